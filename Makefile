@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden house pages bench coverage proof setup lock clean
+.PHONY: demo test check golden house pages bench benchmarks crash coverage fuzz proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -41,11 +41,28 @@ pages: $(STAMP)
 bench: setup
 	$(BIN)/python -m tests.benchmarks
 
+# Every writing command, killed and failed at its calls: what is lost, what is mixed, what the next run mends.
+POINTS ?= 8
+crash: setup
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.crash --most $(POINTS)
+
+# Public sets beside published figures and peers of the same run: DATA is the folder of the publishers' files
+# (docs/benchmarks.md). The peers run where the extra `benchmarks` is installed; else their rows say so.
+benchmarks: setup
+	@test -n "$(DATA)" || { echo "make benchmarks DATA=DIR: the folder of the publishers' files, see docs/benchmarks.md" >&2; exit 2; }
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks $(DATA)
+
 # How often printed intervals hold the truth: tables with exact binomial intervals, some minutes.
 REPETITIONS ?= 60
 coverage: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.coverage --workers $(JOBS) \
 	  --repetitions $(REPETITIONS)
+
+# Every input format, mutated by its structure, through the command that reads it. The seed is printed.
+COUNT   ?= 500
+SECONDS ?= 600
+fuzz: setup
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.fuzz --count $(COUNT) --seconds $(SECONDS)
 
 # A new sealed batch of concealed effects, the tool once on every case, then the answers opened. Resumable.
 CASES ?= 400

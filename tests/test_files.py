@@ -1,17 +1,20 @@
 """Files: whole or not at all."""
 
+import errno
+import math
 import os
+import stat
 from pathlib import Path
 
 import pytest
 
+from toolkit import files
 from toolkit.errors import ConfigError, OutputError
 from toolkit.files import (
     atomic_path,
     check_keys,
     is_number,
     parse_toml,
-    read_regular,
     read_toml,
     sha256_bytes,
     sha256_file,
@@ -78,27 +81,6 @@ def test_missing_toml(tmp_path: Path) -> None:
         read_toml(tmp_path / "x.toml")
 
 
-def test_mode_is_readable_by_others(tmp_path: Path) -> None:
-    write_atomic(tmp_path / "a", b"x")
-    assert (tmp_path / "a").stat().st_mode & 0o777 == 0o644
-
-
-def test_only_a_regular_file_is_read(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(b"whole")
-    (tmp_path / "link").symlink_to("file")
-    (tmp_path / "endless").symlink_to("/dev/zero")
-    os.mkfifo(tmp_path / "pipe")
-    assert read_regular(tmp_path / "file") == read_regular(tmp_path / "link") == b"whole"
-    for name in ("pipe", "endless", "."):
-        with pytest.raises(OSError, match="not a regular file"):
-            read_regular(tmp_path / name)
-    with pytest.raises(FileNotFoundError):
-        read_regular(tmp_path / "none")
-    with pytest.raises(ConfigError) as caught:
-        read_toml(tmp_path / "pipe")
-    assert (caught.value.rule, str(caught.value.got)) == ("no-file", "not a regular file")
-
-
 def test_a_mark_of_byte_order_before_toml_changes_nothing() -> None:
     assert parse_toml(b"\xef\xbb\xbfa = 1\n", where="x.toml") == {"a": 1}
 
@@ -110,7 +92,49 @@ def test_toml_that_no_parser_can_hold_is_an_error_with_a_next_step(text: str) ->
     assert (caught.value.rule, caught.value.where) == ("not-toml", "session.toml")
 
 
-def test_a_whole_number_beyond_every_float_is_no_number() -> None:
-    largest = parse_toml(f"a = {'9' * 308}\nb = {'9' * 309}".encode(), where="")
-    # The largest double is 1.797...e308 (IEEE 754 binary64).
-    assert (is_number(largest["a"]), is_number(largest["b"])) == (True, False)
+def test_a_number_whose_products_are_no_floats_is_no_number() -> None:
+    # The largest double is 1.797...e308 (IEEE 754 binary64): a product of three is still one.
+    whole = parse_toml(f"a = 1{'0' * 100}\nb = {'9' * 309}\nc = -1.1e100".encode(), where="")
+    assert [is_number(whole[key]) for key in "abc"] == [True, False, False]
+    assert math.isfinite(1e100 * 1e100 * 1e100)
+
+
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o027, 0o640), (0o077, 0o600), (0o002, 0o664)])
+def test_a_new_file_has_what_the_umask_leaves(tmp_path: Path, umask: int, mode: int) -> None:
+    before = os.umask(umask)
+    try:
+        write_atomic(tmp_path / "new.toml", "text")
+        (tmp_path / "plain").write_text("text")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "new.toml").stat().st_mode) == mode
+    assert (tmp_path / "plain").stat().st_mode == (tmp_path / "new.toml").stat().st_mode
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o644, 0o664, 0o444])
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path, mode: int) -> None:
+    path = tmp_path / "old.toml"
+    path.write_text("old")
+    path.chmod(mode)
+    write_atomic(path, "new")
+    assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("new", mode)
+
+
+def test_a_part_is_readable_by_nobody_whom_the_file_keeps_out(tmp_path: Path) -> None:
+    path = tmp_path / "secret.toml"
+    path.write_text("old")
+    path.chmod(0o600)
+    with atomic_path(path) as part:
+        assert stat.S_IMODE(part.stat().st_mode) == 0o600
+        part.write_text("new")
+
+
+def test_what_a_flush_does_not_confirm_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(_folder: Path) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(files, "sync_folder", broken)
+    with pytest.raises(OutputError) as caught:
+        write_atomic(tmp_path / "new.toml", "text")
+    assert (tmp_path / "new.toml").read_text() == "text"
+    assert "in its place" in (caught.value.next_step or "")

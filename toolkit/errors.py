@@ -13,6 +13,7 @@
      |- FitError                    a tire model cannot be fitted
      |- TemplateError               a Word template that cannot be used
      |- RenderError                 LibreOffice is missing, failed, or made a PDF that is not the report
+     |- TrustError                  a key, a signature or a log of decisions that proves nothing
      `- OutputError                 a result cannot be written
 
 Anything else that reaches the command line is a bug and ends with exit code 101.
@@ -139,6 +140,10 @@ class TemplateError(ToolkitError):
 
 class RenderError(ToolkitError):
     """LibreOffice is missing, failed, or made a PDF that is not the report."""
+
+
+class TrustError(ToolkitError):
+    """A key, a signature, a person or a log of decisions that cannot be trusted."""
 
 
 class OutputError(ToolkitError):

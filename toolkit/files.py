@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-import errno
 import hashlib
 import os
 import stat
-import sys
-import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
 
 from toolkit.errors import ConfigError, OutputError
+from toolkit.inputs import SETTINGS_FILE, open_regular, read_input
+
+_AT_ONCE = 2**20
+LARGEST = 1e100
+"""No number of a file is larger, in any unit: squares and products of larger ones are no floats."""
 
 
 def sha256_bytes(data: bytes) -> str:
@@ -25,26 +27,11 @@ def sha256_bytes(data: bytes) -> str:
 
 def sha256_file(path: Path) -> str:
     """Return the SHA-256 of a file's content."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def read_regular(path: Path) -> bytes:
-    """Read a file whole, and nothing that is none: a pipe would never end, a device would fill the memory.
-
-    Raises
-    ------
-    OSError
-        it cannot be read, or is no regular file
-    """
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    try:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError(errno.EINVAL, "not a regular file", str(path))
-        with os.fdopen(handle, "rb", closefd=False) as stream:
-            return stream.read()
-    finally:
-        os.close(handle)
+    digest = hashlib.sha256()
+    with open_regular(path) as stream:
+        while data := stream.read(_AT_ONCE):
+            digest.update(data)
+    return digest.hexdigest()
 
 
 @contextlib.contextmanager
@@ -52,7 +39,8 @@ def atomic_path(target: Path) -> Iterator[Path]:
     """Yield a temporary path beside ``target`` and rename it there when the block succeeds.
 
     A reader sees the old file or the new one, never a part: the content is flushed to the disk before
-    the rename and the folder after it. When the block raises, nothing is left behind.
+    the rename and the folder after it. When the block raises, nothing is left behind. A file that is
+    replaced keeps its mode; a new one has what the process's umask and the folder's rules leave it.
 
     Raises
     ------
@@ -60,16 +48,22 @@ def atomic_path(target: Path) -> Iterator[Path]:
         the folder cannot be written to, or the disk is full
     """
     temporary: Path | None = None
+    remedy = "free space or choose another folder with --out; nothing was changed"
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-        os.close(handle)
-        temporary = Path(name)
+        if not target.parent.is_dir():
+            target.parent.mkdir(parents=True, exist_ok=True)
+        mode = _mode(target)
+        temporary = _new_part(target, 0o666 if mode is None else mode)
         yield temporary
         with temporary.open("rb") as stream:
             os.fsync(stream.fileno())
-        temporary.chmod(0o644)
+        if mode is not None:
+            temporary.chmod(mode)
         temporary.replace(target)
+        temporary = None
+        remedy = (
+            "the new file is in its place, but a power cut may undo it: mend the disk, and write it again"
+        )
         sync_folder(target.parent)
     except OSError as error:
         raise OutputError(
@@ -77,12 +71,30 @@ def atomic_path(target: Path) -> Iterator[Path]:
             where=target,
             got=error.strerror or str(error),
             expected="a folder with write permission and free space",
-            next_step="free space or choose another folder with --out; nothing was changed",
+            next_step=remedy,
             rule="not-writable",
         ) from error
     finally:
         if temporary is not None:
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # the error that is raised says more
+                temporary.unlink(missing_ok=True)
+
+
+def _new_part(target: Path, mode: int) -> Path:
+    """Make an empty file of a new name beside ``target``, readable by nobody whom ``mode`` keeps out."""
+    while True:
+        path = target.parent / f".{target.name[:60]}.{os.urandom(4).hex()}.part"
+        with contextlib.suppress(FileExistsError):
+            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode & 0o666 | 0o600))
+            return path
+
+
+def _mode(target: Path) -> int | None:
+    """Return the mode of a file that will be replaced; None where there is none."""
+    try:
+        return stat.S_IMODE(target.stat().st_mode)
+    except FileNotFoundError:
+        return None
 
 
 def write_atomic(target: Path, data: bytes | str) -> None:
@@ -108,28 +120,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     ConfigError
         ``no-file``: missing or unreadable; ``not-toml``
     """
-    return parse_toml(read_bytes(path), where=path)
-
-
-def read_bytes(path: Path) -> bytes:
-    """Read a settings file whole.
-
-    Raises
-    ------
-    ConfigError
-        ``no-file``: missing or unreadable
-    """
-    try:
-        return read_regular(path)
-    except (OSError, ValueError) as error:
-        raise ConfigError(
-            "a settings file cannot be read",
-            where=path,
-            got=getattr(error, "strerror", None) or error,
-            expected="a readable TOML file",
-            next_step="check the path",
-            rule="no-file",
-        ) from error
+    return parse_toml(read_input(path, SETTINGS_FILE), where=path)
 
 
 def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
@@ -155,13 +146,16 @@ def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """Tell whether an entry of a settings file is a finite number that a float can hold.
+    """Tell whether an entry of a settings file is a number that can be computed with: at most 1e100.
 
-    >>> [is_number(one) for one in (1, -2.5, True, "1", float("nan"), 10**400)]
-    [True, True, False, False, False, False]
+    Nothing measured is larger, in any unit; squares of larger ones are no floats, and some solvers wait for
+    ever on what is none.
+
+    >>> [is_number(one) for one in (1, -2.5, True, "1", float("nan"), 10**400, 1e300)]
+    [True, True, False, False, False, False, False]
     """
     # Not math.isfinite: TOML has whole numbers of any length, and one past a float's reach raises there.
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str], *, where: object) -> None:

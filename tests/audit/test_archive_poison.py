@@ -98,3 +98,23 @@ def test_a_worker_killed_in_mid_run_loses_nothing(archive):
     again = audit_archive(archive, REGISTRY, known_at=dt.date(2026, 1, 1), workers=2, step=kill)
     assert again == whole
     assert len(done) == len(set(done)) == len(whole.files)
+
+
+def test_a_file_that_meets_its_limit_of_time_is_not_called_unreadable(tmp_path, monkeypatch):
+    from toolkit.audit import archive as module
+    from toolkit.audit.workers import TIMEOUT_S, Lost, late
+
+    limits = {}
+
+    def run(make, todo, *, workers, timeout_s):
+        limits.update({name: timeout_s(name) for name in todo})
+        return [(name, Lost(reason=late(timeout_s(name)))) for name in todo]
+
+    monkeypatch.setattr(module, "run_isolated", run)
+    (tmp_path / "short.csv").write_bytes(b"1,2\n")
+    with (tmp_path / "long.csv").open("wb") as stream:
+        stream.truncate(200 << 20)
+    told = audit_archive(tmp_path, REGISTRY, known_at=dt.date(2026, 1, 1))
+    assert [finding.rule for finding in told.findings] == ["timeout", "timeout"]
+    assert limits["long.csv"] > 3 * TIMEOUT_S > limits["short.csv"] >= TIMEOUT_S
+    assert f"within {limits['long.csv']:.3g} s" in told.findings[0].message

@@ -37,7 +37,7 @@ def added(monkeypatch):
         runs.append(len(every))
         return sum_up(every)
 
-    def run(make, todo, *, workers):
+    def run(make, todo, *, workers, timeout_s=None):
         work = make()
         return [(name, work(name)) for name in todo]
 

@@ -18,6 +18,7 @@ from tests.audit.audit_factory import (
     record,
     seven_digits,
 )
+from toolkit.audit.candidates import group_of
 from toolkit.audit.columns import columns_of
 from toolkit.audit.identify import identify_columns, recompute, repair
 from toolkit.examples.fig4_4 import packaged_fig4_4
@@ -214,38 +215,63 @@ def test_every_variant_of_a_record_is_recognised_as_itself(order, turned, seed):
     assert (found.variant is None) == (plain and own)
 
 
-def test_rows_that_a_candidate_meets_by_chance_do_not_part_an_unknown_file():
-    from toolkit.audit.identify import Hit, Run, without_chance
+@pytest.mark.parametrize("size", [1, 7, 64])
+def test_a_file_says_the_same_in_whatever_parts_it_is_taken(monkeypatch, size):
+    from toolkit.audit import identify as module
 
-    def hit(group):
-        return (Hit(group=group, signs=(("FY", 0), ("MZ", 0))),)
+    unknown = columns((0.9, 0.9, 0.9, 0.1), rows=150, decimals=1)
+    files = (
+        columns(rows=90),
+        columns(rows=90, decimals=0),
+        joined(columns(rows=40), columns(negative(FY), negative(MZ), rows=25, seed=5)),
+        changed(changed(columns(rows=70), "FY", 63, 0.5), "MZ", 64, 0.37),
+        joined(unknown, columns(order=("D52", "D51", "E5"), rows=9, seed=4)),
+        unknown,
+    )
+    near = record("m15-r5", (0.99722, 0.99718, 1.0228, 0.6473))
+    answers = [judged(file, (R1, R2, near)) for file in files]
+    assert {answer.grade for answer in answers} >= {"exact", "ambiguous", "stale", "unknown"}
+    monkeypatch.setattr(module, "ROWS", size)
+    monkeypatch.setattr(module, "_FIRST_ROWS", size)
+    assert [judged(file, (R1, R2, near)) for file in files] == answers
 
-    chance = (
-        Run(start=0, stop=209, hits=()),
-        Run(start=209, stop=210, hits=hit(7)),
-        Run(start=210, stop=500, hits=()),
-    )
-    assert [(r.start, r.stop, r.hits) for r in without_chance(chance)] == [(0, 500, ())]
-    # A candidate with a fiftieth of the rows, a long run, or a file that is mostly explained: no chance.
-    often = tuple(
-        one
-        for start in range(0, 500, 50)
-        for one in (
-            Run(start=start, stop=start + 49, hits=()),
-            Run(start=start + 49, stop=start + 50, hits=hit(7)),
-        )
-    )
-    assert without_chance(often) == often
-    assert [r.hits for r in without_chance((*often[:8], Run(start=200, stop=500, hits=())))] == [()]
-    long = (
-        Run(start=0, stop=400, hits=()),
-        Run(start=400, stop=404, hits=hit(7)),
-        Run(start=404, stop=500, hits=()),
-    )
-    assert without_chance(long) == long
-    explained = (
-        Run(start=0, stop=6, hits=hit(1)),
-        Run(start=6, stop=7, hits=()),
-        Run(start=7, stop=8, hits=hit(2)),
-    )
-    assert without_chance(explained) == explained
+
+def evaluated(monkeypatch, file):
+    """Rows on which any group is evaluated in full while a file is judged."""
+    from toolkit.audit import identify as module
+
+    rows = []
+
+    def counted(record, part, **how):
+        rows.append(part.rows)
+        return group_of(record, part, **how)
+
+    monkeypatch.setattr(module, "group_of", counted)
+    judged(file)
+    return sum(rows), max(rows)
+
+
+def in_turn(rows):
+    first, second = columns(rows=rows), columns(negative(FY), negative(MZ), rows=rows)
+    odd = np.arange(rows) % 2 == 1
+    return from_arrays(first.x, {load: np.where(odd, second.y[load], first.y[load]) for load in first.y})
+
+
+UNKNOWN = (0.9, 0.9, 0.9, 0.1), (-0.1, 0.2, 0.3, 0.4)
+MANY = {
+    "unknown": lambda rows: columns(*UNKNOWN, rows=rows),
+    "unknown in few digits": lambda rows: columns(*UNKNOWN, rows=rows, decimals=0),
+    "two calibrations in turn": in_turn,
+}
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_what_a_file_of_any_origin_takes_is_linear_in_its_rows(monkeypatch, name):
+    from toolkit.audit import identify as module
+
+    monkeypatch.setattr(module, "ROWS", 256)
+    monkeypatch.setattr(module, "_FIRST_ROWS", 256)
+    few, of_few = evaluated(monkeypatch, MANY[name](1500))
+    many, of_many = evaluated(monkeypatch, MANY[name](6000))
+    assert many < 4.5 * few + 256
+    assert max(of_few, of_many) <= 256

@@ -1,6 +1,6 @@
 import numpy as np
 
-from tests.audit.audit_factory import FY, columns
+from tests.audit.audit_factory import FY, changed, columns
 from toolkit.audit.columns import columns_of
 from toolkit.audit.intervals import coefficient_intervals, interval_bounds
 from toolkit.examples.fig4_4 import packaged_fig4_4
@@ -57,3 +57,35 @@ def test_numbers_without_a_square_leave_every_coefficient_open():
     x = np.random.default_rng(2).uniform(-1e303, 1e303, (20, 1))
     bounds = interval_bounds(x, 0.5 * x[:, 0], half_x=x * 0 + 1e295, half_y=x[:, 0] * 0 + 1e295)
     assert np.isinf(bounds).all()
+
+
+def test_the_rows_of_a_long_file_are_not_all_needed_but_all_held(monkeypatch):
+    from toolkit.audit import intervals as module
+
+    solved = []
+    bounds_of = module._bounds_of
+
+    def counted(x, *others, **halves):
+        solved.append(len(x))
+        return bounds_of(x, *others, **halves)
+
+    for seed, decimals in ((1, 1), (2, 3), (3, 0)):
+        file = columns(rows=3000, seed=seed, decimals=decimals)
+        whole = np.array([(i.low, i.high) for i in coefficient_intervals(file, "FY")])
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "_MANY", 500)
+            patch.setattr(module, "_SPREAD", 40)
+            patch.setattr(module, "_bounds_of", counted)
+            parted = np.array([(i.low, i.high) for i in coefficient_intervals(file, "FY")])
+        np.testing.assert_allclose(parted, whole, rtol=1e-5)
+    assert max(solved) < 500
+
+
+def test_one_row_of_a_long_file_that_no_equation_gives_is_not_passed_over(monkeypatch):
+    from toolkit.audit import intervals as module
+
+    file = changed(columns(rows=3000, decimals=2), "FY", 1234, 1.0)
+    monkeypatch.setattr(module, "_MANY", 500)
+    monkeypatch.setattr(module, "_SPREAD", 40)
+    assert coefficient_intervals(file, "FY") == ()
+    assert coefficient_intervals(file, "MZ") != ()

@@ -35,7 +35,7 @@ def asked(monkeypatch):
     """Names that a run gave to its workers; the work is done here, for what starts processes is not asked."""
     names = []
 
-    def run(make, todo, *, workers):
+    def run(make, todo, *, workers, timeout_s=None):
         assert workers == 1
         names.extend(todo)
         work = make()

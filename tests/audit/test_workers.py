@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.audit.worker_jobs import make
-from toolkit.audit.workers import Lost, run_isolated
+from toolkit.audit.workers import TIMEOUT_S, Lost, late, run_isolated, time_limit
 from toolkit.errors import ConfigError
 
 
@@ -42,10 +42,24 @@ def test_only_the_file_that_kills_its_worker_is_lost(workers, second):
 
 def test_a_file_that_hangs_is_given_up_and_the_others_go_on():
     names = ["a", "hang", "b", "c"]
-    found = dict(run_isolated(make, names, workers=1, timeout_s=2.0))
+    found = dict(run_isolated(make, names, workers=1, timeout_s=lambda _: 2.0))
     assert isinstance(found["hang"], Lost)
     assert found["hang"].reason.startswith("timeout")
     assert [found[name] for name in "abc"] == ["A", "B", "C"]
+
+
+def test_the_limit_of_time_is_each_files_and_is_told():
+    limits = {"a": 60.0, "hang": 1.0, "b": 60.0}
+    found = dict(run_isolated(make, list(limits), workers=1, timeout_s=limits.__getitem__))
+    assert found["hang"] == Lost(reason=late(1.0))
+    assert "within 1 s, the limit of time for a file of its size" in late(1.0)
+    assert (found["a"], found["b"]) == ("A", "B")
+
+
+def test_the_limit_of_time_grows_with_the_size():
+    # 2 million rows of seven numbers are 120 MB; the shortest limit is that of an empty file.
+    assert time_limit(0) == TIMEOUT_S
+    assert time_limit(120 * 2**20) - time_limit(60 * 2**20) == time_limit(60 * 2**20) - time_limit(0) > 60
 
 
 def test_a_file_whose_worker_was_killed_by_somebody_else_is_read_by_the_next(tmp_path):

@@ -14,16 +14,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.benchmarks import (
+    audit_kills,
     audit_rate,
     diagnose_nulls,
     diagnose_time,
+    diagnose_worker,
     fit_rows,
     help_time,
     monte_carlo,
     process_time,
+    registry_growth,
     report_batch,
     report_time,
+    seal_time,
     tire_fits,
+    unknown_rows,
     verify_records,
 )
 
@@ -34,11 +39,16 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "reports": report_batch.run,
     "fit": fit_rows.run,
     "verify": verify_records.run,
+    "registry": registry_growth.run,
+    "seal": seal_time.run,
     "monte-carlo": monte_carlo.run,
     "audit": audit_rate.run,
+    "audit-kills": audit_kills.run,
+    "unknown": unknown_rows.run,
     "tires": tire_fits.run,
     "diagnose": diagnose_time.run,
     "diagnose-nulls": diagnose_nulls.run,
+    "diagnose-worker": diagnose_worker.run,
 }
 
 

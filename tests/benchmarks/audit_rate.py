@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import os
 import statistics
-import subprocess
-import sys
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -31,7 +29,7 @@ from tests.benchmarks.archive_factory import (
     compare,
     make_archive,
 )
-from tests.benchmarks.timing import row
+from tests.benchmarks.timing import row, run_command
 
 FILES, WORKERS = int(os.environ.get("AUDIT_FILES", "5000")), 2
 FEW = max(FILES // 10, 40)
@@ -202,27 +200,6 @@ def _plain_script(folder: Path, names: tuple[str, ...]) -> list[str]:
 
 
 def _peak_MB(archive: Archive) -> float:
-    words = [str(Path(sys.executable).with_name("toolkit")), "audit", str(archive.folder), "--calibrations",
-             str(archive.calibrations), "--workers", str(WORKERS), "--json"]  # fmt: skip
-    child = subprocess.Popen(words, stdout=subprocess.DEVNULL)
-    peak = 0.0
-    while child.poll() is None:
-        peak = max(peak, *(_high_water_MB(pid) for pid in (child.pid, *_children(child.pid))))
-        time.sleep(0.02)
-    return peak
-
-
-def _children(pid: int) -> list[int]:
-    try:
-        return [int(one) for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    except OSError:
-        return []
-
-
-def _high_water_MB(pid: int) -> float:
-    # Of this program alone: what wait4 tells includes the process that started it.
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    except OSError:
-        return 0.0
-    return next((int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM")), 0.0)
+    words = ["audit", str(archive.folder), "--calibrations", str(archive.calibrations), "--workers",
+             str(WORKERS), "--json"]  # fmt: skip
+    return run_command(words)[1]

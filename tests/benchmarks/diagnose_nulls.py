@@ -57,7 +57,7 @@ def run(folder: Path, pairs: int) -> list[dict[str, object]]:
     count, alarms = 29 * pairs, 0
     seconds: list[float] = []
     for i in range(count):
-        path = _draw(folder / f"null{i}", _COLOURS[i % len(_COLOURS)], seed=i)
+        path = draw(folder / f"null{i}", _COLOURS[i % len(_COLOURS)], seed=i)
         began = time.process_time()
         answer = diagnose(read_case(path), None).diagnosis
         seconds.append(time.process_time() - began)
@@ -67,7 +67,8 @@ def run(folder: Path, pairs: int) -> list[dict[str, object]]:
     return [row(what, seconds, "none: processor time of one, 6 000 rows", None, "2 %")]
 
 
-def _draw(folder: Path, phi: float, *, seed: int) -> Path:
+def draw(folder: Path, phi: float, *, seed: int) -> Path:
+    """Write one clean recording and its case, the noise AR(phi); return the case."""
     import pandas as pd
     from scipy.signal import lfilter
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 
 def pairs(
@@ -37,3 +40,41 @@ def row(
         "pairs": len(ours),
         "unit": unit,
     }
+
+
+def run_command(words: list[str]) -> tuple[float, float]:
+    """Return the seconds that `toolkit` takes with these words, and its peak memory [MB].
+
+    The peak is that of the largest of its processes, as the kernel has it of each.
+
+    Raises
+    ------
+    RuntimeError
+        the command cannot use what it was given
+    """
+    started = time.perf_counter()
+    program = str(Path(sys.executable).with_name("toolkit"))
+    child = subprocess.Popen([program, *words], stdout=subprocess.DEVNULL)
+    peak = 0.0
+    while child.poll() is None:
+        peak = max(peak, *(_high_water_MB(pid) for pid in (child.pid, *_children(child.pid))))
+        time.sleep(0.02)
+    if child.returncode not in (0, 1):
+        raise RuntimeError(f"toolkit {' '.join(words)}: exit code {child.returncode}")
+    return time.perf_counter() - started, peak
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        return [int(one) for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+
+
+def _high_water_MB(pid: int) -> float:
+    # Of this program alone: what wait4 tells includes the process that started it.
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return next((int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM")), 0.0)

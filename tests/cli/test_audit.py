@@ -159,3 +159,10 @@ def _sha(path):
     from toolkit.files import sha256_file
 
     return sha256_file(path)
+
+
+def test_a_file_name_with_a_line_break_stays_in_its_row_and_moves_no_cursor(archive):
+    (archive / "2019" / "run" / "a\nb\x1b[2J\u2028c.csv").write_text("nothing,of,use\n")
+    lines = run(archive).stdout.split("\n")
+    assert sum("a\\nb\\x1b[2J\\u2028c.csv" in line for line in lines) == 1
+    assert not any("\x1b" in line or line.startswith("b") for line in lines)

@@ -100,7 +100,7 @@ def test_the_life_of_a_record(run: Run, session: Path) -> None:
     assert run("calibration", "verify", "--head", "0" * 64)[0] == 1
     withdrawn = run(
         "calibration", "withdraw", "pair-r1", "--on", "2026-04-01", "--from", "2026-03-01",
-        "--reason", "dropped",
+        "--reason", "dropped", "--by", "B",
     )  # fmt: skip
     assert (withdrawn[0], withdrawn[1]["void_from"]) == (0, "2026-03-01")
     assert (

@@ -82,3 +82,57 @@ def test_a_report_template_is_no_certificate_template(run: Run, tmp_path: Path) 
     code, answer = run("m15-virtual-r1", "--template", TEMPLATE.with_name("org.docx"))
     assert (code, answer["error"]["rule"]) == (2, "missing-required")
     assert list(tmp_path.iterdir()) == []
+
+
+def _with_country(tmp_path: Path) -> Path:
+    template = tmp_path.parent / f"{tmp_path.name} templates" / "certificate.docx"
+    template.parent.mkdir()
+    shutil.copy(TEMPLATE, template)
+    style = (TEMPLATE.parent / "org.toml").read_text()
+    (template.parent / "org.toml").write_text(style.replace("[laboratory]", '[laboratory]\ncountry = "DE"'))
+    return template
+
+
+@office_needed
+def test_a_sealed_certificate_is_a_pdf_a_3_with_its_proof_and_a_sealed_xml(run: Run, tmp_path: Path) -> None:
+    from tests.trust.seal.seal_factory import key, trust
+    from toolkit.files import sha256_file
+    from toolkit.recording.marks import refuse_original
+    from toolkit.trust.seal.authority import to_pem
+    from toolkit.trust.seal.pdf import check_pdf
+    from toolkit.trust.seal.xml import check_xml
+
+    (tmp_path / "key.pem").write_bytes(to_pem(key()))
+    code, answer = run(
+        "m15-virtual-r1", "--template", _with_country(tmp_path), "--dcc", "--known-at", "2026-04-01",
+        "--seal", tmp_path / "key.pem",
+    )  # fmt: skip
+    assert (code, answer["sealed_by"]) == (1, "Tire laboratory")
+    pdf = Path(answer["pdf"]).read_bytes()
+    check = check_pdf(pdf, trust())
+    assert check.signature == "valid"
+    proof = json.loads(check.attachments["toolkit.json"])
+    assert proof["records"] == [{"id": "m15-virtual-r1", "sha256": answer["record"]["sha256"]}]
+    assert {entry["name"]: entry["sha256"] for entry in proof["files"]} == {
+        Path(answer[kind]).name: sha256_file(Path(answer[kind])) for kind in ("docx", "dcc")
+    }
+    assert b"<pdfaid:part>3</pdfaid:part>" in pdf
+    assert check_xml(Path(answer["dcc"]).read_bytes(), trust()).signature == "valid"
+    # The same command may write over its own files again: the mark is still in them.
+    for kind in ("pdf", "dcc", "docx"):
+        refuse_original(Path(answer[kind]), suffix=Path(answer[kind]).suffix)
+
+
+@office_needed
+def test_a_key_that_cannot_seal_leaves_nothing(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "key.pem").write_text("no key")
+    code, answer = run("m15-virtual-r1", "--seal", tmp_path / "key.pem")
+    assert (code, answer["error"]["rule"]) == (2, "seal-key")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_draft_is_never_sealed(run: Run, tmp_path: Path) -> None:
+    code, answer = run("m15-virtual-r1", "--draft", "--seal", tmp_path / "key.pem")
+    assert (code, answer["error"]["rule"]) == (2, "usage")
+    code, answer = run("m15-virtual-r1", "--time-stamp", "http://127.0.0.1:9/")
+    assert (code, answer["error"]["rule"]) == (2, "usage")

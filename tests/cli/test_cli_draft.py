@@ -210,7 +210,7 @@ def test_a_reduced_test_of_a_record_in_force_is_converted_and_one_withdrawn_sinc
     assert lines[0] == "SA [deg],FZ [N],FY [N],MZ [N*m]"
     table.unlink()
     registry = Registry(own / "calibrations")
-    withdraw(registry, "m15-virtual-r1", on=today(), reason="cell overloaded")
+    withdraw(registry, "m15-virtual-r1", on=today(), reason="cell overloaded", by="B")
     for words in (("convert", whole, table), ("fit", whole), ("report", whole, "--out", tmp_path / "out")):
         code, answer = toolkit(capsys, own, *words)
         assert (code, answer["error"]["rule"]) == (2, "not-in-force")

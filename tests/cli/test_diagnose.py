@@ -149,3 +149,12 @@ def test_an_effect_of_some_runs_names_them(run, tmp_path):
     (one,) = answered(tmp_path / "out")["effects"]
     assert one["parameters"][0]["runs"] in (["r0.csv"], ["r1.csv"])
     assert f"in {one['parameters'][0]['runs'][0]} alone" in found.stdout
+
+
+def test_a_document_without_libreoffice_is_refused_before_the_search(run, tmp_path, monkeypatch):
+    monkeypatch.delenv("TOOLKIT_SOFFICE", raising=False)
+    monkeypatch.setenv("PATH", "")
+    found = run(tmp_path / "no-case.toml", "--out", tmp_path / "out", "--pdf")
+    assert isinstance(found.exception, ToolkitError)
+    assert found.exception.rule == "no-soffice"  # and not that there is no such case
+    assert not (tmp_path / "out").exists()

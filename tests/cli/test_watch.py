@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from toolkit import files
+from toolkit import files, publication
 from toolkit.cli.watch import command
 from toolkit.errors import (
     ConfigError,
@@ -30,7 +30,7 @@ from toolkit.errors import (
 from toolkit.findings import Finding
 from toolkit.lab.home import packaged_home
 from toolkit.lab.reports import MadeReport
-from toolkit.lab.watching import SET_ASIDE, STATE, Round, Watcher
+from toolkit.lab.watching import BATCH, SET_ASIDE, STATE, Round, Watcher
 from toolkit.recording.marks import is_own_output
 
 office_needed = pytest.mark.skipif(
@@ -143,7 +143,7 @@ def test_a_disk_too_full_for_the_state_ends_no_watch_and_is_written_later(
     bench.test("bad")
     bench.faults["bad"] = UnreadableError("it is no recording", where="run", rule="not-a-workbook")
     bench.look()
-    monkeypatch.setattr(files, "write_atomic", full)
+    monkeypatch.setattr(publication, "write_result", full)
     found = bench.look(after=4)
     assert [one.test.name for one in found.made] == ["one"]
     assert {one.test for one in found.waiting} == {STATE, "bad.txt"}
@@ -162,6 +162,43 @@ def test_all_tests_that_are_whole_are_made_in_one_call(bench: Bench) -> None:
     bench.look()
     bench.look(after=4)
     assert bench.reported == [["one", "two"]]
+
+
+def test_many_tests_are_made_in_batches_and_the_state_is_kept_with_each(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(2 * BATCH + 3):
+        bench.test(f"t{number:02}")
+    bench.look()
+    saved: list[int] = []
+    save = bench.watcher._save
+    monkeypatch.setattr(bench.watcher, "_save", lambda: (saved.append(len(bench.watcher.state)), save()))
+    assert len(bench.look(after=4).made) == 2 * BATCH + 3
+    assert [len(batch) for batch in bench.reported] == [BATCH, BATCH, 3]
+    assert saved == [BATCH, 2 * BATCH, 2 * BATCH + 3]
+
+
+def test_what_did_not_change_is_not_read_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    hashed: list[str] = []
+    asked: list[str] = []
+    real = files.sha256_file
+    monkeypatch.setattr(files, "sha256_file", lambda path: (hashed.append(path.parent.name), real(path))[1])
+    bench.watcher.registry = lambda: (asked.append("once"), bench.registry)[1]
+    for number in range(5):
+        bench.test(f"t{number}")
+        bench.faults[f"t{number}"] = RegistryError("none is in force", rule="no-record-in-force")
+    bench.look()
+    saved: list[int] = []
+    save = bench.watcher._save
+    monkeypatch.setattr(bench.watcher, "_save", lambda: (saved.append(1), save()))
+    assert len(bench.look(after=4).set_aside) == 5
+    assert (len(hashed), len(asked), len(saved)) == (10, 2, 1)
+    assert len(bench.look(after=4).set_aside) == 5
+    assert (len(hashed), len(asked), len(saved)) == (10, 3, 1)
+    bench.test("t3", "another content")
+    bench.look(after=4)
+    bench.look(after=4)
+    assert hashed[10:] == ["t3", "t3"]
 
 
 def test_a_partial_file_is_waited_for(bench: Bench) -> None:

@@ -174,7 +174,7 @@ def _prose(root: Path, pages: Iterable[Path]) -> Iterator[tuple[str, int, str]]:
                 if console:
                     continue
                 yield page.relative_to(root).as_posix(), number, text
-    for folder in (PACKAGE, "tests", "proof"):
+    for folder in (PACKAGE, "tests", "proof", "benchmarks"):
         for path in sorted((root / folder).rglob("*.py")):
             text = path.read_text(encoding="utf-8")
             if path.is_relative_to(root / "tests" / "house") or not (".md" in text or "docs/" in text):

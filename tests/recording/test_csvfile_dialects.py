@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tests.recording.format_checks import whole
 from tests.recording.workbook_factory import DATA, HEADERS
 from toolkit.errors import CellError, ColumnError, ToolkitError, UnreadableError
 from toolkit.machine import load_machine
-from toolkit.recording import read_recording
+from toolkit.recording import csvfile, read_recording
 
 M15 = load_machine("m15")
 DIALECTS = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]
@@ -203,7 +204,7 @@ def number(cell: str, separator: str, decimal: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     cells=st.lists(
         st.text(st.sampled_from("0123456789.,;-eE \t"), min_size=1, max_size=6), min_size=1, max_size=3
@@ -226,3 +227,72 @@ def test_whatever_stands_in_the_cells_a_comma_is_one_thing_in_a_whole_file(read,
     found = read("\n".join(rows))
     assert found["D52"].values[: len(wanted)].tolist() == wanted
     assert found["FZ"].values[0] == DATA[0][0]
+
+
+CELLS = (
+    "1",
+    "-2.5",
+    "3,5",
+    "+.5",
+    "1e3",
+    "1E-00003",
+    "1e00003",
+    " 7 ",
+    '"8"',
+    "1_0",
+    "nan",
+    "x",
+    "",
+    "1 2",
+    "1,234",
+)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.lists(st.sampled_from(CELLS), min_size=7, max_size=8), min_size=1, max_size=5),
+    st.sampled_from([",", ";", "\t"]),
+    st.sampled_from(["\n", "\r\n", "\r", "\n\n"]),
+    st.sampled_from(["", "\n", ",,\n", "sep=;\n", "1\r"]),
+    st.sampled_from([1 << 20, 40]),
+)
+def test_a_table_that_is_read_in_parts_is_what_is_read_cell_by_cell(
+    tmp_path, monkeypatch, rows, separator, end, above, part
+):
+    def answer():
+        try:
+            recording = read_recording(path, load_machine("m15"))
+        except ToolkitError as error:
+            return error.as_dict()
+        return [(s.header, s.unit, s.values.tolist()) for s in recording.series]
+
+    path = tmp_path / "table.csv"
+    lines = [separator.join(HEADERS), *(separator.join(cells) for cells in rows)]
+    path.write_bytes((above + end.join(lines) + end).encode())
+    with monkeypatch.context() as patch:
+        patch.setattr(csvfile, "_PART", part)
+        in_parts = answer()
+        patch.setattr(csvfile, "_plain_table", lambda *_: None)
+        assert in_parts == answer()
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal", "encoding"),
+    [(",", ".", "utf-8"), (";", ",", "utf-8-sig"), ("\t", ".", "utf-16")],
+)
+def test_plain_numbers_take_no_object_for_each_cell(tmp_path, separator, decimal, encoding):
+    # 16 bytes for each number: its own and the one that the reader has beside it. A list of floats takes 32,
+    # and the text of each cell 50 more.
+    def peak(count):
+        rows = DATA * (count // len(DATA))
+        path = tmp_path / "table.csv"
+        path.write_bytes(text(rows, separator=separator, decimal=decimal).encode(encoding))
+        data = path.read_bytes()
+        tracemalloc.start()
+        read_recording(path, load_machine("m15"), data=data)
+        high = tracemalloc.get_traced_memory()[1] - (3 * len(data) if encoding == "utf-16" else 0)
+        tracemalloc.stop()
+        return high
+
+    more = 20_000
+    assert peak(20_000 + more) - peak(20_000) < 16 * more * len(HEADERS)

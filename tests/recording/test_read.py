@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -222,3 +224,13 @@ def test_the_second_reader_disagrees(tmp_path, read):
     with pytest.raises(CellError, match="E3") as caught:
         cross_check(gate(path), "Sheet1", table)
     assert caught.value.rule == "readers-differ"
+
+
+@pytest.mark.parametrize("number", ["1.7e308", "-1.1e100"])
+def test_a_number_that_cannot_be_measured_is_refused(tmp_path: Path, number: str) -> None:
+    path = tmp_path / "run.csv"
+    rows = [",".join(map(str, row)) for row in DATA]
+    path.write_text("\n".join([",".join(HEADERS), number + rows[0][rows[0].index(",") :], *rows[1:]]))
+    with pytest.raises(CellError, match="data row 1") as caught:
+        read_recording(path, load_machine("m15"))
+    assert (caught.value.rule, caught.value.got) == ("nan-cell", str(float(number)))

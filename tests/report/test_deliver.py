@@ -8,6 +8,7 @@ import errno
 import os
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -173,6 +174,16 @@ def test_a_failed_conversion_leaves_nothing(tmp_path: Path, monkeypatch, script:
     assert not office.folder.exists()
 
 
+def test_temporary_files_of_a_libreoffice_that_was_killed_go_with_it(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, 'echo x > "$TMPDIR/lu12.tmp"; kill -9 $$')))
+    with pytest.raises(RenderError):
+        deliver(opened(tmp_path, p("x")), content(), tmp_path / "out")
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("script", "ends"),
     [
@@ -297,3 +308,18 @@ def test_a_report_is_known_again_and_replaces_only_a_report(tmp_path: Path, plai
         assert is_own_output(new)
         assert is_own_output(old)
         assert new.read_bytes() != old.read_bytes()
+
+
+@pytest.mark.parametrize("locale", ["de_DE.UTF-8", "tr_TR.UTF-8"])
+def test_no_document_takes_its_language_from_who_converts_it(
+    tmp_path: Path, monkeypatch, locale: str
+) -> None:
+    note = 'echo "$LC_ALL/$LANGUAGE" >> "$NOTES"\n'
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, note + _NOTING.replace('>> "$NOTES"', ""))))
+    monkeypatch.setenv("NOTES", str(tmp_path / "notes"))
+    for name in ("LC_ALL", "LANG", "LANGUAGE"):
+        monkeypatch.setenv(name, locale)
+    (tmp_path / "a.docx").write_bytes(b"")
+    with Office() as office:
+        office.convert_each([tmp_path / "a.docx"], tmp_path)
+    assert set((tmp_path / "notes").read_text().split()) == {"C.UTF-8/"}

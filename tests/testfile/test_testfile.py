@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import openpyxl
 import pytest
+import python_calamine
 
 from toolkit.characteristics.model import Characteristics, Row
 from toolkit.errors import RecordingError, ToolkitError
@@ -82,6 +83,26 @@ def test_numbers_are_numbers_and_texts_are_never_formulas(tmp_path: Path, made: 
     heads = [cell.value for cell in reduced[1]]
     assert reduced.cell(2, heads.index("FY [N]") + 1).value == made[0].reduced.conditions[0].FY
     assert book["raw"].max_row == 1 + sum(one.rows for one in made[1].values())
+
+
+def test_rows_beyond_a_worksheets_last_go_on_in_another(
+    tmp_path: Path, made: Made, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from toolkit.testfile import write
+
+    rows = sum(one.rows for one in made[1].values())
+    whole, parted = tmp_path / "whole.xlsx", tmp_path / "parted.xlsx"
+    write_test_file(whole, made[0], made[1])
+    monkeypatch.setattr(write, "_SHEET_ROWS", rows // 2 + 1)
+    monkeypatch.setattr(write, "_AT_A_TIME", 7)
+    write_test_file(parted, made[0], made[1])
+    expected = python_calamine.load_workbook(whole).get_sheet_by_name("raw").to_python()
+    book = python_calamine.load_workbook(parted)
+    first, second = (book.get_sheet_by_name(name).to_python() for name in ("raw", "raw 2"))
+    assert first[0] == second[0] == expected[0]
+    assert len(first) == rows // 2 + 2
+    assert first[1:] + second[1:] == expected[1:]
+    assert read_test_file(parted) == made[0]
 
 
 def test_it_says_that_it_is_simulated(file: Path) -> None:

@@ -19,11 +19,13 @@ from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.model import CLEAN, GRADES, TELLS, Grade
 from toolkit.audit.one_file import Auditor, unreadable
 from toolkit.audit.resume import Done, Files, Results, done
-from toolkit.audit.workers import Lost, run_isolated
+from toolkit.audit.workers import Lost, run_isolated, time_limit
 from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
-from toolkit.files import atomic_path, sha256_bytes
+from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
+from toolkit.inputs import open_regular
+from toolkit.publication import publication
 from toolkit.recording.folder import TEST_FILE
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
 from toolkit.version import __version__
@@ -84,7 +86,7 @@ def write_sums(folder: Path, sums: Sums, key: str) -> None:
     OutputError
         the folder cannot be written to
     """
-    with atomic_path(folder / SUMS) as temporary, temporary.open("wb") as stream:
+    with publication(folder) as stage, (stage / SUMS).open("wb") as stream:
         digest = hashlib.sha256()
         for line in _lines(sums, key):
             digest.update(line)
@@ -95,7 +97,7 @@ def write_sums(folder: Path, sums: Sums, key: str) -> None:
 def read_sums(folder: Path, key: str) -> Sums | None:
     """Return the sums that were kept under a key; None where there are none, or they are damaged."""
     try:
-        with (folder / SUMS).open("rb") as stream:
+        with open_regular(folder / SUMS) as stream:
             first = stream.readline()
             head = json.loads(first)
             if head["key"] != key:
@@ -159,7 +161,9 @@ def _of_file(line: Mapping[str, Any]) -> list[Finding]:
         message = f"its test.toml cannot be used, the file counts as undated: {line['test_toml']}"
         findings.append(Finding(rule="test-toml", where=path, message=message))
     if grade == "unreadable":
-        findings.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
+        # A file that met its limit of time was not judged, and may be sound.
+        rule = "timeout" if (reason or "").startswith("timeout:") else "unreadable-file"
+        findings.append(Finding(rule=rule, where=path, message=reason or ""))
     elif grade not in CLEAN:
         findings.append(Finding(rule=f"identified-{grade}", where=path, message=reason or sentence(line)))
     return findings
@@ -274,14 +278,17 @@ def audit_archive(
             "an audit needs a worker", where="--workers", got=workers, expected="1 or more",
             next_step="name the number of processes; the number of cores is a good one", rule="usage",
         )  # fmt: skip
-    day = known_at or today()
+    day = known_at or max([today(), *(registry.ledger(name).known_on() for name in registry.instruments())])
     todo = inventory(archive) if names is None else names
     digest = _hash(registry, day)
+    limit = partial(_limit, archive)
     make: Callable[[], Callable[[str], Done]] = partial(_Worker, archive, registry, day)
     if scheduler is None:
-        run = partial(run_isolated, make, workers=workers)
+        run = partial(run_isolated, make, workers=workers, timeout_s=limit)
     else:
-        run = partial(run_on_cluster, _remote(archive, registry, day, digest), address=scheduler)
+        run = partial(
+            run_on_cluster, _remote(archive, registry, day, digest), address=scheduler, timeout_s=limit
+        )
     with Results(out, archive=archive, registry_hash=digest) as results:
         reused: set[str] = set()
         for name in results.known(todo):
@@ -294,6 +301,13 @@ def audit_archive(
         files = results.files(todo)
         sums = _sums(out, files, results.digest(todo))
         return _judged(archive, registry, day, files, sums, reused=len(reused))
+
+
+def _limit(archive: Path, name: str) -> float:
+    try:
+        return time_limit((archive / name).stat().st_size)
+    except OSError:
+        return time_limit(0)  # its worker tells what is wrong
 
 
 class _Worker:

@@ -16,13 +16,15 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
-from toolkit.audit.workers import DIED, TIMEOUT_S, Lost
+from toolkit.audit.workers import DIED, TIMEOUT_S, Lost, late, under_limits
 from toolkit.errors import ConfigError
+from toolkit.inputs import raised_to
 from toolkit.recording.extras import needed
 
 # The scheduler of a cluster: whether one answers at an address, and with which certificates.
@@ -130,7 +132,7 @@ def run_on_cluster(
     names: Sequence[str],
     *,
     address: str,
-    timeout_s: float = TIMEOUT_S,
+    timeout_s: Callable[[str], float] = lambda _: TIMEOUT_S,
     batch: int = BATCH,
     empty_s: float = EMPTY_S,
 ) -> Iterator[tuple[str, Result | Lost]]:
@@ -141,7 +143,7 @@ def run_on_cluster(
     make : called once in each thread of a worker, returns what is called with each name; both must pickle
     names : what there is to do
     address : of the scheduler, ``tcp://host:8786``; ``tls://``: see `toolkit.audit.scheduler`
-    timeout_s : of one name; its worker is ended beyond, for its nanny to start again
+    timeout_s : of each name; its worker is ended beyond, for its nanny to start again
     batch : names a task
     empty_s : how long a cluster without workers is waited for
 
@@ -155,11 +157,12 @@ def run_on_cluster(
     if not names:
         return
     client = _client(distributed, address)
+    make = partial(under_limits, raised_to(), make)
     try:
         doubtful: list[str] = []
         yield from _batches(client, distributed, make, names, doubtful, timeout_s, batch, empty_s, address)
         for name in doubtful:
-            yield name, _alone(client, distributed, make, name, timeout_s, empty_s, address)
+            yield name, _alone(client, distributed, make, name, timeout_s(name), empty_s, address)
     finally:
         client.close(timeout=CONNECT_S)
 
@@ -189,7 +192,7 @@ def _batches(
     make: Callable[[], Callable[[str], Result]],
     names: Sequence[str],
     doubtful: list[str],
-    timeout_s: float,
+    timeout_s: Callable[[str], float],
     batch: int,
     empty_s: float,
     address: str,
@@ -205,7 +208,8 @@ def _batches(
         elif time.monotonic() - last_worker > empty_s:
             raise _no_workers(address, empty_s)
         for part in islice(todo, max(_AHEAD * max(threads, 1) - len(flying), 0)):
-            task = client.submit(_several, make, tuple(part), token, timeout_s, pure=False, retries=0)
+            limits = [timeout_s(name) for name in part]
+            task = client.submit(_several, make, tuple(part), token, limits, pure=False, retries=0)
             flying[task] = part
         if not flying:
             return
@@ -234,10 +238,9 @@ def _alone(
     tries: int = _TRIES,
 ) -> Result | Lost:
     token = uuid.uuid4().hex
-    task = client.submit(_several, make, (name,), token, timeout_s, pure=False, retries=0)
+    task = client.submit(_several, make, (name,), token, [timeout_s], pure=False, retries=0)
     began = last_worker = time.monotonic()
     started = False
-    late = f"timeout: no answer within {timeout_s:g} s"
     try:
         while not _wait(client, distributed, [task]):
             now = time.monotonic()
@@ -250,7 +253,7 @@ def _alone(
             elif not started:
                 began = now  # a little before it starts
             if started and now - began > timeout_s + _GRACE_S:
-                return Lost(reason=late)
+                return Lost(reason=late(timeout_s))
         try:
             answer = _result(distributed, task, address)
         except _LostResultError:
@@ -262,7 +265,8 @@ def _alone(
             result: Result = answer[0]
             return result
         # The worker ends itself where the time is up.
-        return Lost(reason=late if started and time.monotonic() - began >= timeout_s else DIED)
+        over = started and time.monotonic() - began >= timeout_s
+        return Lost(reason=late(timeout_s) if over else DIED)
     finally:
         task.cancel(force=True)
 
@@ -321,12 +325,12 @@ def _threads(client: Any, address: str) -> int:
 
 
 def _several(
-    make: Callable[[], Callable[[str], Result]], names: tuple[str, ...], token: str, timeout_s: float
+    make: Callable[[], Callable[[str], Result]], names: tuple[str, ...], token: str, limits: Sequence[float]
 ) -> list[Result]:
     """Do some names in a worker's thread, whose state is made once a run."""
     if getattr(_made, "token", None) != token:
         _made.work, _made.token = make(), token
-    return [_timed(_made.work, name, timeout_s) for name in names]
+    return [_timed(_made.work, name, limit) for name, limit in zip(names, limits, strict=True)]
 
 
 def _timed(work: Callable[[str], Result], name: str, timeout_s: float) -> Result:

@@ -38,7 +38,7 @@ class Columns:
         """Number of rows."""
         return len(self.x)
 
-    def part(self, rows: slice) -> Columns:
+    def part(self, rows: slice | NDArray[np.int64]) -> Columns:
         """Return some of the rows; each keeps the last place that the whole file gave it."""
         return replace(
             self,

@@ -26,12 +26,15 @@ from toolkit.audit.model import CLEAN
 from toolkit.calibration.registry.registry import instrument_of
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import OutputError, ToolkitError
-from toolkit.files import sha256_bytes, sha256_file, write_atomic
+from toolkit.files import sha256_file
+from toolkit.inputs import SETTINGS_FILE, read_input
+from toolkit.publication import publication, settle
 from toolkit.recording.folder import TEST_FILE, nearest_test_toml
 from toolkit.recording.formats.write import WRITERS, Written
 from toolkit.recording.labview import write_labview
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
 from toolkit.recording.read import read_recording
+from toolkit.staging import PASSING
 from toolkit.units import from_si, si_scale
 
 if TYPE_CHECKING:
@@ -90,7 +93,11 @@ def check_target(archive: Path, target: Path) -> None:
         raise _refused(target, f"the archive is {source_folder}", "a folder apart from the archive")
     if target.exists() and not target.is_dir():
         raise _refused(target, "a file", "a folder")
-    if target.is_dir() and any(target.iterdir()) and not (target / INDEX).is_file():
+    settle(target)
+    results = (
+        [path for path in target.iterdir() if not path.name.startswith(PASSING)] if target.is_dir() else []
+    )
+    if results and not (target / INDEX).is_file():
         raise _refused(target, "a folder with other files", f"an empty folder, or one with {INDEX} of before")
 
 
@@ -102,7 +109,7 @@ def write_copies(
     draft: bool = False,
     step: Callable[[str], None] = lambda _: None,
 ) -> tuple[Copy, ...]:
-    """Write the corrected copies of an audited archive, and their index; return all of them.
+    """Write the corrected copies of an audited archive and their index, together; return all of them.
 
     Files without a record in force, and those that are right, have no copy; where the record in force may
     not make a number (it is expired), the copy is refused unless a ``draft`` is asked for.
@@ -115,40 +122,42 @@ def write_copies(
     check_target(audit.archive, target)
     standings: dict[tuple[str, str], Standing] = {}
     copies: list[Copy] = []
-    for plain in audit.files.plain():
-        if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
-            continue
-        key = (plain["in_force"], plain["date"])
-        if key not in standings:
-            standings[key] = standing(
-                registry,
-                instrument_of(key[0]),
-                on=dt.date.fromisoformat(key[1]),
-                known_at=audit.known_at,
-                named=key[0],
-            )
-        copies.append(_copy(audit.archive, plain, standings[key], target, draft=draft))
-        step(plain["path"])
-    manifest = {
-        "generator": GENERATOR,
-        "marks": OWN_OUTPUT,
-        "schema": 1,
-        "known_at": audit.known_at.isoformat(),
-        "heads": dict(audit.heads),
-        "files": [copy.as_dict() for copy in copies],
-    }
-    write_atomic(target / INDEX, json.dumps(manifest, indent=2) + "\n")
+    with publication(target) as stage:
+        for plain in audit.files.plain():
+            if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
+                continue
+            folder = (target / plain["path"]).parent
+            if not folder.resolve().is_relative_to(target.resolve()):
+                raise _refused(folder, "a link that leads outside", "a plain folder")
+            key = (plain["in_force"], plain["date"])
+            if key not in standings:
+                standings[key] = standing(
+                    registry,
+                    instrument_of(key[0]),
+                    on=dt.date.fromisoformat(key[1]),
+                    known_at=audit.known_at,
+                    named=key[0],
+                )
+            copies.append(_copy(audit.archive, plain, standings[key], stage, draft=draft))
+            step(plain["path"])
+        manifest = {
+            "generator": GENERATOR,
+            "marks": OWN_OUTPUT,
+            "schema": 1,
+            "known_at": audit.known_at.isoformat(),
+            "heads": dict(audit.heads),
+            "files": [copy.as_dict() for copy in copies],
+        }
+        (stage / INDEX).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
     return tuple(copies)
 
 
-def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, target: Path, *, draft: bool) -> Copy:
+def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, stage: Path, *, draft: bool) -> Copy:
     record = standing.record
-    path, place = archive / plain["path"], target / plain["path"]
+    path, place = archive / plain["path"], stage / plain["path"]
     failed: str | None = None
     sha256: str | None = None
     use: CalibrationUse | None = None
-    if not place.parent.resolve().is_relative_to(target.resolve()):
-        raise _refused(place.parent, "a link that leads outside", "a plain folder")
     try:
         use = standing.use(draft=draft, where=path)
         context = context_of(path)
@@ -159,7 +168,7 @@ def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, target: P
             columns = columns_of(recording)
             _write(place, recording, recompute(columns, record), use)
             sha256 = sha256_file(place)
-            _keep_test(path, archive, target)
+            _keep_test(path, archive, stage)
     except OutputError:
         raise
     except ToolkitError as error:
@@ -180,12 +189,12 @@ def _write(
 ) -> None:
     place.parent.mkdir(parents=True, exist_ok=True)
     if recording.format == "csv":
-        write_atomic(place, _csv(recording, new))
+        place.write_text(_csv(recording, new), encoding="utf-8", newline="")
         return
     title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
     title += f"; {use.mark}" if use.mark else ""
     if recording.format in WRITERS:
-        write_atomic(place, WRITERS[recording.format](_copied_columns(recording, new), title))
+        place.write_bytes(WRITERS[recording.format](_copied_columns(recording, new), title))
         return
     machine = recording.machine
     units = {column.symbol: column.unit for column in machine.columns}
@@ -223,16 +232,15 @@ def _csv(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> str:
     return stream.getvalue()
 
 
-def _keep_test(path: Path, archive: Path, target: Path) -> None:
+def _keep_test(path: Path, archive: Path, stage: Path) -> None:
     # The test's own test.toml goes along, as it is: without it a copy has no date and no machine.
     toml = nearest_test_toml(path.parent)
     root = Path(os.path.abspath(archive))  # noqa: PTH100  resolve() would follow links
     if toml is None or root not in toml.parents:
         return
-    place = target / toml.parent.relative_to(root) / TEST_FILE
-    data = toml.read_bytes()
-    if not place.is_file() or sha256_bytes(place.read_bytes()) != sha256_bytes(data):
-        write_atomic(place, data)
+    place = stage / toml.parent.relative_to(root) / TEST_FILE
+    if not place.exists():
+        place.write_bytes(read_input(toml, SETTINGS_FILE))
 
 
 def _refused(target: Path, got: str, expected: str) -> OutputError:

@@ -7,18 +7,18 @@ unit of its fifth significant digit. Candidates that the file cannot tell apart 
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.audit.candidates import Group, describe, unfit
+from toolkit.audit.candidates import Group, describe, group_of, unfit
 from toolkit.audit.columns import Columns
 from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
-from toolkit.audit.screen import Key, Screen, screen_of
+from toolkit.audit.runs import Hit, Partition, Reach, Runs, products, reach_of, without_chance
+from toolkit.audit.screen import Key, Screen, probe_rows, screen_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.units import si_scale
 
@@ -27,129 +27,10 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
 
-# Segments: which candidate fits which rows of a file that changes in the middle.
+ROWS = 1 << 15
+"""Rows on which candidates are evaluated at a time."""
 
-
-_LUCKY = 3  # rows
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hit:
-    """A candidate: ``group`` by its index, and the sign variant of each load by its index."""
-
-    group: int
-    signs: tuple[tuple[str, int], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """Rows ``start`` to ``stop`` (0-based, stop excluded) and the candidates that fit all of them."""
-
-    start: int
-    stop: int
-    hits: tuple[Hit, ...]
-
-
-def whole_file(fits: Sequence[dict[str, NDArray[np.bool_]]]) -> tuple[Hit, ...]:
-    """Return the candidates that fit every row; ``fits`` has (variants, rows) a load for each group."""
-    hits: list[Hit] = []
-    for index, by_load in enumerate(fits):
-        choices = [[(load, int(v)) for v in np.flatnonzero(fit.all(axis=1))] for load, fit in by_load.items()]
-        hits += _products(index, choices)
-    return tuple(hits)
-
-
-def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[Run, ...]:
-    """Split a file into runs of rows that the same candidates fit."""
-    lengths = [{load: _run_lengths(fit) for load, fit in by_load.items()} for by_load in fits]
-    # A pair of variants fits as long as the shorter of the two; the longest pair is wanted.
-    reaches = np.zeros((len(fits), rows), dtype=np.int64)
-    for reach, by_load in zip(reaches, lengths, strict=True):
-        if by_load:
-            reach[:] = np.minimum.reduce([length.max(axis=0) for length in by_load.values()])
-    runs: list[Run] = []
-    row = 0
-    while row < rows:
-        reach_here = reaches[:, row]
-        longest = int(reach_here.max(initial=0))
-        hits: list[Hit] = []
-        for index in np.flatnonzero(reach_here == longest).tolist() if longest else ():
-            choices = [
-                [(load, int(v)) for v in np.flatnonzero(length[:, row] >= longest)]
-                for load, length in lengths[index].items()
-            ]
-            hits += _products(index, choices)
-        if longest == 0 and runs and not runs[-1].hits:
-            runs[-1] = Run(start=runs[-1].start, stop=row + 1, hits=())
-        else:
-            runs.append(Run(start=row, stop=row + max(longest, 1), hits=tuple(hits)))
-        row += max(longest, 1)
-    return tuple(runs)
-
-
-def without_chance(runs: Sequence[Run]) -> tuple[Run, ...]:
-    """Return the runs without those that a file of unknown origin has by chance.
-
-    Thousands of candidates meet a few rows of any file. Where over half of the rows have no candidate, a run
-    of one to three rows counts only if one of its candidates explains three rows and a fiftieth of the file.
-    """
-    unknown = sum(run.stop - run.start for run in runs if not run.hits)
-    if 2 * unknown <= runs[-1].stop:
-        return tuple(runs)
-    explained: Counter[Hit] = Counter()
-    for run in runs:
-        explained.update(dict.fromkeys(run.hits, run.stop - run.start))
-    enough = max(_LUCKY, runs[-1].stop / 50)
-    kept_runs: list[Run] = []
-    for run in runs:
-        lucky = run.stop - run.start <= _LUCKY and all(explained[hit] < enough for hit in run.hits)
-        if run.hits and not lucky:
-            kept_runs.append(run)
-        elif kept_runs and not kept_runs[-1].hits:
-            kept_runs[-1] = Run(start=kept_runs[-1].start, stop=run.stop, hits=())
-        else:
-            kept_runs.append(Run(start=run.start, stop=run.stop, hits=()))
-    return tuple(kept_runs)
-
-
-def _run_lengths(fit: NDArray[np.bool_]) -> NDArray[np.int64]:
-    # How many rows from this one on fit without a break, variants x rows.
-    rows = fit.shape[1]
-    position = np.arange(rows)
-    breaks = np.where(fit, rows, position)
-    next_break = np.minimum.accumulate(breaks[:, ::-1], axis=1)[:, ::-1]
-    return np.asarray(next_break - position)
-
-
-def _products(index: int, choices: list[list[tuple[str, int]]]) -> list[Hit]:
-    import itertools
-
-    if not choices:
-        return []
-    return [Hit(group=index, signs=signs) for signs in itertools.product(*choices)]
-
-
-def distinct_rivals(groups: Sequence[Group], accepted: Hit, *, slack: bool) -> tuple[Hit, ...]:
-    """Return the candidates that this file cannot tell from the accepted one, itself included.
-
-    Two candidates are told apart where their predictions differ, in some row of FY or MZ, by more than the
-    sum of their two bounds (twice the bound): then not both could fit.
-    """
-    accepted_group = groups[accepted.group]
-    close: list[Hit] = []
-    for index, group in enumerate(groups):
-        choices = []
-        for load, variant in accepted.signs:
-            mine, rival = accepted_group.families[load], group.families[load]
-            limit = mine.bound + rival.bound
-            if slack:
-                limit = limit + mine.slack + rival.slack
-            apart = np.abs(rival.predicted - mine.predicted[variant]) > limit
-            choices.append([(load, int(v)) for v in np.flatnonzero(~apart.any(axis=1))])
-        close += _products(index, choices)
-    return tuple(close)
-
-
+_FIRST_ROWS = 1 << 9
 _ALIKE = "{:.12g}"
 
 
@@ -238,36 +119,45 @@ def repair(
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Judge:
+    # Groups are evaluated on some thousand rows at a time, and only as long as they may still be accepted.
     columns: Columns
     screen: Screen
     on: date | None
     in_force: CalibrationRecord | None
     void: frozenset[str]
-    groups: list[Group] = field(default_factory=list)  # those that the screen let through so far
-    _keys: set[Key] = field(default_factory=set)
+    groups: list[Group] = field(default_factory=list)  # those that were looked at so far, on no rows
+    _places: dict[Key, int] = field(default_factory=dict)
+    _small: dict[tuple[int, str, float], bool] = field(default_factory=dict)
 
     def segments(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
         """Return the file's segments and the answer of each: the whole file first, parts only if it must."""
         usual = self._usual()
         if usual is not None:
             return usual
-        self._let_in(self.screen.for_all_rows(self.columns))
+        everywhere = [self._place(key) for key in self.screen.for_all_rows(self.columns)]
         for slack in (False, True):
-            hits = whole_file(self._fits(slack=slack))
+            hits = self._whole_file(everywhere, slack=slack)
             if hits:
                 answers = self._answers(hits, slack=slack)
                 if len(answers) == 1:  # and does nothing else come near?
-                    accepted = self.groups[hits[0].group]
-                    self._let_in(self.screen.close_to(accepted, self.columns, dict(hits[0].signs)))
-                    answers = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
-                return self._conclusion([Run(start=0, stop=self.columns.rows, hits=hits)], [answers])
-        self._let_in(self.screen.anywhere(self.columns))
+                    rivals = self._rivals(hits[0], everywhere, slack=slack)
+                    answers = self._answers(rivals, slack=slack)
+                return self._conclusion([(0, self.columns.rows, answers)])
         parts = [
-            (slack, without_chance(partition(self._fits(slack=slack), self.columns.rows)))
-            for slack in (False, True)
+            (slack, without_chance(runs)) for slack, runs in zip((False, True), self._runs(), strict=True)
         ]
-        slack, runs = min(parts, key=lambda part: (_unknown_rows(part[1]), len(part[1]), part[0]))
-        return self._conclusion(runs, [self._answers(run.hits, slack=slack) for run in runs])
+        slack, runs = min(parts, key=lambda part: (part[1].unknown, part[1].parts, part[0]))
+        answered: dict[bytes, tuple[_Answer, ...]] = {}
+        signatures = runs.signatures()
+        for place, signature in enumerate(signatures):
+            if signature not in answered:
+                answered[signature] = self._answers(runs.hits(place), slack=slack)
+        return self._conclusion(
+            [
+                (start, stop, () if place is None else answered[signatures[place]])
+                for start, stop, place in runs.bounds()
+            ]
+        )
 
     def _usual(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]] | None:
         # Most files are what they should be: by the record in force, as it is, and by nothing else.
@@ -277,44 +167,118 @@ class _Judge:
         if self.in_force.id not in ids or not self.columns.loads:
             return None
         plain = tuple(range(len(self.in_force.indications)))
-        self._let_in([(ids.index(self.in_force.id), False, plain)])
-        for load, family in self.groups[0].families.items():
-            if not bool(np.all(np.abs(family.predicted[0] - self.columns.y[load]) <= family.bound)):
-                return None
-        hit = Hit(group=0, signs=tuple((load, 0) for load in self.groups[0].families))
-        self._let_in(self.screen.close_to(self.groups[0], self.columns, dict(hit.signs)))
-        answers = self._answers(distinct_rivals(self.groups, hit, slack=False), slack=False)
+        place = self._place((ids.index(self.in_force.id), False, plain))
+        for part in self._parts():
+            for load, family in self._on(place, part).families.items():
+                if not bool(np.all(np.abs(family.predicted[0] - part.y[load]) <= family.bound)):
+                    return None
+        hit = Hit(group=place, signs=tuple((load, 0) for load in self.columns.loads))
+        answers = self._answers(self._rivals(hit, [], slack=False), slack=False)
         if len(answers) > 1:
             return None
-        return self._conclusion([Run(start=0, stop=self.columns.rows, hits=(hit,))], [answers])
+        return self._conclusion([(0, self.columns.rows, answers)])
 
-    def _let_in(self, keys: Sequence[Key]) -> None:
-        new = [key for key in keys if key not in self._keys]
-        self._keys.update(new)
-        self.groups += [self.screen.group(key, self.columns) for key in new]
+    def _place(self, key: Key) -> int:
+        if key not in self._places:
+            self._places[key] = len(self.groups)
+            self.groups.append(self.screen.group(key, self.columns.part(slice(0, 0))))
+        return self._places[key]
 
-    def _fits(self, *, slack: bool) -> list[dict[str, NDArray[np.bool_]]]:
-        return [
-            {
-                load: np.abs(family.predicted - self.columns.y[load])
-                <= family.bound + (family.slack if slack else 0.0)
-                for load, family in group.families.items()
-            }
-            for group in self.groups
-        ]
+    def _on(self, place: int, part: Columns) -> Group:
+        group = self.groups[place]
+        return group_of(group.record, part, order=group.order, issued=group.issued)
+
+    def _parts(self) -> Iterator[Columns]:
+        # Short parts first: most candidates are refused by a few rows.
+        start, size = 0, _FIRST_ROWS
+        while start < self.columns.rows:
+            yield self.columns.part(slice(start, start + size))
+            start, size = start + size, min(4 * size, ROWS)
+
+    def _whole_file(self, places: Sequence[int], *, slack: bool) -> tuple[Hit, ...]:
+        # The candidates that fit every row.
+        def fits(place: int, part: Columns) -> dict[str, NDArray[np.bool_]]:
+            return _fits(self._on(place, part), part, slack=slack)
+
+        return self._lasting(places, fits)
+
+    def _rivals(self, accepted: Hit, others: Sequence[int], *, slack: bool) -> tuple[Hit, ...]:
+        """Return the candidates that this file cannot tell from the accepted one, itself included.
+
+        Two candidates are told apart where their predictions differ, in some row of FY or MZ, by more than
+        the sum of their two bounds (twice the bound): then not both could fit.
+        """
+        signs = dict(accepted.signs)
+        probe = self.columns.part(probe_rows(self.columns.rows))
+        close = self.screen.close_to(self._on(accepted.group, probe), probe, signs)
+        places = dict.fromkeys([accepted.group, *others, *(self._place(key) for key in close)])
+        mine: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+        seen: Columns | None = None
+
+        def alike(place: int, part: Columns) -> dict[str, NDArray[np.bool_]]:
+            nonlocal seen
+            if part is not seen:
+                seen = part
+                for load, family in self._on(accepted.group, part).families.items():
+                    bound = family.bound + family.slack if slack else family.bound
+                    mine[load] = family.predicted[signs[load]], bound
+            close: dict[str, NDArray[np.bool_]] = {}
+            for load, rival in self._on(place, part).families.items():
+                predicted, limit = mine[load]
+                limit = limit + (rival.bound + rival.slack if slack else rival.bound)
+                close[load] = ~(np.abs(rival.predicted - predicted) > limit)
+            return close
+
+        return self._lasting(tuple(places), alike)
+
+    def _lasting(
+        self, places: Sequence[int], fits: Callable[[int, Columns], dict[str, NDArray[np.bool_]]]
+    ) -> tuple[Hit, ...]:
+        # The candidates of these groups that fit part after part, to the last row.
+        lasting: dict[int, dict[str, NDArray[np.bool_]]] = {place: {} for place in places}
+        for part in self._parts():
+            for place, before in list(lasting.items()):
+                now = {load: np.asarray(fit.all(axis=1)) for load, fit in fits(place, part).items()}
+                for load, fit in before.items():
+                    now[load] &= fit
+                if all(fit.any() for fit in now.values()):
+                    lasting[place] = now
+                else:
+                    del lasting[place]
+            if not lasting:
+                break
+        return tuple(hit for place, variants in lasting.items() for hit in products(place, variants))
+
+    def _runs(self) -> tuple[Runs, Runs]:
+        # Without and with a unit of the coefficients' fifth digit.
+        variants = 2 ** (len(self.columns.names) + 1)
+        parted = Partition(self.columns.loads, variants), Partition(self.columns.loads, variants)
+        for start in range(0, self.columns.rows, ROWS):
+            part = self.columns.part(slice(start, start + ROWS))
+            reaches: tuple[list[Reach], list[Reach]] = [], []
+            for key, rows in self.screen.anywhere(part):
+                few = part.part(rows)
+                place = self._place(key)
+                group = self._on(place, few)
+                for slack, of_slack in zip((False, True), reaches, strict=True):
+                    of_slack.append(reach_of(place, rows + start, _fits(group, few, slack=slack)))
+            for partition, of_slack in zip(parted, reaches, strict=True):
+                partition.add(start + part.rows, of_slack)
+        return parted[0].runs(), parted[1].runs()
 
     def _conclusion(
-        self, runs: Sequence[Run], answers: Sequence[tuple[_Answer, ...]]
+        self, parts: Sequence[tuple[int, int, tuple[_Answer, ...]]]
     ) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
+        # Of each part its first row, its stop, and what explains it.
         segments, single = [], []
-        for run, answer in zip(runs, answers, strict=True):
+        for start, stop, answer in parts:
             only = answer[0] if len(answer) == 1 else None
             # What all candidates of an ambiguous file share is known of it.
             variants = {a.variant for a in answer}
             segments.append(
                 Segment(
-                    first_row=run.start + 1,
-                    last_row=run.stop,
+                    first_row=start + 1,
+                    last_row=stop,
                     record=only.record if only else None,
                     variant=variants.pop() if len(variants) == 1 else None,
                     grade=self._grade(only) if only else "ambiguous" if answer else "unknown",
@@ -389,8 +353,13 @@ class _Judge:
         # The sign of a constant that is smaller than what rounding hides says nothing: it counts as right.
         family = self.groups[hit.group].families[load]
         signs = [int(s) for s in family.signs[variant]]
-        constant = _constant(self.groups[hit.group].record, load, family.coefficients[variant])
-        if bool(np.all(abs(constant) <= family.bound)):
+        size = abs(_constant(self.groups[hit.group].record, load, family.coefficients[variant]))
+        place = hit.group, load, size
+        if place not in self._small:
+            self._small[place] = all(
+                bool(np.all(size <= self._on(hit.group, part).families[load].bound)) for part in self._parts()
+            )
+        if self._small[place]:
             signs[-1] = 1
         return tuple(signs)
 
@@ -455,5 +424,10 @@ def _moved(order: tuple[int, ...]) -> int:
     return sum(i != image for i, image in enumerate(order))
 
 
-def _unknown_rows(runs: Sequence[Run]) -> int:
-    return sum(run.stop - run.start for run in runs if not run.hits)
+def _fits(group: Group, part: Columns, *, slack: bool) -> dict[str, NDArray[np.bool_]]:
+    # By load, (variants, rows).
+    return {
+        load: np.abs(family.predicted - part.y[load])
+        <= (family.bound + family.slack if slack else family.bound + 0.0)
+        for load, family in group.families.items()
+    }

@@ -16,7 +16,7 @@ from toolkit.audit.quality import impossible
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
-from toolkit.reduction.blocks import find_blocks, is_tare
+from toolkit.reduction.blocks import Block, block_means, find_blocks, is_tare
 from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.units import si_scale
 
@@ -104,9 +104,7 @@ def choose(
 
     ``offered``: the choice of another day, whose records need not be read and checked again.
     """
-    from toolkit.calibration.registry.clock import today
-
-    now = known_at or today()
+    now = registry.ledger(instrument).known_on(known_at)
     if offered is not None:
         if on is None or offered.trouble is not None:
             return replace(offered, in_force=None)
@@ -116,7 +114,8 @@ def choose(
     statuses: list[RecordStatus] = []
     force: dict[dt.date, CalibrationRecord | None] = {}
     try:
-        statuses = [registry.status(record.id, known_at=now) for record in records]
+        by_id = registry.statuses(instrument, known_at=now) if records else {}
+        statuses = [by_id[record.id] for record in records]
         for day in {now, on or now}:
             force[day] = _in_force(registry, instrument, day, now)
     except RegistryError as error:
@@ -179,14 +178,14 @@ def inspect_file(
             )
         corrector = choice.in_force or choice.today
         corrected = None if corrector is None else _corrected(columns, corrector)
-    blocks = _blocks(recording, corrected)
-    loaded = [block for block in blocks if not block.tare] or list(blocks)
+    first, *blocks = _blocks(recording, corrected)
+    loaded = [block for block in blocks if not block.tare] or blocks
     rows = sum(block.last_row - block.first_row + 1 for block in loaded)
     return Inspection(
         recording=recording,
         context=context,
-        blocks=blocks,
-        first_row=_means(recording, corrected, 0, 1),
+        blocks=tuple(blocks),
+        first_row=first,
         slip_angle_rad=sum(b.SA_rad * (b.last_row - b.first_row + 1) for b in loaded) / rows,
         identification=identification,
         columns=columns,
@@ -249,39 +248,40 @@ def _corrected(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray
 
 
 def _blocks(recording: Recording, corrected: dict[str, NDArray[np.float64]] | None) -> tuple[LoadBlock, ...]:
-    return tuple(
-        _means(recording, corrected, block.start, block.stop) for block in find_blocks(recording["FZ"].si)
-    )
+    # The first row stands before the blocks, as one of its own.
+    first = Block(start=0, stop=1, mean_FZ=float(recording["FZ"].si[0]))
+    blocks = (first, *find_blocks(recording["FZ"].si))
+    rows = [(block.start, block.stop) for block in blocks]
+    nothing: list[float | None] = [None] * len(blocks)
 
-
-def _means(
-    recording: Recording, corrected: dict[str, NDArray[np.float64]] | None, start: int, stop: int
-) -> LoadBlock:
-    from toolkit.reduction.blocks import Block
-
-    def own(symbol: str) -> float | None:
+    def own(symbol: str) -> list[float | None]:
         if not recording.has(symbol):
-            return None
+            return nothing
         series = recording[symbol]
-        return float(series.values[start:stop].mean()) * si_scale(series.unit)
+        means: list[float | None] = (block_means(series.values, rows) * si_scale(series.unit)).tolist()
+        return means
 
-    def right(symbol: str) -> float | None:
-        if corrected is None or symbol not in corrected:
-            return None
-        return float(corrected[symbol][start:stop].mean())
+    def right(symbol: str) -> list[float | None]:
+        values = (corrected or {}).get(symbol)
+        means: list[float | None] = nothing if values is None else block_means(values, rows).tolist()
+        return means
 
-    FZ = float(recording["FZ"].si[start:stop].mean())
     smallest = min(recording.machine.protocol.loads_N, default=0.0)
-    return LoadBlock(
-        first_row=start + 1,
-        last_row=stop,
-        tare=is_tare(Block(start=start, stop=stop, mean_FZ=FZ), smallest_load=smallest),
-        FZ_N=FZ,
-        SA_rad=float(recording["SA"].si[start:stop].mean()) if recording.has("SA") else math.nan,
-        FY_file_N=own("FY"),
-        MZ_file_Nm=own("MZ"),
-        FY_N=right("FY"),
-        MZ_Nm=right("MZ"),
+    SA = block_means(recording["SA"].si, rows).tolist() if recording.has("SA") else [math.nan] * len(blocks)
+    values = zip(blocks, SA, own("FY"), own("MZ"), right("FY"), right("MZ"), strict=True)
+    return tuple(
+        LoadBlock(
+            first_row=block.start + 1,
+            last_row=block.stop,
+            tare=is_tare(block, smallest_load=smallest),
+            FZ_N=block.mean_FZ,
+            SA_rad=SA_rad,
+            FY_file_N=FY_file,
+            MZ_file_Nm=MZ_file,
+            FY_N=FY,
+            MZ_Nm=MZ,
+        )
+        for block, SA_rad, FY_file, MZ_file, FY, MZ in values
     )
 
 

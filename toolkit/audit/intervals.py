@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 
 _STEPS = 200
 _TIGHT = 1e-11
+_MANY = 1 << 15  # rows; so many are looked at together
+_SPREAD = 1 << 11  # rows of a longer file to begin with
+_ROUNDS = 60
+_SPARE = 1e-6  # of what a row allows: round-off of large loads in small digits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +89,64 @@ def interval_bounds(
     ----------
     x, half_x : (rows, channels) values and their half last places
     y, half_y : (rows,) the same of the load
+
+    Notes
+    -----
+    Of a long file a few thousand rows are taken, and with them whichever rows their answers break, until they
+    break none: the answer is that of all rows, at the cost of a few passes over them.
     """
+    if len(x) <= _MANY:
+        return _bounds_of(x, y, half_x=half_x, half_y=half_y)[0]
+    chosen = _first_rows(x, y)
+    for _ in range(_ROUNDS):
+        bounds, points = _bounds_of(x[chosen], y[chosen], half_x=half_x[chosen], half_y=half_y[chosen])
+        if bounds is None:
+            return None  # a part of the rows that nothing fits
+        if not np.isfinite(bounds).all():
+            break  # so few rows bound too little
+        broken = _broken(points, x, y, half_x, half_y)
+        if not len(broken):
+            return bounds
+        chosen = np.union1d(chosen, broken)
+    return _bounds_of(x, y, half_x=half_x, half_y=half_y)[0]
+
+
+def _first_rows(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    # Spread over the file, and the ends of every column.
+    columns = [*x.T, y]
+    ends = [int(at) for column in columns for at in (np.argmin(column), np.argmax(column))]
+    spread = np.linspace(0, len(y) - 1, _SPREAD).round().astype(np.int64)
+    return np.union1d(spread, np.array(ends, dtype=np.int64))
+
+
+def _broken(
+    points: Sequence[NDArray[np.float64]],
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    half_x: NDArray[np.float64],
+    half_y: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """Return the rows that coefficients (channels + 1,) break worst, a part of the file at a time."""
+    rows: set[int] = set()
+    for start in range(0, len(y), _MANY):
+        part = slice(start, start + _MANY)
+        for point in points:
+            allowed = half_y[part] + half_x[part] @ np.abs(point[:-1])
+            over = np.abs(y[part] - x[part] @ point[:-1] - point[-1]) - allowed * (1 + _SPARE)
+            worst = int(np.argmax(over))
+            if over[worst] > 0:
+                rows.add(start + worst)
+    return np.array(sorted(rows), dtype=np.int64)
+
+
+def _bounds_of(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    *,
+    half_x: NDArray[np.float64],
+    half_y: NDArray[np.float64],
+) -> tuple[NDArray[np.float64] | None, list[NDArray[np.float64]]]:
+    # `interval_bounds`, and the coefficients at which each end is reached.
     n = x.shape[1]
     rounding = np.maximum(half_y, 1e-12 * max(float(np.abs(y).max()), np.finfo(float).tiny))
     # In the directions of a QR factorisation, about the least-squares solution and in units of the rounding,
@@ -92,15 +154,16 @@ def interval_bounds(
     scale = np.maximum(np.abs(np.column_stack([x, np.ones(len(x))])).max(axis=0), np.finfo(float).tiny)
     q, r = np.linalg.qr(np.column_stack([x, np.ones(len(x))]) / scale / rounding[:, None])
     if np.abs(np.diag(r)).min() <= 1e-10 * np.abs(np.diag(r)).max():
-        return np.tile([-np.inf, np.inf], (n + 1, 1))  # a dead channel, or one that is another's multiple
+        return np.tile([-np.inf, np.inf], (n + 1, 1)), []  # a dead channel, or one that is another's multiple
     back = np.linalg.inv(r) / scale[:, None]
     target = y / rounding
     centre, residual = back @ (q.T @ target), target - q @ (q.T @ target)
     low, high = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
+    points: list[NDArray[np.float64]] = []
     with np.errstate(over="ignore"):
         size = np.linalg.norm(back, axis=1)
     if not np.isfinite(size).all():
-        return np.tile([-np.inf, np.inf], (n + 1, 1))  # numbers that no double precision can compare
+        return np.tile([-np.inf, np.inf], (n + 1, 1)), []  # numbers that no double precision can compare
     for signs in itertools.product(*_possible_signs(q, back, centre, half_x, half_y, rounding)):
         turned = np.array(signs)
         allowed = half_x / rounding[:, None] * turned  # |c| half_x for these signs
@@ -114,7 +177,8 @@ def interval_bounds(
                 break  # no solution has these signs
             low[i] = min(low[i], -np.inf if ends[0] is None else centre[i] + ends[0] * size[i])
             high[i] = max(high[i], np.inf if ends[1] is None else centre[i] - ends[1] * size[i])
-    return np.column_stack([low, high]) if np.all(low <= high) else None
+        points += [centre + back @ point for point in polytope.points]
+    return (np.column_stack([low, high]) if np.all(low <= high) else None), points
 
 
 def _possible_signs(
@@ -155,6 +219,7 @@ class _Polytope:
         self._right = np.concatenate([right / size, np.full(2 * len(corner), self._far)])
         self._given = (area, right)
         self.empty = False
+        self.points: list[NDArray[np.float64]] = []  # at which a goal was lowest
 
     def lowest(self, goal: NDArray[np.float64]) -> float | None:
         """Return the lowest value of ``goal`` x; None where there is no point at all, or no limit.
@@ -173,7 +238,10 @@ class _Polytope:
                 new = int(np.argmax(over))
                 if over[new] <= _TIGHT * (1.0 + abs(self._right[new])):
                     free = bool(np.any((basis >= self._cube) & (weights > _TIGHT)))
-                    return None if free else float(goal @ point)
+                    if free:
+                        return None
+                    self.points.append(point)
+                    return float(goal @ point)
                 moves = np.linalg.solve(sides.T, self._area[new])
             except np.linalg.LinAlgError:
                 break
@@ -184,12 +252,15 @@ class _Polytope:
             ratio = np.full(n, np.inf)
             ratio[blocking] = np.maximum(weights[blocking], 0.0) / moves[blocking]
             basis[int(np.argmin(ratio))] = new
-        return _lowest(goal, *self._given)
+        return self._solved(goal)
 
+    def _solved(self, goal: NDArray[np.float64]) -> float | None:
+        # By a general solver where the steps did not end; None where the programme has no lowest value.
+        from scipy.optimize import linprog
 
-def _lowest(goal: NDArray[np.float64], area: NDArray[np.float64], right: NDArray[np.float64]) -> float | None:
-    # By a general solver where the steps above did not end; None where the programme has no lowest value.
-    from scipy.optimize import linprog
-
-    answer = linprog(goal, A_ub=area, b_ub=right, bounds=(None, None), method="highs")
-    return float(answer.fun) if answer.status == 0 and answer.fun is not None else None
+        area, right = self._given
+        answer = linprog(goal, A_ub=area, b_ub=right, bounds=(None, None), method="highs")
+        if answer.status != 0 or answer.fun is None:
+            return None
+        self.points.append(np.asarray(answer.x))
+        return float(answer.fun)

@@ -20,9 +20,11 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, read_bytes
-from toolkit.recording.archive import MAX_FILE_BYTES
+from toolkit.files import check_keys
+from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
+from toolkit.publication import ENTERING, PENDING, settle
 from toolkit.recording.marks import GENERATOR
+from toolkit.staging import PASSING
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
@@ -174,7 +176,7 @@ def _words(text: str) -> str:
 
 def _of_csv(source: Path) -> Iterator[PastReport]:
     try:
-        text = read_bytes(source).decode("utf-8-sig")
+        text = read_input(source, LIST_FILE).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise _bad(source, f"byte {error.start} is no UTF-8", "a CSV file in UTF-8") from error
     try:
@@ -201,7 +203,12 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
 
 def _of_folder(folder: Path) -> Iterator[PastReport]:
     for place, folders, names in os.walk(folder):
-        folders[:] = sorted(name for name in folders if not (Path(place) / name).is_symlink())
+        if {PENDING, ENTERING} & {*folders}:
+            settle(Path(place))
+            names = [path.name for path in Path(place).iterdir() if path.is_file()]
+        folders[:] = sorted(
+            name for name in folders if not name.startswith(PASSING) and not (Path(place) / name).is_symlink()
+        )
         manifests = [
             _manifest(Path(place) / name, folder) for name in sorted(names) if name.endswith(".json")
         ]
@@ -219,10 +226,10 @@ def _of_folder(folder: Path) -> Iterator[PastReport]:
 
 
 def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
-    if path.is_symlink() or path.stat().st_size > MAX_FILE_BYTES:
+    if path.is_symlink():
         return None
     try:
-        manifest = json.loads(path.read_bytes())
+        manifest = json.loads(read_regular(path, RECORDING_FILE))
     except (OSError, ValueError, RecursionError):
         return None
     if not isinstance(manifest, dict) or manifest.get("generator") != GENERATOR or "inputs" not in manifest:

@@ -25,8 +25,8 @@ from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, sign
 from toolkit.errors import ToolkitError
 from toolkit.files import read_toml, sha256_bytes, sha256_file
 from toolkit.findings import Finding
+from toolkit.inputs import RECORDING_FILE, limit_of, read_regular
 from toolkit.machine import load_machine
-from toolkit.recording.archive import MAX_FILE_BYTES
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
@@ -98,7 +98,7 @@ class Auditor:
         path = self.archive / name
         try:
             size = path.stat().st_size
-            data = path.read_bytes() if size <= MAX_FILE_BYTES else None
+            data = read_regular(path, RECORDING_FILE) if size <= limit_of(RECORDING_FILE) else None
             # The gate refuses a larger one without reading it; of others the reader tells the hash.
             large = sha256_file(path) if data is None else ""
         except OSError as error:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.errors import OutputError
-from toolkit.files import atomic_path
+from toolkit.publication import publication
 from toolkit.recording.extras import needed
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, refuse_original
 
@@ -52,9 +52,9 @@ def write_parquet(
     marks = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": "1", "kind": "audit"}
     schema = _schema(arrow, reports=reports).with_metadata({**marks, "known_at": known_at.isoformat()})
     rows = iter(files)
-    with atomic_path(target) as temporary:
+    with publication(target.parent) as stage:
         try:
-            with parquet.ParquetWriter(temporary, schema) as writer:
+            with parquet.ParquetWriter(stage / target.name, schema) as writer:
                 while batch := [_row(line, schema.names) for line in itertools.islice(rows, _BATCH)]:
                     writer.write_batch(arrow.RecordBatch.from_pylist(batch, schema=schema))
         except arrow.ArrowInvalid as error:

@@ -28,6 +28,7 @@ from toolkit.audit.one_file import FileAudit, OwnOutput
 from toolkit.audit.serial import SHAPE, from_plain, to_plain
 from toolkit.errors import OutputError
 from toolkit.files import sha256_bytes, sha256_file
+from toolkit.inputs import SETTINGS_FILE, open_regular_to_append, raised_to, read_regular
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
 from toolkit.version import __version__
@@ -122,7 +123,8 @@ class Results:
             ``in-use``: another audit writes here; ``output``: the folder cannot be written to
         """
         self._archive = archive
-        self._base = f"{__version__}|{SHAPE}|{registry_hash}"
+        limits = f"|{raised_to()}" if raised_to() else ""
+        self._base = f"{__version__}|{SHAPE}|{registry_hash}{limits}"
         self._tomls: dict[str, str] = {}
         # path -> key, CRC-32 of the answer, offset of its newest line
         self._places: dict[str, tuple[bytes, int, int]] = {}
@@ -174,7 +176,7 @@ class Results:
     def files(self, names: Sequence[str]) -> Files:
         """Return the results of the names, without those of files that the toolkit wrote."""
         self._file.flush()
-        stream = self._file if self._path is None else self._path.open("rb")
+        stream = self._file if self._path is None else open_regular_to_append(self._path)
         return Files(stream, [self._places[name][2] for name in sorted(names) if name not in self._own])
 
     def digest(self, names: Sequence[str]) -> str | None:
@@ -244,7 +246,7 @@ def _words(toml: Path | None) -> str:
         return ""
     data = b""
     try:
-        data = toml.read_bytes()
+        data = read_regular(toml, SETTINGS_FILE)
         machine = tomllib.loads(data.decode()).get("machine") if b".toml" in data else None
         is_file = isinstance(machine, str) and machine.endswith(".toml")
         definition = sha256_file(toml.parent / str(machine)) if is_file else ""
@@ -258,7 +260,7 @@ def _opened(path: Path) -> IO[bytes]:
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.open("a+b")
+        file = open_regular_to_append(path)
     except OSError as error:
         raise _refused(path, error.strerror or "an error", "a folder that can be written to") from error
     try:

@@ -8,7 +8,7 @@ through is judged row by row as before. Equations with higher terms are always l
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 _PROBE = 6  # rows that are looked at first
-_CELLS = 1 << 16  # predictions at a time: they stay in the processor's cache
+_CELLS = 1 << 14  # rows and groups at a time: their sums stay in the processor's cache
 # Both sides of a comparison are computed in another order here: what is near the limit goes through.
 _SPARE = 1.0 + 1e-6
 
@@ -43,6 +43,11 @@ class _Equations:
     coefficients: NDArray[np.float64]
     size: NDArray[np.float64]
     slack: NDArray[np.float64]
+
+    @property
+    def off(self) -> NDArray[np.float64]:
+        # What coefficients and sums may be off, in parts of each column: (groups, channels + 1).
+        return self.slack + 2 * ROUND_OFF * self.size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,31 +67,54 @@ class Screen:
 
     def for_all_rows(self, columns: Columns) -> list[Key]:
         """Return the groups that may explain every row, with a rounded coefficient or without."""
-        rows = _probe(columns.rows)
+        rows = probe_rows(columns.rows)
         good = np.arange(len(self.linear))
         for load in self.equations:
             fits = self._fits(columns, load, rows, good)
             good = good[np.any(np.all(fits, axis=0), axis=1)]
         return self._keys(good)
 
-    def anywhere(self, columns: Columns) -> list[Key]:
-        """Return the groups that may explain at least one row."""
-        keys: set[int] = set()
-        most = max((equation.coefficients[..., 0].size for equation in self.equations.values()), default=1)
-        for start in range(0, columns.rows, max(1, _CELLS // most)):
-            rows = np.arange(start, min(start + max(1, _CELLS // most), columns.rows))
-            good = np.arange(len(self.linear))
-            fitting = np.ones((len(rows), len(good)), dtype=bool)
-            for load in self.equations:
-                fitting &= np.any(self._fits(columns, load, rows, good), axis=2)
-                survivors = np.any(fitting, axis=0)
-                good, fitting = good[survivors], fitting[:, survivors]
-            keys.update(good.tolist())
-        return self._keys(np.array(sorted(keys), dtype=np.int64))
+    def anywhere(self, part: Columns) -> Iterator[tuple[Key, NDArray[np.int64]]]:
+        """Yield every group that may explain a row of these, and the rows at which it may, rising."""
+        step = max(1, _CELLS // max(len(self.linear), 1))
+        starts = range(0, part.rows, step) if self.equations else ()
+        pairs_of = [self._pairs(part.part(slice(start, start + step)), start) for start in starts]
+        pairs = np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs_of])
+        pairs = pairs[np.argsort(pairs[:, 1], kind="stable")]
+        for of_group in np.split(pairs, np.flatnonzero(np.diff(pairs[:, 1])) + 1):
+            if len(of_group):
+                yield self.linear[of_group[0, 1]], of_group[:, 0]
+        for key in self.general:
+            yield key, np.arange(part.rows)
+
+    def _pairs(self, part: Columns, start: int) -> NDArray[np.int64]:
+        # Row and linear group (pairs, 2) wherever some signs of each load may explain the row. The second
+        # load is looked at where the first fits, which is nearly nowhere.
+        (load, equations), *others = self.equations.items()
+        values = np.column_stack([np.abs(part.x), np.ones(part.rows)])
+        y = np.abs(part.y[load])
+        limit = (
+            part.half_x @ equations.size[:, :-1].T
+            + values @ equations.off.T
+            + (part.half_y[load] + 1e-9 * y)[:, None]
+        )
+        misses = _misses(values.T[:, :, None], equations.size.T[:, None, :], y[:, None])
+        row, group = np.nonzero(~(misses > limit * _SPARE))
+        for load, equations in others:
+            size, y = equations.size[group], np.abs(part.y[load][row])
+            limit = (
+                np.einsum("ij,ij->i", part.half_x[row], size[:, :-1])
+                + np.einsum("ij,ij->i", values[row], equations.off[group])
+                + part.half_y[load][row]
+                + 1e-9 * y
+            )
+            passed = ~(_misses(values[row].T, size.T, y) > limit * _SPARE)
+            row, group = row[passed], group[passed]
+        return np.column_stack([row + start, group])
 
     def close_to(self, accepted: Group, columns: Columns, signs: dict[str, int]) -> list[Key]:
         """Return the groups that a file may not tell from an accepted candidate."""
-        rows = _probe(columns.rows)
+        rows = probe_rows(columns.rows)
         good = np.arange(len(self.linear))
         for load, variant in signs.items() if self.equations else ():
             family = accepted.families[load]
@@ -135,6 +163,24 @@ class Screen:
             columns.half_x[rows] @ size[:, :-1].T + magnitudes @ (slack + 2 * ROUND_OFF * size).T + bound
         ) * _SPARE
         return limit
+
+
+def _misses(
+    values: NDArray[np.float64], sizes: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how far |y| lies from the nearest |+-s0 v0 +- s1 v1 ...|; ``values`` and ``sizes`` (terms, ...).
+
+    Some signs give y where some give |y|, so that half of the signs need no look.
+    """
+    sums = [values[0] * sizes[0]]
+    for value, size in zip(values[1:], sizes[1:], strict=True):
+        product = value * size
+        sums = [*(total + product for total in sums), *(np.abs(total - product) for total in sums)]
+    nearest = np.abs(sums[0] - y)
+    for total in sums[1:]:
+        total -= y
+        np.minimum(nearest, np.abs(total, out=total), out=nearest)
+    return np.asarray(nearest)
 
 
 def layout(columns: Columns) -> Signature:
@@ -199,5 +245,6 @@ def _equations(
 
 
 @lru_cache(maxsize=256)
-def _probe(rows: int) -> NDArray[np.int64]:
+def probe_rows(rows: int) -> NDArray[np.int64]:
+    """Return the few rows of a file that are looked at first, from its first to its last."""
     return np.unique(np.linspace(0, rows - 1, min(rows, _PROBE)).round().astype(np.int64))

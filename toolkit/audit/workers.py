@@ -16,15 +16,18 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
 
 from toolkit.errors import ConfigError
+from toolkit.inputs import raise_limits, raised_to
 
 Result = TypeVar("Result")
 
 TIMEOUT_S = 120.0
+_BYTES_PER_S = 2**19  # a slow machine under load reads and judges as much
 DIED = "worker-died: the reader's process ended without an answer"
 MEMORY_BYTES = 4 << 30
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -38,6 +41,23 @@ class Lost:
     """A file whose worker died (``worker-died``) or took too long (``timeout``)."""
 
     reason: str
+
+
+def time_limit(size: int) -> float:
+    """Return how long a file of so many bytes may take [s].
+
+    >>> time_limit(0), time_limit(256 * 2**20)
+    (120.0, 632.0)
+    """
+    return TIMEOUT_S + size / _BYTES_PER_S
+
+
+def late(limit_s: float) -> str:
+    """Return why a file has no answer whose worker was ended at its limit of time."""
+    return (
+        f"timeout: no answer within {limit_s:.3g} s, the limit of time for a file of its size; whether it is "
+        "sound was not found out"
+    )
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -54,7 +74,7 @@ def run_isolated(
     names: Sequence[str],
     *,
     workers: int = 1,
-    timeout_s: float = TIMEOUT_S,
+    timeout_s: Callable[[str], float] = lambda _: TIMEOUT_S,
 ) -> Iterator[tuple[str, Result | Lost]]:
     """Yield (name, result) of every name, in the order in which they are done.
 
@@ -63,7 +83,7 @@ def run_isolated(
     make : called once in each worker, returns what is called with each name; both must pickle
     names : what there is to do
     workers : processes
-    timeout_s : of one name; its worker is killed beyond
+    timeout_s : of each name; its worker is killed beyond
 
     Raises
     ------
@@ -74,6 +94,7 @@ def run_isolated(
     the dead one is the first, but a machine that ran short of memory may have killed the wrong one.
     """
     context = mp.get_context("spawn")
+    make = partial(under_limits, raised_to(), make)
     todo = deque(names)
     doubtful: set[str] = set()
     stillborn = 0  # workers that ended before they were ready, one after the other
@@ -147,9 +168,9 @@ def run_isolated(
                         worker.ready, stillborn = True, 0
                         continue
                     yield worker.waiting.popleft(), result
-                elif worker.waiting and time.monotonic() - worker.since > timeout_s:
+                elif worker.waiting and time.monotonic() - worker.since > timeout_s(worker.waiting[0]):
                     name = worker.waiting[0]
-                    lost = bury(worker, f"timeout: no answer within {timeout_s:g} s")
+                    lost = bury(worker, late(timeout_s(name)))
                     if lost is not None:
                         yield name, lost
     finally:
@@ -157,6 +178,12 @@ def run_isolated(
             worker.process.kill()
             worker.process.join()
             worker.pipe.close()
+
+
+def under_limits(raised: int, make: Callable[[], Callable[[str], Result]]) -> Callable[[str], Result]:
+    """Make a worker's function where inputs are read up to what they are read to at home."""
+    raise_limits(raised)
+    return make()
 
 
 @contextlib.contextmanager

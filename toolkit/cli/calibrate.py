@@ -11,10 +11,13 @@ from toolkit.cli.console import (
     Calibrations,
     Home,
     Json,
+    LockFile,
     Machine,
     Quiet,
+    Sign,
     answer,
     exit_code,
+    open_signers,
 )
 from toolkit.errors import ConfigError
 
@@ -36,6 +39,8 @@ def command(
     again: Annotated[
         bool, typer.Option("--again", help="Enter a session anew whose record was discarded.")
     ] = False,
+    lock_file: LockFile = False,
+    sign: Sign = None,
     full: Full = False,
     figures: Figures = None,
     home: Home = None,
@@ -53,6 +58,7 @@ def command(
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.answers import refuse_unwritable
     from toolkit.lab.home import registry_to_write
+    from toolkit.lab.sealing import standards_of
     from toolkit.lab.session_answer import (
         NOT_ENTERED,
         candidate_payload,
@@ -70,7 +76,9 @@ def command(
             next_step="leave one of them out; nothing was written",
             rule="usage",
         )
-    registry = Registry(registry_to_write(calibrations or out, home))
+    registry = Registry(
+        registry_to_write(calibrations or out, home), lock_file=lock_file, signers=open_signers(sign)
+    )
     if dry_run and figures is not None:
         raise ConfigError(
             "a dry run makes no files",
@@ -81,7 +89,9 @@ def command(
             rule="usage",
         )
     refuse_unwritable(figures)
-    candidate = (rehearse if dry_run else calibrate)(session, registry, machine=machine, again=again)
+    candidate = (rehearse if dry_run else calibrate)(
+        session, registry, machine=machine, again=again, standards=standards_of(registry.folder.parent)
+    )
     status = NOT_ENTERED if dry_run and not candidate.existing else registry.status(candidate.record.id).state
     payload, text = candidate_payload(candidate, status), candidate_text(candidate, status)
     if status == "candidate":

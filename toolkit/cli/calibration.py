@@ -10,7 +10,19 @@ import typer
 
 from toolkit.cli import calibration_results as results
 from toolkit.cli.calibrate import Figures
-from toolkit.cli.console import Calibrations, Home, Id, Json, Machine, Quiet, answer, exit_code
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Id,
+    Json,
+    LockFile,
+    Machine,
+    Quiet,
+    Sign,
+    answer,
+    exit_code,
+    open_signers,
+)
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -123,6 +135,8 @@ def import_record(
         bool, typer.Option("--again", help="Enter a file anew whose record was discarded.")
     ] = False,
     calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    sign: Sign = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -136,7 +150,9 @@ def import_record(
     from toolkit.lab.home import registry_to_write
     from toolkit.lab.registry_answer import record_row
 
-    registry = Registry(registry_to_write(calibrations, home))
+    registry = Registry(
+        registry_to_write(calibrations, home), lock_file=lock_file, signers=open_signers(sign)
+    )
     record, existing = import_legacy(file, registry, again=again)
     path = registry.folder / record.instrument / f"{record.id}.json"
     payload = {**record_row(record, registry.status(record.id)), "existing": existing, "path": str(path)}
@@ -175,6 +191,8 @@ def approve(
         str | None, typer.Option("--recall", help='Recall interval after the session, such as "12 months".')
     ] = None,
     calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    sign: Sign = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -186,7 +204,7 @@ def approve(
     from toolkit.calibration.registry.approval import approve as decide
     from toolkit.lab.answers import finding_lines
 
-    registry = _registry(calibrations, home)
+    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
     since = _day(in_force_from, "--in-force-from")
     decision = decide(
         registry, record_id, in_force_from=since or dt.date.max, checked_by=checked_by,
@@ -219,23 +237,25 @@ def withdraw(
     record_id: Id,
     on: Annotated[str, typer.Option("--on", help="Day on which the fault became known (YYYY-MM-DD).")],
     reason: Annotated[str, typer.Option("--reason", help="Why; printed wherever the record is named.")],
+    by: Annotated[str, typer.Option("--by", help="Who withdraws.")],
     void_from: Annotated[
         str | None, typer.Option("--from", help="First void day; default: the record's in-force date.")
     ] = None,
-    by: Annotated[str, typer.Option("--by", help="Who withdraws.")] = "not stated",
     calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    sign: Sign = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
     """Withdraw a record; the ledger keeps it and says why.
 
-    Example: toolkit calibration withdraw m15-r2 --on 2026-04-01 --reason "reference out of tolerance"
+    Example: toolkit calibration withdraw m15-r2 --on 2026-04-01 --by "first person" --reason "dropped"
     """
     from toolkit.calibration.registry.approval import withdraw as decide
     from toolkit.lab.registry_answer import void_day
 
-    registry = _registry(calibrations, home)
+    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
     known_on = _day(on, "--on") or dt.date.max
     status = decide(
         registry, record_id, on=known_on, void_from=_day(void_from, "--from"), reason=reason, by=by
@@ -272,6 +292,8 @@ def discard(
     reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
     by: Annotated[str, typer.Option("--by", help="Who discards.")] = "not stated",
     calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    sign: Sign = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -285,7 +307,7 @@ def discard(
     """
     from toolkit.calibration.registry.approval import discard as decide
 
-    registry = _registry(calibrations, home)
+    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
     status = decide(registry, record_id, reason=reason, by=by)
     head = registry.head(_instrument_of(record_id))
     payload = {"id": record_id, "status": status.state, "reason": status.reason, "head": head}
@@ -341,10 +363,12 @@ app.command("chart")(results.chart)
 app.command("due")(results.due)
 
 
-def _registry(calibrations: Path | None, home: Path | None) -> Registry:
+def _registry(
+    calibrations: Path | None, home: Path | None, *, lock_file: bool = False, sign: list[Path] | None = None
+) -> Registry:
     from toolkit.lab.home import open_registry
 
-    return open_registry(calibrations, home)
+    return open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))
 
 
 def _instrument_of(record_id: str) -> str:

@@ -16,7 +16,10 @@ from toolkit.cli.console import (
     Json,
     KnownAt,
     Quiet,
+    Seal,
+    TimeStamp,
     answer,
+    ask_passphrase,
     day,
     exit_code,
     progress,
@@ -92,6 +95,8 @@ def certificate(
     draft: Annotated[
         bool, typer.Option("--draft", help="Allow a record that is not approved: every page says DRAFT.")
     ] = False,
+    seal: Seal = None,
+    time_stamp: TimeStamp = None,
     known_at: KnownAt = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep what was not verified in rejected/ of the folder.")
@@ -110,18 +115,23 @@ def certificate(
     """
     from toolkit.lab.certificate import certificate_payload, certificate_text, deliver_certificate
     from toolkit.lab.home import home_template, open_registry
+    from toolkit.lab.sealing import open_sealing
     from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", home))
+    registry = open_registry(calibrations, home)
+    sealing = open_sealing(seal, registry.folder.parent, ask=ask_passphrase, stamps=time_stamp, draft=draft)
     with progress(None, "certificate", show=not (json or quiet)) as step:
         issued, delivered = deliver_certificate(
-            open_registry(calibrations, home), record_id, opened,
+            registry, record_id, opened,
             out or Path.cwd() / f"certificate-{record_id}", issued=day(known_at), draft=draft,
-            replaces=replaces, amendment=amendment_reason, dcc=dcc, keep=keep, step=step,
+            replaces=replaces, amendment=amendment_reason, dcc=dcc, sealing=sealing, keep=keep, step=step,
         )  # fmt: skip
-    payload = certificate_payload(issued, delivered) | {"timing": {"seconds": time.perf_counter() - started}}
-    answer(payload, certificate_text(issued, delivered), as_json=json, quiet=quiet)
+    payload = certificate_payload(issued, delivered, sealing) | {
+        "timing": {"seconds": time.perf_counter() - started}
+    }
+    answer(payload, certificate_text(issued, delivered, sealing), as_json=json, quiet=quiet)
     return 1 if delivered.warnings else exit_code(issued.findings)
 
 

@@ -95,7 +95,7 @@ def command(
     """
     from toolkit.comparison.compare import compare
     from toolkit.lab.answers import delivered_keys, unit_choice
-    from toolkit.lab.compare import comparison_template, deliver_comparison, read_entries, write_figures
+    from toolkit.lab.compare import comparison_template, read_entries, write_comparison
     from toolkit.lab.compare_answer import comparison_payload, comparison_text
 
     chosen = choose_reader(reader)
@@ -110,15 +110,11 @@ def command(
     comparison = compare(
         entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility
     )
-    drawn = write_figures(comparison, style, figures) if figures else {}
     attention = [*findings, *comparison.findings]
-    document = (
-        None
-        if opened is None or out is None
-        else deliver_comparison(
-            comparison, opened, out, attention, day(known_at), None if units is None else style
-        )
-    )
+    drawn, document = write_comparison(
+        comparison, style, attention, figures=figures, opened=opened, out=out, known_at=day(known_at),
+        units=None if units is None else style,
+    )  # fmt: skip
     payload: dict[str, Any] = comparison_payload(comparison) | {
         "figures": drawn,
         "document": None if document is None else delivered_keys(document),

@@ -16,12 +16,28 @@ import typer
 if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.findings import Finding
+    from toolkit.trust.keys import Signer
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Calibrations = Annotated[
     Path | None,
     typer.Option("--calibrations", help="Registry folder; default: calibrations/ of the laboratory's home."),
+]
+LockFile = Annotated[
+    bool,
+    typer.Option(
+        "--lock-file",
+        help="Keep other writers out by a lock file, where the file system has no locks; all writers must.",
+    ),
+]
+Sign = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--sign",
+        metavar="KEY",
+        help="Private SSH key that signs, or the public one of a key in the agent; once for each person.",
+    ),
 ]
 Machine = Annotated[
     str | None,
@@ -51,11 +67,40 @@ Draft = Annotated[
         help="Allow a record that is not approved and in force; everything made is then marked as a draft.",
     ),
 ]
+Seal = Annotated[
+    Path | None,
+    typer.Option(
+        "--seal",
+        metavar="KEY",
+        help="Seal what is issued by this key, PKCS #12 or PEM; default: TOOLKIT_SEAL_KEY.",
+    ),
+]
+TimeStamp = Annotated[
+    str | None, typer.Option("--time-stamp", metavar="URL", help="Time-stamp server of the seal (RFC 3161).")
+]
 ProtocolFile = Annotated[
     Path | None,
     typer.Option(
         "--protocol", metavar="FILE", help="Protocol (.toml); default: the test's own, else the machine's."
     ),
+]
+Isolated = Annotated[
+    bool,
+    typer.Option(
+        "--isolated",
+        help="Run the case's own code without network, and with a read-only view of the files but for a "
+        "temporary folder; where the kernel cannot, stop.",
+    ),
+]
+Memory = Annotated[
+    float | None,
+    typer.Option(
+        "--memory", min=0.05, help="GB that each process of the case's own code may take; default 4."
+    ),
+]
+Processes = Annotated[
+    int | None,
+    typer.Option("--processes", min=1, help="Processes that this code may have at once; default 64."),
 ]
 Units = Annotated[
     str, typer.Option("--units", help="SI or lbf, for people; the JSON answer is always in SI.")
@@ -63,6 +108,13 @@ Units = Annotated[
 Reader = Annotated[
     str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
 ]
+
+
+def ask_passphrase() -> bytes:
+    """Ask for the passphrase of a key: at the terminal, unseen, or as the first line of the input."""
+    if sys.stdin.isatty():
+        return str(typer.prompt("passphrase of the key", hide_input=True, err=True)).encode()
+    return sys.stdin.readline().rstrip("\n").encode()
 
 
 def day(moment: datetime | None) -> date | None:
@@ -77,18 +129,60 @@ def reader(name: str) -> Literal["calamine", "both"]:
     return "both" if name == "both" else "calamine"
 
 
+def open_signers(keys: Sequence[Path] | None) -> tuple[Signer, ...]:
+    """Return the signers of ``--sign``; the passphrase of an encrypted key is asked for on the terminal.
+
+    Raises
+    ------
+    TrustError
+        ``signing-key``, ``weak-key``
+    """
+    from functools import partial
+    from getpass import getpass
+
+    from toolkit.trust.keys import open_signer
+
+    return tuple(open_signer(key, partial(getpass, f"passphrase of {key}: ")) for key in keys or ())
+
+
 def answer(payload: dict[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:
     """Print a command's result: the JSON document, or the text for people, or nothing."""
-    if as_json:
-        typer.echo(
-            json.dumps({"schema": 1, **_plain(payload)}, ensure_ascii=False, indent=2, allow_nan=False)
-        )
-    elif not quiet and text:
-        typer.echo(text)
+    with _printing():
+        if as_json:
+            typer.echo(
+                json.dumps({"schema": 1, **_plain(payload)}, ensure_ascii=False, indent=2, allow_nan=False)
+            )
+        elif not quiet and text:
+            typer.echo(text)
+
+
+@contextlib.contextmanager
+def _printing() -> Iterator[None]:
+    """Turn a failure to print into an error: what the command did is done by then."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        from toolkit.errors import OutputError
+
+        raise OutputError(
+            "the answer cannot be printed",
+            where="standard output",
+            got=error.strerror or error,
+            expected="an output with free space",
+            next_step="what the command had to write is written: look at it, or ask again with free space",
+            rule="not-writable",
+        ) from error
 
 
 def stream(payload: dict[str, Any]) -> None:
     """Print a JSON document whose iterators are written element by element, never held as a whole."""
+    with _printing():
+        _stream(payload)
+
+
+def _stream(payload: dict[str, Any]) -> None:
     write = sys.stdout.write
     write('{\n  "schema": 1')
     for key, value in payload.items():
@@ -125,9 +219,10 @@ def exit_code(findings: Sequence[Finding]) -> int:
 def print_error(error: ToolkitError, *, as_json: bool) -> None:
     """Print an error: JSON to stdout where it was asked for, else lines to stderr."""
     if as_json:
-        typer.echo(json.dumps({"schema": 1, "error": error.as_dict()}, ensure_ascii=False, indent=2))
-    else:
-        typer.echo(f"error: {error}", err=True)
+        with contextlib.suppress(OSError):
+            typer.echo(json.dumps({"schema": 1, "error": error.as_dict()}, ensure_ascii=False, indent=2))
+            return
+    typer.echo(f"error: {error}", err=True)
 
 
 def print_usage_error(error: Exception, *, as_json: bool) -> None:

@@ -98,10 +98,16 @@ def _silent(_text: str) -> None:
 
 @contextlib.contextmanager
 def _stage(out: Path) -> Iterator[Path]:
-    """Yield a fresh folder beside ``out`` that takes its place when every step has succeeded."""
+    """Yield a fresh folder; when every step has succeeded, its files replace all that is in ``out``."""
     from toolkit.errors import OutputError
+    from toolkit.publication import publication, settle
+    from toolkit.staging import PASSING, result_files, supersede
 
-    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or (out / _MARK).is_file())):
+    settle(out)
+    if out.exists() and not (
+        out.is_dir()
+        and ((out / _MARK).is_file() or all(path.name.startswith(PASSING) for path in out.iterdir()))
+    ):
         raise OutputError(
             "the output folder holds other files",
             where=out,
@@ -110,23 +116,11 @@ def _stage(out: Path) -> Iterator[Path]:
             next_step="choose another folder with --out",
             rule="not-empty",
         )
-    stage = out.parent / f".{out.name}.part"
-    try:
-        shutil.rmtree(stage, ignore_errors=True)
-        stage.mkdir(parents=True)
+    with publication(out) as stage:
         yield stage
-        shutil.rmtree(out, ignore_errors=True)
-        stage.replace(out)
-    except OSError as error:
-        raise OutputError(
-            "the demo cannot write its output",
-            where=out,
-            got=error.strerror or error,
-            expected="a folder with write permission and free space",
-            next_step="choose another folder with --out",
-        ) from error
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
+        for path in result_files(out):
+            if not path.parts[0].startswith(PASSING):
+                supersede(stage, path)
 
 
 def _steps(stage: Path) -> list[Step]:

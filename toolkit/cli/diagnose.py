@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
+from toolkit.cli.console import Calibrations, Home, Isolated, Json, Memory, Processes, Quiet, answer
 
 NAME = "diagnose"
 
@@ -38,6 +38,9 @@ def command(
             "--by", help="Who releases the opinion on the cause (ISO/IEC 17025, 7.8.7); else a draft."
         ),
     ] = None,
+    isolated: Isolated = False,
+    memory: Memory = None,
+    processes: Processes = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -54,26 +57,36 @@ def command(
     What is named goes into model.toml beside the answer: the simulation with these effects in it, which
     toolkit simulate and toolkit diagnose (--model, or [simulation] model = "model.toml") read.
 
+    A case executes its code: simulators of kind python and ode are programs. They run in a process of their
+    own, which cannot end or garble this one, but may read and write what you may; run those of others
+    --isolated.
+
     Example: toolkit diagnose case.toml --out answer
     """
     _one_thread()
-    from toolkit.lab.diagnosis import diagnose_case, diagnosis_text, write_diagnosis, write_document
+    from toolkit.lab.diagnosis import diagnose_case, diagnosis_text, worker_limits, write_diagnosis
     from toolkit.lab.home import home_template
+    from toolkit.report.word.office import find_soffice
     from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
-    # The template is judged before anything is searched.
+    # What the document needs is judged before anything is searched: it comes with the answer or not at all.
     chosen = template or (home_template("diagnosis.docx", home) if pdf else None)
     opened = None if chosen is None else read_template(chosen)
+    if opened is not None:
+        find_soffice()
     diagnosed = diagnose_case(
         case, out=out, model=model, calibrations=calibrations, home=home, budget_s=budget,
+        limits=worker_limits(isolated=isolated, memory_GB=memory, processes=processes),
         tell=_teller(show=not quiet and not json),
     )  # fmt: skip
-    payload = write_diagnosis(diagnosed, out, timing=lambda: {"seconds": time.perf_counter() - started})
+    payload = write_diagnosis(
+        diagnosed, out, timing=lambda: {"seconds": time.perf_counter() - started}, opened=opened, by=by
+    )
     text = diagnosis_text(diagnosed.result.diagnosis, out)
     warned = False
     if opened is not None:
-        document = payload["document"] = write_document(diagnosed, opened, out, by=by)
+        document = payload["document"]
         warned = bool(document["warnings"])
         text += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"
         text += "".join(f"\n  warning {warning}" for warning in document["warnings"])

@@ -34,9 +34,9 @@ def command(
 
     Example: toolkit evaluate tire.tir grid.csv --axes SAE --out forces.csv
     """
-    from toolkit.files import write_atomic
     from toolkit.lab.answers import findings_text
     from toolkit.lab.evaluate import evaluate_grid, grid_rows, grid_text, grid_units, refuse_output
+    from toolkit.publication import write_result
     from toolkit.tires.table import read_table
     from toolkit.tires.tir import read_tir
 
@@ -48,7 +48,7 @@ def command(
     values, findings = evaluate_grid(file, table, angles=angles)  # type: ignore[arg-type]
     text = grid_text(table, values)
     if out is not None:
-        write_atomic(out, text)
+        write_result(out, text)
     shown = text.rstrip("\n") if out is None else f"{len(table.cells)} rows written to {out}"
     if findings:
         shown += f"\n\n{findings_text(findings)}"

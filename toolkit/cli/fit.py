@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -81,6 +82,7 @@ def command(
         write_figures,
     )
     from toolkit.lab.tire_files import check_tir, write_fit
+    from toolkit.publication import publication
 
     started = time.perf_counter()
     names = model_choice(model or ["magic_formula"])
@@ -98,13 +100,14 @@ def command(
             source, names, axes=axes, loss=chosen, weights=weights, rated_load_N=rated_load, radius_m=radius
         )
     findings = fitted.findings
-    if tir is not None:
-        fit = next(fit for fit in fitted.globals if fit.model == into)
-        findings += write_fit(
-            tir, fit, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m,
-            use=fitted.use,
-        )  # fmt: skip
-    written = write_figures(fitted, figures) if figures is not None else []
+    with nullcontext() if figures is None else publication(figures) as stage:
+        written = [] if stage is None else write_figures(fitted, stage)
+        if tir is not None:
+            fit = next(fit for fit in fitted.globals if fit.model == into)
+            findings += write_fit(
+                tir, fit, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m,
+                use=fitted.use,
+            )  # fmt: skip
     payload: dict[str, Any] = {
         **fit_payload(fitted),
         "tir": None if tir is None else str(tir),

@@ -69,16 +69,16 @@ def qualify(
 
     Example: toolkit qualify --out qualification.json
     """
-    from toolkit.files import write_atomic
     from toolkit.lab.home import packaged_home
     from toolkit.lab.qualification_answer import qualification_payload, qualification_text
+    from toolkit.publication import write_result
     from toolkit.qualification.run import qualify as run
 
     record = run(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
     payload, text = qualification_payload(record), qualification_text(record)
     if out is not None:
         document = jsonlib.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False)
-        write_atomic(out, (document if out.suffix.lower() == ".json" else text) + "\n")
+        write_result(out, (document if out.suffix.lower() == ".json" else text) + "\n")
         text += f"\nwritten: {out}"
     answer(payload, text, as_json=json, quiet=quiet)
     return 0 if record.passed else 1

@@ -71,9 +71,9 @@ def correct(
     from datetime import date
 
     from toolkit.diagnosis.answer.correction import correction_of, machine_of
-    from toolkit.files import write_atomic
     from toolkit.machine import load_machine
     from toolkit.machine.next_version import next_version
+    from toolkit.publication import write_result
     from toolkit.simulation.model_file import read_model
 
     _refuse_existing(out)
@@ -82,7 +82,7 @@ def correct(
     correction = correction_of(model, effect, reason=reason, by=by, date=day.isoformat())
     fitted = machine_of(model, load_machine(machine).name)
     text, definition = next_version(machine, correction, out=out, diagnosed_with=fitted)
-    write_atomic(out, text)
+    write_result(out, text)
     payload = {"path": out} | _payload(definition)
     answer(payload, f"{_text(definition)}\nwritten to {out}", as_json=json, quiet=quiet)
     return 0

@@ -11,6 +11,7 @@ import typer
 
 from toolkit.cli.console import print_error, print_usage_error
 from toolkit.errors import ToolkitError
+from toolkit.inputs import raise_limits, size_of
 from toolkit.version import __version__
 
 # typer carries a copy of click whose exceptions it does not export: the root of its usage errors.
@@ -58,10 +59,12 @@ def _register() -> None:
         inspect,
         installation,
         machine,
+        person,
         process,
         report,
         simulate,
         template,
+        verify,
         watch,
     )
 
@@ -75,7 +78,9 @@ def _register() -> None:
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
     app.add_typer(machine.app, name="machine")
-    for module in (audit, simulate, diagnose):
+    app.add_typer(person.person, name="person")
+    app.add_typer(person.ledger, name="ledger")
+    for module in (audit, simulate, diagnose, verify):
         app.command(module.NAME)(module.command)
     app.command("explain")(installation.explain)
     app.command("qualify")(installation.qualify)
@@ -85,7 +90,41 @@ def _register() -> None:
 def _command() -> Any:
     # Built once: whoever calls `run` many times in a process would wait for all options every time.
     _register()
-    return typer.main.get_command(app)
+    command = typer.main.get_command(app)
+    _take_sizes(command, typer.main.get_command(_options).params[0])
+    return command
+
+
+def _raise_limits(size: str | None) -> None:
+    try:
+        raise_limits(0 if size is None else size_of(size))
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--max-size") from None
+
+
+_options = typer.Typer(add_completion=False)
+
+
+@_options.command()
+def _of_every_command(
+    max_size: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SIZE", callback=_raise_limits, expose_value=False,
+            help="Read inputs up to SIZE, such as 2GB; default: a limit for each format.",
+        ),
+    ] = None,
+) -> None:  # fmt: skip
+    pass
+
+
+def _take_sizes(command: Any, option: Any) -> None:
+    """Let every command take ``--max-size``: what it reads is opened by one opener."""
+    if hasattr(command, "commands"):
+        for below in command.commands.values():
+            _take_sizes(below, option)
+    else:
+        command.params.append(option)
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:
@@ -105,6 +144,14 @@ def run(arguments: list[str] | None = None) -> NoReturn:
         code = 130
     except BrokenPipeError:
         code = 0
+    except OSError as error:  # a name that no file can have, a disk that fails: nothing that is wrong here
+        refused = ToolkitError(
+            "the system refuses a file or folder", where=error.filename, got=error.strerror or error,
+            expected="one that can be reached", next_step="check its name, its permissions and the disk",
+            rule="system",
+        )  # fmt: skip
+        print_error(refused, as_json=as_json)
+        code = refused.exit_code
     except Exception:  # noqa: BLE001  the last line of defence: a bug, told as one
         traceback.print_exc()
         typer.echo(

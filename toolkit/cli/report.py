@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 from typing import Annotated
@@ -18,7 +19,10 @@ from toolkit.cli.console import (
     ProtocolFile,
     Quiet,
     Reader,
+    Seal,
+    TimeStamp,
     answer,
+    ask_passphrase,
     day,
     progress,
 )
@@ -89,6 +93,8 @@ def command(
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     draft: Draft = False,
+    seal: Seal = None,
+    time_stamp: TimeStamp = None,
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: Annotated[
@@ -117,6 +123,13 @@ def command(
 
     chosen = choose_reader(reader)
     started = time.perf_counter()
+    sealing = None
+    if seal is not None or time_stamp is not None or os.environ.get("TOOLKIT_SEAL_KEY"):
+        from toolkit.lab.home import calibrations_folder
+        from toolkit.lab.sealing import open_sealing
+
+        place = calibrations_folder(calibrations, home).parent
+        sealing = open_sealing(seal, place, ask=ask_passphrase, stamps=time_stamp, draft=draft)
     # LibreOffice and matplotlib take a second to start: beside all that is imported and read here.
     with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
         from toolkit.lab.answers import unit_choice
@@ -154,6 +167,7 @@ def command(
             diagnosis=answer_and_file,
             allow_missing=allow_missing,
             keep=keep,
+            sealing=sealing,
         )
         delivered = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
     payload = reports_payload(delivered) | {"timing": {"seconds": time.perf_counter() - started}}

@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Isolated,
+    Json,
+    Memory,
+    Processes,
+    Quiet,
+    answer,
+    exit_code,
+)
 
 NAME = "simulate"
 
@@ -39,6 +49,12 @@ def command(
         list[str] | None,
         typer.Option("--condition", metavar="KEY=VALUE", help="Condition of all inputs; repeatable."),
     ] = None,
+    budget: Annotated[
+        float, typer.Option("--budget", min=1.0, help="Seconds that a model's own code may take.")
+    ] = 600.0,
+    isolated: Isolated = False,
+    memory: Memory = None,
+    processes: Processes = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -66,17 +82,22 @@ def command(
 
     In place of a plan it takes the model.toml of a diagnosis, of any kind of simulation, and runs it on
     inputs: DIR gets the outputs of each file as CSV. The model of a tire may also be the tire of a plan,
-    [tire] file = "model.toml": its effects are then switched on.
+    [tire] file = "model.toml": its effects are then switched on. A model of kind python or ode executes its
+    code, in a process of its own; run that of others --isolated.
 
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
     from toolkit.lab.answers import finding_lines
+    from toolkit.lab.diagnosis import worker_limits
     from toolkit.lab.simulate import is_model_file, model_answer, simulate_plan
     from toolkit.simulation.plan import read_plan, with_effects
 
     if inputs or condition or is_model_file(plan):
         _refuse_options({"--effect": effect, "--seed": seed, "--csv": csv, "--case": case})
-        payload, text = model_answer(plan, inputs or [], condition or [], out, calibrations, home)
+        limits = worker_limits(isolated=isolated, memory_GB=memory, processes=processes)
+        payload, text = model_answer(
+            plan, inputs or [], condition or [], out, calibrations, home, budget_s=budget, limits=limits
+        )
         answer(payload, text, as_json=json, quiet=quiet)
         return 0
     planned = with_effects(read_plan(plan, seed=seed), effect or [])

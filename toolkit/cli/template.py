@@ -115,8 +115,8 @@ def new(
     Example: toolkit template new report_templates/ours.docx --like summary
     """
     from toolkit.errors import OutputError
-    from toolkit.files import write_atomic
     from toolkit.lab.home import packaged_home
+    from toolkit.publication import publication
     from toolkit.report.style import style_file
 
     sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
@@ -144,7 +144,8 @@ def new(
                 rule="not-empty",
             )
     source = sources[like]
-    write_atomic(file, source.read_bytes())
-    write_atomic(style, (style_file(source) or source.with_name("org.toml")).read_bytes())
+    with publication(file.parent) as stage:
+        (stage / file.name).write_bytes(source.read_bytes())
+        (stage / style.name).write_bytes((style_file(source) or source.with_name("org.toml")).read_bytes())
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0

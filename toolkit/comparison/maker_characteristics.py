@@ -21,6 +21,7 @@ from toolkit.characteristics.characteristic import BOTH
 from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.tires.plausibility import demand_possible
 from toolkit.units import unit
 
@@ -128,12 +129,7 @@ def _rows_of(values: dict[str, float | None], load: float, identity: str) -> lis
 
 def _text(path: Path) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise UnreadableError(
-            "the table cannot be read", where=path, got=error.strerror, expected="a readable CSV file",
-            next_step="check the path", rule="no-file",
-        ) from error  # fmt: skip
+        return read_input(path, TABLE_FILE).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UnreadableError(
             "the table is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",

@@ -57,12 +57,17 @@ class AtMost:
     limit: float
 
 
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+"""Characters that no document can print and no file name has; tabs and ends of lines are none of them."""
+
+
 @dataclass(frozen=True)
 class Text:
     """How a text may be: empty, stripped of spaces at its ends, of a pattern, or written as a number.
 
-    ``numbers``: ``"int"`` takes a whole number without quotes for its digits, ``"any"`` every number.
-    ``accepts`` is asked of a text where no pattern can say it; the field's `Entry` says what is expected.
+    No text has control characters. ``numbers``: ``"int"`` takes a whole number without quotes for its
+    digits, ``"any"`` every number. ``accepts`` is asked of a text where no pattern can say it; the
+    field's `Entry` says what is expected.
     """
 
     empty: bool = False
@@ -74,7 +79,8 @@ class Text:
     def fits(self, text: str) -> bool:
         """Tell whether a text is as it should be."""
         return (
-            (self.empty or bool(text.strip()))
+            _CONTROL.search(text) is None
+            and (self.empty or bool(text.strip()))
             and (self.pattern is None or re.fullmatch(self.pattern, text) is not None)
             and (self.accepts is None or bool(self.accepts(text)))
         )

@@ -12,7 +12,8 @@ from toolkit.declared.faults import Fault, Source, refuse
 from toolkit.declared.kinds import Place
 from toolkit.declared.marks import Format
 from toolkit.errors import ConfigError
-from toolkit.files import parse_toml, read_bytes
+from toolkit.files import parse_toml
+from toolkit.inputs import SETTINGS_FILE, read_input
 
 T = TypeVar("T")
 
@@ -25,7 +26,7 @@ def read(cls: type[T], path: Path) -> T:
     ConfigError
         no file, no TOML; every entry that is unknown, missing or cannot be used
     """
-    return read_text(cls, read_bytes(path), where=path)
+    return read_text(cls, read_input(path, SETTINGS_FILE), where=path)
 
 
 def read_text(cls: type[T], data: bytes, *, where: object) -> T:

@@ -21,9 +21,11 @@ from toolkit.diagnosis.search.search import Search, search
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
+from toolkit.diagnosis.simulators.case_code import WORKER_LIMITS, CaseCode, running
 from toolkit.diagnosis.simulators.simulator import Supervised
-from toolkit.diagnosis.simulators.user_code import kept_apart
 from toolkit.findings import Finding
+from toolkit.worker.posix import Limits
+from toolkit.worker.worker import LateError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -50,21 +52,35 @@ def diagnose(
     *,
     budget_s: float = 600.0,
     tell: Callable[[str], None] = lambda _: None,
+    limits: Limits | None = WORKER_LIMITS,
 ) -> Result:
     """Diagnose a case.
+
+    Parameters
+    ----------
+    calibrations : folder of the registry, None without one
+    budget_s : seconds after which a partial answer is given
+    tell : told what is searched
+    limits : of the worker in which the case's own code runs; None runs it in this process, with all that it
+        may do to it
 
     Raises
     ------
     ConfigError
         the case cannot be used; FitError: its simulation gives no usable output as declared
     """
-    with kept_apart():
-        return _diagnosed(case, calibrations, TimeBudget(budget_s, tell), budget_s)
+    with running(case, limits) as code:
+        budget = TimeBudget(budget_s, tell, alarm=code is None)
+        if code is not None:
+            code.until = budget.until
+        return _diagnosed(case, calibrations, budget, budget_s, code)
 
 
-def _diagnosed(case: Case, calibrations: Path | None, budget: TimeBudget, budget_s: float) -> Result:
+def _diagnosed(
+    case: Case, calibrations: Path | None, budget: TimeBudget, budget_s: float, code: CaseCode | None
+) -> Result:
     try:
-        model = budget.guarded(model_of)(case, calibrations)
+        model = budget.guarded(model_of)(case, calibrations, code)
     except BudgetSpentError:
         return Result(diagnosis=_too_late(case, None, None, (), budget.step), search=None)
     failed = FailedRuns(model.simulate)
@@ -91,8 +107,9 @@ def _diagnosed(case: Case, calibrations: Path | None, budget: TimeBudget, budget
         answer = _too_late(case, problem, declared, findings, str(error))
     finally:
         supervised.release()
-    answer = replace(answer, findings=(*answer.findings, *failed.findings(case)))
-    files, late = _predictions(problem, outcome, budget, budget_s)
+    deaths = () if code is None else code.findings()
+    answer = replace(answer, findings=(*answer.findings, *failed.findings(case), *deaths))
+    files, late = _predictions(problem, outcome, budget, budget_s, code)
     if late:
         answer = replace(answer, complete=False, skipped=(*answer.skipped, late))
     return Result(diagnosis=answer, search=outcome, predictions=files)
@@ -113,7 +130,7 @@ def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.fl
 
 
 def _predictions(
-    problem: Problem, outcome: Search | None, budget: TimeBudget, budget_s: float
+    problem: Problem, outcome: Search | None, budget: TimeBudget, budget_s: float, code: CaseCode | None
 ) -> tuple[tuple[tuple[str, str], ...], str]:
     """Return the files of predictions, or what was skipped where the time is up."""
     runs = problem.case.predict
@@ -125,10 +142,15 @@ def _predictions(
         fits[1] = outcome.refitted
         fits[2] = outcome.refitted if mostly_unknown(outcome) else outcome.augmented
     budget.tell("predictions")
-    return tuple(
-        (name, prediction_csv(problem, run, fits))
-        for name, run in zip(prediction_names(runs), runs, strict=True)
-    ), ""
+    if code is not None:
+        code.until = time.monotonic() + seconds
+    try:
+        return tuple(
+            (name, prediction_csv(problem, run, fits))
+            for name, run in zip(prediction_names(runs), runs, strict=True)
+        ), ""
+    except LateError:
+        return (), "predictions"
 
 
 def _too_late(

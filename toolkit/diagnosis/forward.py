@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +16,14 @@ from toolkit.diagnosis.case.case import Case, CaseChannel
 from toolkit.diagnosis.case.model_file import corrections_of, parameters_of, simulation_of
 from toolkit.diagnosis.case.recordings import read_run
 from toolkit.diagnosis.fit.predict import csv_of, prediction_names
+from toolkit.diagnosis.policy import WORKER
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
-from toolkit.diagnosis.simulators.user_code import kept_apart
-from toolkit.errors import ConfigError
-from toolkit.files import read_bytes
+from toolkit.diagnosis.simulators.case_code import WORKER_LIMITS, CaseCode, running
+from toolkit.errors import ConfigError, FitError
+from toolkit.inputs import TABLE_FILE, read_input
+from toolkit.worker.posix import Limits
+from toolkit.worker.worker import LateError
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
@@ -44,6 +48,8 @@ def simulate_model(
     calibrations: Path | None,
     *,
     conditions: Mapping[str, str] | None = None,
+    budget_s: float = WORKER.simulate_s,
+    limits: Limits | None = WORKER_LIMITS,
 ) -> tuple[tuple[tuple[str, str], ...], tuple[Finding, ...]]:
     """Return name and content of a CSV file for each file of inputs, and notes on the model's effects.
 
@@ -53,6 +59,8 @@ def simulate_model(
     ----------
     inputs : CSV files with the model's time, inputs and covariates; further columns are not read
     conditions : of all these runs, such as ``{"rotation": "reverse"}``
+    budget_s : seconds that the model's own code may take
+    limits : of the worker in which that code runs; None runs it in this process
 
     Raises
     ------
@@ -61,12 +69,21 @@ def simulate_model(
         simulation gives no usable output
     """
     case = case_of(model, inputs, conditions or {})
-    with kept_apart():
-        return _outputs(case, calibrations), built_in_findings(case)
+    with running(case, limits) as code:
+        if code is not None:
+            code.until = time.monotonic() + budget_s
+        try:
+            return _outputs(case, calibrations, code), built_in_findings(case)
+        except LateError:
+            raise FitError(
+                "the simulation gives no usable output", where=case.file(), rule="simulator",
+                got=f"no answer within {budget_s:g} s", expected="outputs of every file of inputs",
+                next_step="give a larger --budget, or fewer inputs at once",
+            ) from None  # fmt: skip
 
 
-def _outputs(case: Case, calibrations: Path | None) -> tuple[tuple[str, str], ...]:
-    simulator = model_of(case, calibrations)
+def _outputs(case: Case, calibrations: Path | None, code: CaseCode | None) -> tuple[tuple[str, str], ...]:
+    simulator = model_of(case, calibrations, code)
     p = {parameter.name: parameter.value for parameter in simulator.parameters}
     files = []
     for name, run in zip(prediction_names(case.runs), case.runs, strict=True):
@@ -95,7 +112,7 @@ def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, s
     runs = tuple(
         read_run(
             path,
-            read_bytes(path),
+            read_input(path, TABLE_FILE),
             name=path.name,
             channels=channels,
             time=time,

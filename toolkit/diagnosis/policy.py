@@ -27,6 +27,21 @@ class _Budget:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Worker:
+    """What a case's own code may use, in a process of its own."""
+
+    memory_GB: float = _set(
+        4.0, "GB of address space", "a simulator of 100 000 rows takes 0.5; a desk computer has 8 or more"
+    )
+    processes: int = _set(64, "processes", "a pool on every core of a large computer, and no fork bomb")
+    scratch_MB: int = _set(1024, "MB of temporary files", "when isolated they lie in the memory")
+    deaths: int = _set(
+        12, "deaths", "of single sets of parameters; a simulator that dies more often bounds no fit"
+    )
+    simulate_s: float = _set(600.0, "s", "a model file's code without a --budget: that of a diagnosis")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Rows:
     """Which rows count, and which are held out."""
 
@@ -230,11 +245,11 @@ class _Surface:
     cell_rows: int = _set(20, "rows of a run", "fewer do not tell what its cells carried from its loads")
 
 
-BUDGET, ROWS, PRIORS, NOISE = _Budget(), _Rows(), _Priors(), _Noise()
+BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCREENING, STARTS, STEP, LATTICE = _Screening(), _Starts(), _Step(), _Lattice()
 STRUCTURE, VERDICT, LOCATION, SURFACE = _Structure(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, ROWS, PRIORS, NOISE, SCREENING, STARTS, STEP, LATTICE, STRUCTURE, VERDICT, LOCATION,
+    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCREENING, STARTS, STEP, LATTICE, STRUCTURE, VERDICT, LOCATION,
     SURFACE,
 )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -29,9 +30,10 @@ def finding_lines(findings: Sequence[Finding]) -> list[str]:
 
     lines = []
     for finding in findings:
-        lines.append(f"  {finding.level:<8}{finding.rule:<20} {finding.where}")
+        lines.append(f"  {finding.level:<8}{finding.rule:<20} {one_line(finding.where)}")
         indent = " " * 10
-        lines += textwrap.wrap(finding.message, width=98, initial_indent=indent, subsequent_indent=indent)
+        wrapped = textwrap.wrap(finding.message, width=98, initial_indent=indent, subsequent_indent=indent)
+        lines += map(one_line, wrapped)
     return lines
 
 
@@ -42,15 +44,30 @@ def findings_text(findings: Sequence[Finding]) -> str:
     return "findings (toolkit explain RULE tells more):\n" + "\n".join(finding_lines(findings))
 
 
+def one_line(text: object) -> str:
+    r"""Return a text with every control character escaped: the name of a file may hold any of them.
+
+    >>> print(one_line("a\nb\x1b[2J"))
+    a\nb\x1b[2J
+    """
+    return "".join(
+        character.encode("unicode_escape").decode("ascii")
+        if unicodedata.category(character) in ("Cc", "Zl", "Zp")
+        else character
+        for character in str(text)
+    )
+
+
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:
     """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``."""
     if not rows:
         return ""
     align = align or "<" + ">" * (len(header) - 1)
-    widths = [max(len(str(row[i])) for row in [header, *rows]) for i in range(len(header))]
+    rows = [[one_line(cell) for cell in row] for row in rows]
+    widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
     lines = [
         "  ".join(
-            f"{cell!s:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True)
+            f"{cell:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True)
         ).rstrip()
         for row in [header, ["-" * width for width in widths], *rows]
     ]

@@ -135,20 +135,14 @@ def write_folder(
     OutputError
         the folder cannot be written to
     TemplateError, RenderError
-        the summary cannot be made; the page and the lines are there
+        the summary cannot be made; nothing was changed but the results of single files, which are used again
     """
     from toolkit.audit.timeline import timelines, traces
-    from toolkit.files import atomic_path
     from toolkit.lab.rules import rules_catalogue
+    from toolkit.publication import publication
     from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
     from toolkit.report.audit.page import AuditView, write_page
 
-    with atomic_path(out / LINES) as temporary, temporary.open("wb") as lines:
-        head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
-        lines.write(json.dumps({**head, "known_at": answer.made.known_at.isoformat()}).encode() + b"\n")
-        linked = answer.linked is not None
-        files = (json.dumps(one).encode() for one in files_of(answer)) if linked else answer.made.files.raw()
-        lines.writelines(one + b"\n" for one in files)
     view = AuditView(
         made=answer.made,
         rules=rules_catalogue(),
@@ -160,16 +154,25 @@ def write_folder(
         drifted_tests=answer.drifted_tests,
         uses=_uses(answer, registry),
     )
-    write_page(out / PAGE, view)
-    if template is None:
-        return out / PAGE, out / LINES
-    from toolkit.report.audit.content import build_audit_content
-    from toolkit.report.deliver import deliver
-    from toolkit.report.style import read_style, style_file
+    with publication(out) as stage:
+        with (stage / LINES).open("wb") as lines:
+            head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
+            lines.write(json.dumps({**head, "known_at": answer.made.known_at.isoformat()}).encode() + b"\n")
+            linked = answer.linked is not None
+            files = (
+                (json.dumps(one).encode() for one in files_of(answer)) if linked else answer.made.files.raw()
+            )
+            lines.writelines(one + b"\n" for one in files)
+        write_page(stage / PAGE, view)
+        if template is None:
+            return out / PAGE, out / LINES
+        from toolkit.report.audit.content import build_audit_content
+        from toolkit.report.deliver import deliver
+        from toolkit.report.style import read_style, style_file
 
-    content = build_audit_content(view, read_style(style_file(template.path)))
-    summary = deliver(template, content, out, name="audit")
-    return out / PAGE, out / LINES, summary.docx, summary.pdf
+        content = build_audit_content(view, read_style(style_file(template.path)))
+        summary = deliver(template, content, out, name="audit", stage=stage)
+        return out / PAGE, out / LINES, summary.docx, summary.pdf
 
 
 def _uses(answer: AuditAnswer, registry: Registry) -> tuple[CalibrationUse, ...]:

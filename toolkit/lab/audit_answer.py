@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
-from toolkit.lab.answers import table
+from toolkit.lab.answers import one_line, table
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
@@ -94,10 +94,10 @@ def text_of(answer: AuditAnswer) -> str:
         lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))
     impossible = {finding.where for finding in audit.findings if finding.rule in RULES}
     if impossible:
-        places = ", ".join(sorted(impossible)[:3]) + (", ..." if len(impossible) > 3 else "")
+        places = one_line(", ".join(sorted(impossible)[:3])) + (", ..." if len(impossible) > 3 else "")
         lines.append(f"Fy or Mz that no tire has, in files: {len(impossible)} ({places}); --json tells why")
     settings = Counter(finding.message for finding in audit.findings if finding.rule == "test-toml")
-    lines += [f"{count} files: {message}" for message, count in settings.most_common(_SETTINGS)]
+    lines += [one_line(f"{count} files: {message}") for message, count in settings.most_common(_SETTINGS)]
     if len(settings) > _SETTINGS:
         lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
     lines += [f"refused record {record.id}: {record.reason}" for record in audit.refused]
@@ -112,14 +112,14 @@ def _asked(answer: AuditAnswer) -> Iterator[str]:
             why = f"to be amended, {report.not_clean} of {report.files} files are not right"
             why = why if report.to_amend else "stands"
             tests = ", ".join(sorted(report.tests))
-            yield (
+            yield one_line(
                 f"report {report.report} ({tests}): {why}"
                 if report.files
                 else f"report unknown: {report.report}"
             )
         if answer.linked.unknown:
             unknown = answer.linked.unknown
-            yield f"report unknown: {len(unknown)} tests, {', '.join(unknown[:10])}"
+            yield one_line(f"report unknown: {len(unknown)} tests, {', '.join(unknown[:10])}")
     if answer.drift is not None:
         drift = answer.drift
         yield ""
@@ -140,7 +140,11 @@ def _asked(answer: AuditAnswer) -> Iterator[str]:
     if answer.copies is not None:
         written = [copy for copy in answer.copies if copy.sha256 is not None]
         yield f"{len(written)} corrected copies"
-        yield from (f"no copy of {copy.path}: {copy.reason}" for copy in answer.copies if copy.sha256 is None)
+        yield from (
+            one_line(f"no copy of {copy.path}: {copy.reason}")
+            for copy in answer.copies
+            if copy.sha256 is None
+        )
         for amended in answer.amended:
             pdf = amended.as_dict()["pdf"]
             yield f"{pdf or 'NO REPORT: ' + str(amended.outcome)} replaces {amended.replaces}"

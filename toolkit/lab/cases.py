@@ -123,6 +123,8 @@ def diagnose(
     calibrations: str | Path | None = None,
     home: str | Path | None = None,
     budget_s: float = 600.0,
+    isolated: bool = False,
+    in_process: bool = False,
 ) -> Diagnosis:
     """Tell why a simulation and its recordings differ: where, by what, and how sure that is.
 
@@ -132,17 +134,25 @@ def diagnose(
     model : model file of an earlier answer in place of the case's simulation
     calibrations, home : the registry, or the laboratory, where the simulation is the machine
     budget_s : seconds after which a partial answer is given
+    isolated : run the case's own code without network and with a read-only view of the files
+    in_process : run the case's own code in this process, with all that it may do to it, for a debugger
 
     Raises
     ------
     ToolkitError
         the case cannot be read, or its simulation not run
     """
-    from toolkit.lab.diagnosis import diagnose_case
+    from toolkit.errors import ConfigError
+    from toolkit.lab.diagnosis import diagnose_case, worker_limits
 
+    if isolated and in_process:
+        raise ConfigError(
+            "code in this process cannot be isolated", where="diagnose", got="isolated and in_process",
+            expected="one of them", next_step="leave in_process out", rule="wrong-value",
+        )  # fmt: skip
     diagnosed = diagnose_case(
         Path(case), model=as_path(model), calibrations=as_path(calibrations), home=as_path(home),
-        budget_s=budget_s,
+        budget_s=budget_s, limits=None if in_process else worker_limits(isolated=isolated),
     )  # fmt: skip
     return Diagnosis(result=diagnosed)
 

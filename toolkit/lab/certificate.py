@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from toolkit.lab.answers import delivered_keys, file_name, finding_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from datetime import date
     from pathlib import Path
 
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.sealing import Sealing
     from toolkit.report.certificate.model import Certificate
     from toolkit.report.deliver import Delivered
     from toolkit.report.word.package import Template
@@ -28,6 +30,7 @@ def deliver_certificate(
     replaces: str | None,
     amendment: str | None,
     dcc: bool,
+    sealing: Sealing | None = None,
     keep: bool,
     step: Callable[[str], None],
 ) -> tuple[Certificate, Delivered]:
@@ -49,19 +52,30 @@ def deliver_certificate(
     certificate = collect(
         registry, record_id, style, issued=issued, draft=draft, replaces=replaces, amendment=amendment
     )
+    xml = build_dcc(certificate) if dcc else None
+    if xml is not None and sealing is not None:
+        xml = sealing.seal_xml(xml)
     delivered = deliver(
         opened,
         build_content(certificate, style),
         out,
         name=file_name(certificate.id, otherwise="certificate"),
-        companions={".xml": build_dcc(certificate)} if dcc else None,
+        companions=None if xml is None else {".xml": xml},
+        seal=None if sealing is None else partial(_seal, sealing, certificate),
         keep=keep,
         step=step,
     )
     return certificate, delivered
 
 
-def certificate_payload(certificate: Certificate, delivered: Delivered) -> dict[str, Any]:
+def _seal(sealing: Sealing, certificate: Certificate, pdf: Path, others: Sequence[Path]) -> None:
+    record = {"id": certificate.record, "sha256": certificate.record_sha256}
+    sealing.seal_file(pdf, others, document=f"certificate {certificate.id}", records=[record])
+
+
+def certificate_payload(
+    certificate: Certificate, delivered: Delivered, sealing: Sealing | None = None
+) -> dict[str, Any]:
     """Return a delivered certificate as the JSON answer."""
     return {
         "certificate": certificate.id,
@@ -77,6 +91,7 @@ def certificate_payload(certificate: Certificate, delivered: Delivered) -> dict[
         "withdrawn": certificate.withdrawn,
         "replaces": certificate.replaces,
         **delivered_keys(delivered),
+        **({"sealed_by": sealing.key.name} if sealing else {}),
         "dcc": delivered.companions[0] if delivered.companions else None,
         "decision_rule": certificate.rule,
         "loads": {load.load: _load(load) for load in certificate.loads},
@@ -101,13 +116,14 @@ def _load(load: Any) -> dict[str, Any]:
     }
 
 
-def certificate_text(certificate: Certificate, delivered: Delivered) -> str:
+def certificate_text(certificate: Certificate, delivered: Delivered, sealing: Sealing | None = None) -> str:
     """Return a delivered certificate for people."""
     marks = "  DRAFT" if certificate.draft else "  WITHDRAWN" if certificate.withdrawn else ""
     lines = [
         f"certificate {certificate.id} of {certificate.record}{marks}",
         *(f"{path}" for path in (delivered.pdf, delivered.docx, *delivered.companions)),
         f"{delivered.pages} pages, {len(delivered.filled.manifest)} values verified",
+        f"sealed by {sealing.key.name}" if sealing else "unsigned: no --seal",
         *(f"  warning {warning}" for warning in delivered.warnings),
         *finding_lines(certificate.findings),
     ]

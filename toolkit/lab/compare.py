@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -32,15 +33,42 @@ def comparison_template(template: Path | None, out: Path | None, home: Path | No
     return read_template(template or home_template("comparison.docx", home))
 
 
-def deliver_comparison(
+def write_comparison(
+    comparison: Comparison,
+    style: Style,
+    findings: Sequence[Finding],
+    *,
+    figures: Path | None,
+    opened: Template | None,
+    out: Path | None,
+    known_at: date | None,
+    units: Style | None,
+) -> tuple[dict[str, Path], Delivered | None]:
+    """Write the figures and deliver the document, what is asked for of both; return them.
+
+    ``style`` is that of the figures, ``units`` those of the document where they are not its template's.
+    """
+    from toolkit.publication import publication
+
+    with ExitStack() as together:
+        drawn = {}
+        if figures is not None:
+            drawn = _write_figures(comparison, style, together.enter_context(publication(figures)), figures)
+        if opened is None or out is None:
+            return drawn, None
+        stage = together.enter_context(publication(out))
+        return drawn, _deliver(comparison, opened, out, stage, findings, known_at, units)
+
+
+def _deliver(
     comparison: Comparison,
     opened: Template,
     out: Path,
+    stage: Path,
     findings: Sequence[Finding],
     known_at: date | None,
     units: Style | None,
 ) -> Delivered:
-    """Deliver ``comparison.docx`` and its verified ``comparison.pdf``."""
     from datetime import date
 
     from toolkit.report.comparison.content import build_comparison_content
@@ -51,7 +79,7 @@ def deliver_comparison(
     if units is not None:
         style = style.in_units_of(units)
     content = build_comparison_content(comparison, style, findings, issued=known_at or date.today())  # noqa: DTZ011
-    return deliver(opened, content, out, name="comparison")
+    return deliver(opened, content, out, name="comparison", stage=stage)
 
 
 def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple[list[Entry], list[Finding]]:
@@ -94,34 +122,31 @@ def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
 
 
 def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, list[Finding]]:
-    import hashlib
-
     from toolkit.comparison.maker_characteristics import is_characteristics_table, maker_characteristics
     from toolkit.comparison.maker_table import maker_rows
     from toolkit.comparison.model import Entry
+    from toolkit.files import sha256_file
 
     if path.is_file() and is_characteristics_table(path):
-        identity = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+        identity = sha256_file(path)[:12]
         rows = maker_characteristics(path, identity=identity)
         return Entry(
             label=path.stem, kind="characteristics", identity=identity, source=str(path), rows=rows
         ), []
-    identity = hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else ""
+    identity = sha256_file(path)[:12] if path.is_file() else ""
     read, findings = maker_rows(path, axes=axes, angles_rad=angles, identity=identity)
     return Entry(label=path.stem, kind="table", identity=identity, source=str(path), rows=read), list(
         findings
     )
 
 
-def write_figures(comparison: Comparison, style: Style, folder: Path) -> dict[str, Path]:
-    """Write the figures of a comparison into a folder; return their paths by name."""
-    from toolkit.files import write_atomic
+def _write_figures(comparison: Comparison, style: Style, stage: Path, folder: Path) -> dict[str, Path]:
+    """Write the figures of a comparison; return their paths in their folder by name."""
     from toolkit.report.comparison.plots import comparison_plots
     from toolkit.report.figures import draw
 
     drawn = {}
     for name, plot in comparison_plots(comparison, style).items():
-        path = folder / f"{name}.png"
-        write_atomic(path, draw(plot).png)
-        drawn[name] = path
+        (stage / f"{name}.png").write_bytes(draw(plot).png)
+        drawn[name] = folder / f"{name}.png"
     return drawn

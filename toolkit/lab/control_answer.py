@@ -56,10 +56,10 @@ def chart_answer(
     newest = max((s.points[-1] for s in chart.series), key=lambda point: (point.date, point.session_record))
     findings = chart_findings(chart, newest.session_record)
     if out is not None:
-        from toolkit.files import write_atomic
+        from toolkit.publication import write_result
         from toolkit.report.calibration.chart_figures import draw_chart
 
-        write_atomic(out, draw_chart(chart, kind or "png"))
+        write_result(out, draw_chart(chart, kind or "png"))
     text = [table(
         ["load", "check load", "points", "centre", "lower", "upper", "newest", "unit", "rules broken"],
         [_row(series) for series in chart.series], align="<<>>>>><<",

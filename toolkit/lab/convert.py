@@ -48,7 +48,7 @@ def convert(source: Path, target: Path, *, axes: str, resolve: Callable[[Path], 
     """
     from toolkit.channels import AXES
     from toolkit.errors import ConfigError
-    from toolkit.files import write_atomic
+    from toolkit.publication import write_result
 
     if axes not in AXES:
         raise ConfigError(
@@ -71,7 +71,7 @@ def convert(source: Path, target: Path, *, axes: str, resolve: Callable[[Path], 
             columns, read_in, lost, marks = _read(source, kinds[0], axes)
         text, target_findings = _written(columns, read_in, kinds[1], axes, source, marks)
         findings = (*lost, *target_findings)
-    write_atomic(target, text)
+    write_result(target, text)
     return Converted(kinds=kinds, findings=findings, use=use)
 
 
@@ -97,10 +97,11 @@ def _refuse_draft(source: Path, target: Path, kinds: tuple[str, str], use: Calib
     """Refuse a table of a draft: of a reduced test, or of a file that carries the mark of one."""
     from toolkit.calibration.records.use import DRAFT_MARK
     from toolkit.errors import OutputError
+    from toolkit.inputs import TYDEX_FILE, read_input
 
     draft = use is not None and use.draft
     if kinds[0] == "tydex":
-        draft = source.is_file() and DRAFT_MARK.encode() in source.read_bytes()
+        draft = source.is_file() and DRAFT_MARK.encode() in read_input(source, TYDEX_FILE)
     if draft and kinds[1] == "csv":
         raise OutputError(
             "a table has no place for the mark of a draft", where=target, got=f"{source.name}, a draft",
@@ -154,8 +155,9 @@ def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Find
 def _marks(tydex: Path) -> tuple[str, ...]:
     """Return the marks of records among the comments of a TYDEX file."""
     from toolkit.calibration.records.use import SINCE, UNVERIFIED
+    from toolkit.inputs import TYDEX_FILE, read_input
 
-    lines = tydex.read_bytes().decode("utf-8", errors="replace").splitlines()
+    lines = read_input(tydex, TYDEX_FILE).decode("utf-8", errors="replace").splitlines()
     return tuple(dict.fromkeys(line.strip() for line in lines if line.startswith((UNVERIFIED, SINCE))))
 
 

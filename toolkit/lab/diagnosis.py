@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.diagnose import Result
     from toolkit.report.word.package import Template
+    from toolkit.worker.posix import Limits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +44,7 @@ def diagnose_case(
     calibrations: Path | None = None,
     home: Path | None = None,
     budget_s: float = 600.0,
+    limits: Limits | None = None,
     tell: Callable[[str], None] = lambda _text: None,
 ) -> Diagnosed:
     """Return the diagnosis of a case.
@@ -51,6 +53,7 @@ def diagnose_case(
     ----------
     out : where `write_diagnosis` will put it: judged before the search, not after it
     model : model file in place of the case's simulation
+    limits : of the worker in which the case's own code runs (`worker_limits`); None runs it in this process
     tell : told what is searched
 
     Raises
@@ -66,9 +69,23 @@ def diagnose_case(
     if out is not None:
         check_folder(out, model or case.model)
     registry = machine_registry(case.simulation.kind, calibrations, home)
-    result = diagnose(case, registry, budget_s=budget_s, tell=tell)
+    result = diagnose(case, registry, budget_s=budget_s, limits=limits, tell=tell)
     tell("")
     return Diagnosed(case=case, result=result, use=calibration_use(case, registry))
+
+
+def worker_limits(
+    *, isolated: bool = False, memory_GB: float | None = None, processes: int | None = None
+) -> Limits:
+    """Return the limits of the process in which a case's own code runs; None for those of the policy."""
+    from toolkit.diagnosis.policy import WORKER
+    from toolkit.diagnosis.simulators.case_code import limits_of
+
+    return limits_of(
+        memory_GB=WORKER.memory_GB if memory_GB is None else memory_GB,
+        processes=WORKER.processes if processes is None else processes,
+        isolated=isolated,
+    )
 
 
 def check_folder(out: Path, model: Path | None) -> None:
@@ -88,12 +105,25 @@ def machine_registry(kind: str, calibrations: Path | None, home: Path | None) ->
 
 
 def write_diagnosis(
-    diagnosed: Diagnosed, out: Path, *, timing: Callable[[], dict[str, Any]]
+    diagnosed: Diagnosed,
+    out: Path,
+    *,
+    timing: Callable[[], dict[str, Any]],
+    opened: Template | None = None,
+    by: str | None = None,
 ) -> dict[str, Any]:
-    """Write predictions, model file, page and answer; return the answer. ``timing`` is asked at its end."""
+    """Write predictions, model file, page, answer and, by a template, the document; return the answer.
+
+    ``timing`` is asked at its end; ``by`` releases the document's opinion on the cause.
+
+    Raises
+    ------
+    OutputError, TemplateError, RenderError
+        the folder cannot be written to, or the document not be made: then nothing of it was changed
+    """
     from toolkit.diagnosis.answer.model_text import MODEL
     from toolkit.diagnosis.answer.serial import as_json
-    from toolkit.files import write_atomic
+    from toolkit.publication import publication
     from toolkit.report.diagnosis.page import page
 
     model = diagnosed.model(out)
@@ -102,15 +132,21 @@ def write_diagnosis(
     drawn = page(diagnosed.result, diagnosed.use)
     payload["timing"] = timing()
     text = json.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
-    for name, content in diagnosed.result.predictions:
-        write_atomic(out / "predictions" / name, content)
-    _write_model(out / MODEL, model)
-    write_atomic(out / "diagnosis.html", drawn)
-    write_atomic(out / "diagnosis.json", text)
+    files = {f"predictions/{name}": content for name, content in diagnosed.result.predictions}
+    files |= {"diagnosis.html": drawn, "diagnosis.json": text}
+    with publication(out) as stage:
+        for name, content in files.items():
+            (stage / name).parent.mkdir(exist_ok=True)
+            (stage / name).write_text(content, encoding="utf-8")
+        _write_model(out / MODEL, model, stage)
+        if opened is not None:
+            payload["document"] = _write_document(diagnosed, opened, out, stage, by=by)
     return payload
 
 
-def write_document(diagnosed: Diagnosed, opened: Template, out: Path, *, by: str | None) -> dict[str, Any]:
+def _write_document(
+    diagnosed: Diagnosed, opened: Template, out: Path, stage: Path, *, by: str | None
+) -> dict[str, Any]:
     """Deliver ``diagnosis.docx`` and ``diagnosis.pdf``; return what the JSON answer says of them."""
     from datetime import date
 
@@ -129,7 +165,7 @@ def write_document(diagnosed: Diagnosed, opened: Template, out: Path, *, by: str
         model_sha256=None if model is None else sha256_bytes(model.encode()),
         by=by,
     )
-    return delivered_keys(deliver(opened, content, out, name="diagnosis"))
+    return delivered_keys(deliver(opened, content, out, name="diagnosis", stage=stage))
 
 
 def _apart(model: Path | None, target: Path) -> None:
@@ -144,15 +180,16 @@ def _apart(model: Path | None, target: Path) -> None:
         )  # fmt: skip
 
 
-def _write_model(path: Path, text: str | None) -> None:
+def _write_model(path: Path, text: str | None, stage: Path) -> None:
     """Write the model file; one of an earlier answer does not stay beside an answer that names nothing."""
-    from toolkit.files import read_toml, write_atomic
+    from toolkit.files import read_toml
     from toolkit.simulation.model_file import is_model
+    from toolkit.staging import supersede
 
     if text is not None:
-        write_atomic(path, text)
+        (stage / path.name).write_text(text, encoding="utf-8")
     elif path.is_file() and is_model(read_toml(path)):
-        path.unlink()
+        supersede(stage, path.name)
 
 
 def _writable(out: Path) -> None:

@@ -303,13 +303,12 @@ def fit_options(loss: str, weights: str, rated_load: float | None, radius: float
     return "robust" if loss == "robust" else "linear"
 
 
-def write_figures(fitted: Fitted, folder: Path) -> list[str]:
-    """Write the figures of all fits into a folder; return their names."""
-    from toolkit.files import write_atomic
+def write_figures(fitted: Fitted, stage: Path) -> list[str]:
+    """Write the figures of all fits into a staging folder; return their names."""
     from toolkit.report.fit_figures import fit_figures
 
     word = fitted.use.word if fitted.use else None
     pictures = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)
     for name, picture in pictures.items():
-        write_atomic(folder / name, picture)
+        (stage / name).write_bytes(picture)
     return sorted(pictures)

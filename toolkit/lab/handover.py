@@ -169,10 +169,11 @@ def _whole(resolved: Resolved, test: Path, path: Path) -> None:
 
     if test.is_file():
         # A reduced test is handed over as it is, with its raw rows, unless its record stands otherwise now.
+        from toolkit.inputs import RECORDING_FILE, read_input
         from toolkit.testfile import read_test_file
 
         if read_test_file(test).reduced.calibration == resolved.result.reduced.calibration:
-            path.write_bytes(test.read_bytes())
+            path.write_bytes(read_input(test, RECORDING_FILE))
             return
     write_test_file(path, resolved.result, dict(resolved.recordings))
 

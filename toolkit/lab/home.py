@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.errors import ConfigError, OutputError
+from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.trust.keys import Signer
 
 TEMPLATES = "report_templates"
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -65,11 +67,17 @@ def registry_to_write(calibrations: Path | None = None, home: Path | None = None
     return calibrations_folder(calibrations, home)
 
 
-def open_registry(calibrations: Path | None = None, home: Path | None = None) -> Registry:
-    """Return the registry of `calibrations_folder`."""
+def open_registry(
+    calibrations: Path | None = None,
+    home: Path | None = None,
+    *,
+    lock_file: bool = False,
+    signers: Sequence[Signer] = (),
+) -> Registry:
+    """Return the registry of `calibrations_folder`; ``lock_file``: where the file system has no locks."""
     from toolkit.calibration.registry.registry import Registry
 
-    return Registry(calibrations_folder(calibrations, home))
+    return Registry(calibrations_folder(calibrations, home), lock_file=lock_file, signers=signers)
 
 
 def registry_if_any(calibrations: Path | None = None, home: Path | None = None) -> Registry | None:
@@ -113,24 +121,19 @@ def make_home(folder: Path) -> tuple[str, ...]:
     OutputError
         the folder cannot be written to
     """
-    templates = folder / TEMPLATES
+    from toolkit.publication import publication
+
     written: list[str] = []
-    try:
-        (folder / "calibrations").mkdir(parents=True, exist_ok=True)
-        templates.mkdir(exist_ok=True)
+    with publication(folder) as stage:
+        for name in ("calibrations", TEMPLATES):
+            if not (folder / name).is_dir():
+                (stage / name).mkdir()
         for source in sorted((packaged_home() / TEMPLATES).iterdir()):
-            target = templates / source.name
-            if source.is_file() and not target.exists():
-                shutil.copyfile(source, target)
-                written.append(str(target.relative_to(folder)))
-    except OSError as error:
-        raise OutputError(
-            "the home cannot be made",
-            where=folder,
-            got=error.strerror,
-            expected="a folder that can be written to",
-            next_step="choose another folder",
-        ) from error
+            name = f"{TEMPLATES}/{source.name}"
+            if source.is_file() and not (folder / name).exists():
+                (stage / TEMPLATES).mkdir(exist_ok=True)
+                shutil.copyfile(source, stage / name)
+                written.append(name)
     return tuple(written)
 
 

@@ -31,7 +31,8 @@ def listed(
         heads[name] = {"count": len(ledger.entries), "sha256": ledger.head, "damage": ledger.damage}
         good, refused = registry.usable(name)
         bad += len(refused) + (ledger.damage is not None)
-        all_rows = [record_row(record, registry.status(record.id, known_at=known_at)) for record in good]
+        statuses = registry.statuses(name, known_at=known_at) if good else {}
+        all_rows = [record_row(record, statuses[record.id]) for record in good]
         shown = [row for row in all_rows if everything or row["status"] != "discarded"]
         hidden += len(all_rows) - len(shown)
         rows += shown

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
     from toolkit.errors import ToolkitError
     from toolkit.lab.resolve import Resolved
+    from toolkit.lab.sealing import Sealing
+    from toolkit.report.content import ReportContent
     from toolkit.report.deliver import Delivered, Job
     from toolkit.report.diagnosis.answer import Told
     from toolkit.report.drawer import Drawer
@@ -34,7 +37,7 @@ class Options:
     """What all reports of one call have in common.
 
     ``None`` in ``details``: those of each ``test.toml``; in ``units``: those of the style file.
-    ``diagnosis`` is the answer that the report tells, with its file.
+    ``diagnosis`` is the answer that the report tells, with its file; ``sealing`` seals each PDF.
     """
 
     template: Template
@@ -48,6 +51,7 @@ class Options:
     diagnosis: tuple[Told, Path] | None = None
     allow_missing: bool = False
     keep: bool = False
+    sealing: Sealing | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,12 +179,18 @@ def _job(
         diagnosis=options.diagnosis[0] if options.diagnosis else None,
     )
     return Job(
+        seal=None if options.sealing is None else partial(_seal, options.sealing, content),
         template=options.template,
         content=content,
         out=folder,
         extras=writers(resolved, test, xlsx=options.xlsx, tydex=options.tydex, tir=options.tir),
         provenance=provenance(resolved, test, diagnosis=options.diagnosis and options.diagnosis[1]),
     )
+
+
+def _seal(sealing: Sealing, content: ReportContent, pdf: Path, others: Sequence[Path]) -> None:
+    records = [{"id": use.id, "sha256": use.sha256} for use in content.calibrations]
+    sealing.seal_file(pdf, others, document=f"report {content.identity}", records=records)
 
 
 def attention(report: MadeReport) -> bool:

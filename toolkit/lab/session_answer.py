@@ -66,14 +66,15 @@ def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None)
 
 def _write(fit: SessionFit, title: str, folder: Path) -> list[str]:
     from toolkit.calibration.fit.report import report_session
-    from toolkit.files import write_atomic
+    from toolkit.publication import publication
     from toolkit.report.calibration.figures import report_figures
 
     pictures: dict[str, bytes] = {}
     for report in report_session(fit):
         pictures |= report_figures(report, title=title)
-    for name, data in pictures.items():
-        write_atomic(folder / name, data)
+    with publication(folder) as stage:
+        for name, data in pictures.items():
+            (stage / name).write_bytes(data)
     return sorted(pictures)
 
 

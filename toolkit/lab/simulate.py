@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.simulation.acquisition import OwnProgram
     from toolkit.simulation.plan import Plan
+    from toolkit.worker.posix import Limits
 
 
 def simulate_plan(
@@ -59,10 +61,11 @@ def _no_runs(plan: Plan) -> ToolkitError:
 def _test(
     plan: Plan, out: Path, registry: Registry | None, csv: Path | None, case: Path | None
 ) -> tuple[dict[str, Any], str]:
+    from toolkit.publication import publication
     from toolkit.simulation.case import CASE, RUNS, TIRE, check_case, run_names, write_case, write_runs
     from toolkit.simulation.program import other_programs
     from toolkit.simulation.run import simulate
-    from toolkit.simulation.write import TEST, TRUTH, check_folder, write_test
+    from toolkit.simulation.write import TEST, TRUTH, check_folder, test_names, write_test
 
     program = _program(plan, registry)
     record = None if program is None else program.record
@@ -74,7 +77,17 @@ def _test(
     if case is not None:
         check_case(plan, record)
     test = simulate(plan, program, others)
-    files = write_test(test, out)
+    check_folder(out, set(test_names(test)))
+    with ExitStack() as together:
+        stages = {
+            folder: together.enter_context(publication(folder))
+            for folder in (out, csv, case)
+            if folder is not None
+        }
+        files = write_test(test, stages[out])
+        runs = () if csv is None else write_runs(test, stages[csv])
+        if case is not None:
+            write_case(test, stages[case], record=record)
     payload = _common(plan, out, files) | {
         "kind": "test",
         "record": plan.record,
@@ -89,10 +102,10 @@ def _test(
         f"  own Fy, Mz   by {record or 'the true map of the cells (no record applies)'}{wrong}"
     )
     if csv is not None:
-        payload["csv"] = [str(path) for path in write_runs(test, csv)]
+        payload["csv"] = [str(csv / path.name) for path in runs]
         text += f"\n  as CSV       {csv}"
     if case is not None:
-        payload["case"] = str(write_case(test, case, record=record)[0])
+        payload["case"] = str(case / CASE)
         text += f"\n  case         {case / CASE}   (toolkit diagnose {case / CASE} --out DIR)"
     return payload, text + _effects(plan)
 
@@ -192,20 +205,29 @@ def model_answer(
     out: Path,
     calibrations: Path | None,
     home: Path | None,
+    *,
+    budget_s: float,
+    limits: Limits,
 ) -> tuple[dict[str, Any], str]:
-    """Write the outputs of a model on inputs; return the JSON answer and the text for people."""
+    """Write the outputs of a model on inputs; return the JSON answer and the text for people.
+
+    ``limits`` are of the worker in which the model's own code runs, ``budget_s`` its seconds.
+    """
     from toolkit.diagnosis.forward import simulate_model
-    from toolkit.files import write_atomic
     from toolkit.lab.diagnosis import machine_registry
+    from toolkit.publication import publication
     from toolkit.simulation.model_file import read_model
     from toolkit.simulation.write import check_folder
 
     model = read_model(path)
     registry = machine_registry(model.kind, calibrations, home)
-    outputs, findings = simulate_model(model, inputs, registry, conditions=_conditions(conditions))
+    outputs, findings = simulate_model(
+        model, inputs, registry, conditions=_conditions(conditions), budget_s=budget_s, limits=limits
+    )
     check_folder(out, {name for name, _ in outputs})
-    for name, content in outputs:
-        write_atomic(out / name, content)
+    with publication(out) as stage:
+        for name, content in outputs:
+            (stage / name).write_text(content, encoding="utf-8")
     payload = {
         "out": out,
         "simulated": True,

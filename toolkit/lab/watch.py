@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -88,7 +87,7 @@ class WatchAnswer:
 
 @contextlib.contextmanager
 def alone(out: Path) -> Iterator[None]:
-    """Hold the output folder for one watch; what a killed one left half made is taken away."""
+    """Hold the output folder for one watch."""
     from toolkit.errors import OutputError
 
     try:
@@ -108,8 +107,6 @@ def alone(out: Path) -> Iterator[None]:
                 expected="one watch for each output folder",
                 next_step="end the other one, or choose another --out", rule="watch-running",
             ) from error  # fmt: skip
-        for remnant in [*out.glob(".report-*"), *out.glob("*/.report-*")]:
-            shutil.rmtree(remnant, ignore_errors=True)
         yield
 
 

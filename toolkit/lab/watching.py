@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
+from toolkit.inputs import RESULT_FILE, read_regular
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from toolkit.lab.resolve import Resolved
 
 STATE = "watch.json"
+BATCH = 16
+"""Reports made in one call: tests that are held with their recordings, and one start of LibreOffice."""
 SET_ASIDE = "set-aside"
 # What a file looks like while it is being copied, and what a test lacks whose last file is on its way.
 _PARTIAL = frozenset(
@@ -98,14 +101,26 @@ class Watcher:
         self.settle_s, self.patience_s, self.settings = settle_s, patience_s, settings
         self.registry = registry
         self.seen: dict[str, tuple[Listing, float]] = {}
+        self.contents: dict[str, tuple[Listing, str]] = {}
+        self.heads = ""  # of the registry, as this look began
         self.waited: dict[str, tuple[str, str]] = {}
         self.unwritten: dict[Path, tuple[str, str]] = {}
         self.state = self._load()
+        self.unsaved = False
 
     def look(self) -> Round:
-        """Look once: make the reports of all tests that have become whole."""
+        """Look once: make the reports of all tests that have become whole, a batch at a time.
+
+        What a test holds is read once for each listing of its files; the registry is asked once, before any
+        test is read, and the state is written once a batch: a look at tests that did not change reads none
+        of their files, and one at many that did holds no more of them than a batch.
+        """
+        made: list[MadeReport] = []
         waiting: list[Waiting] = []
         aside: list[Aside] = []
+        self.heads = ""
+        with contextlib.suppress(ToolkitError):  # the tests that need it say what is wrong with it
+            self.heads = self.registry()
         ready: dict[Path, Resolved] = {}
         contents: dict[Path, str] = {}
         for path, (text, _) in list(self.unwritten.items()):
@@ -121,7 +136,7 @@ class Watcher:
                 waiting.append(Waiting(test=name, reason="files are arriving"))
                 continue
             try:
-                content = _content(test, listing)
+                content = self._content(test, name, listing)
             except OSError as error:
                 waiting.append(Waiting(test=name, reason=f"a file cannot be read yet: {error.strerror}"))
                 continue
@@ -148,9 +163,20 @@ class Watcher:
                 self._set_aside(judged, content)
             else:
                 ready[test] = judged
-        reports = self._make(ready, contents, waiting, aside)
+                if len(ready) == BATCH:
+                    made += self._make(ready, contents, waiting, aside)
+                    ready = {}
+        made += self._make(ready, contents, waiting, aside)
+        if self.unsaved:
+            self._save()
         waiting += [Waiting(test=path.name, reason=why) for path, (_, why) in self.unwritten.items()]
-        return Round(made=tuple(reports), waiting=tuple(waiting), set_aside=tuple(aside))
+        return Round(made=tuple(made), waiting=tuple(waiting), set_aside=tuple(aside))
+
+    def _content(self, test: Path, name: str, listing: Listing) -> str:
+        """Return one hash of all of a test's files, read again only where one of them has changed."""
+        if name not in self.contents or self.contents[name][0] != listing:
+            self.contents[name] = (listing, _content(test, listing))
+        return self.contents[name][1]
 
     def _read(self, test: Path, age: float) -> Resolved | Waiting | Aside:
         name = self._name(test)
@@ -246,7 +272,7 @@ class Watcher:
         """
         if entry.get("state") != SET_ASIDE:
             return False
-        if entry.get("rule") in _NOT_IN_FORCE and entry.get("registry") != self.registry():
+        if entry.get("rule") in _NOT_IN_FORCE and entry.get("registry") != self.heads:
             return True
         return entry.get("version") != self.version or entry.get("settings", self.settings) != self.settings
 
@@ -259,18 +285,18 @@ class Watcher:
             "rule": fault.rule,
             "reason": fault.reason,
             "version": self.version,
-            **({"registry": self.registry()} if fault.rule in _NOT_IN_FORCE else {}),
+            **({"registry": self.heads} if fault.rule in _NOT_IN_FORCE else {}),
             **({} if by is None else {"settings": by}),
         }
         self._write(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")
-        self._save()
+        self.unsaved = True
 
     def _load(self) -> dict[str, dict[str, Any]]:
         path = self.out / STATE
         if not path.is_file():
             return {}
         try:
-            state = json.loads(path.read_text(encoding="utf-8"))
+            state = json.loads(read_regular(path, RESULT_FILE))
             tests = state["tests"]
             if state["generator"] != "toolkit" or not all(
                 isinstance(entry, dict) for entry in tests.values()
@@ -288,16 +314,17 @@ class Watcher:
         return dict(tests)
 
     def _save(self) -> None:
+        self.unsaved = False
         document = {"generator": "toolkit", "schema": 1, "tests": dict(sorted(self.state.items()))}
         self._write(self.out / STATE, json.dumps(document, ensure_ascii=False, indent=2) + "\n")
 
     def _write(self, path: Path, text: str) -> None:
         """Write a file of the watch's own; on a full disk it is written at a later look, and said to wait."""
-        from toolkit.files import write_atomic
+        from toolkit.publication import write_result
 
         self.unwritten.pop(path, None)
         try:
-            write_atomic(path, text)
+            write_result(path, text)
         except OutputError as error:
             self.unwritten[path] = (text, str(error))
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from toolkit.channels import Axes, Rotation
+from toolkit.channels import CHANNELS, Axes, Rotation
 from toolkit.declared import (
     Above,
     AtLeast,
@@ -28,7 +28,8 @@ from toolkit.declared import (
     refuse,
 )
 from toolkit.errors import ConfigError
-from toolkit.files import parse_toml, read_bytes
+from toolkit.files import parse_toml
+from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine.correction import Correction
 from toolkit.machine.protocol import Protocol
 from toolkit.units import unit
@@ -44,6 +45,7 @@ _DIMENSIONS: dict[Role, tuple[str, ...]] = {
     "angle": ("angle",),
 }
 _INDICATIONS = Names(of="column.symbol", role="indication")
+_LOADS = Names("MY", *(c.symbol for c in CHANNELS.values() if c.dimension in ("force", "moment")))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +108,7 @@ class CellPolarity:
 
     name: Annotated[str, _INDICATIONS, Entry("symbol of the cell's column")]
     signs: Annotated[
-        tuple[tuple[str, Literal[1, -1]], ...], Keyed(), Size(1),
+        tuple[tuple[str, Literal[1, -1]], ...], Keyed(), _LOADS, Size(1),
         Entry("sign by load: 1 where the load grows with the indication", key="polarity", example={"FY": 1}),
     ]  # fmt: skip
     source: Annotated[str, Entry("who states it, and where")]
@@ -267,7 +269,6 @@ def machine_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _PACKAGED.glob("*.toml")))
 
 
-@lru_cache(maxsize=32)
 def load_machine(name_or_path: str) -> Machine:
     """Return a packaged machine by name, or one from a .toml file by path.
 
@@ -285,7 +286,7 @@ def load_machine(name_or_path: str) -> Machine:
     1.353
     """
     path = machine_file(name_or_path)
-    if not path.is_file():
+    if not is_regular(path):
         raise ConfigError(
             f"unknown machine {name_or_path!r}",
             where=path if name_or_path.endswith(".toml") else None,
@@ -294,7 +295,7 @@ def load_machine(name_or_path: str) -> Machine:
             next_step="name one of those, or give the path of a machine definition (.toml)",
             rule="unknown-machine",
         )
-    return machine_of_text(read_bytes(path), path)
+    return machine_of_text(read_input(path, SETTINGS_FILE), path)
 
 
 def machine_file(name_or_path: str) -> Path:
@@ -302,6 +303,7 @@ def machine_file(name_or_path: str) -> Path:
     return Path(name_or_path) if name_or_path.endswith(".toml") else _PACKAGED / f"{name_or_path}.toml"
 
 
+@lru_cache(maxsize=32)  # by what stands in the file: a definition may be edited while a program runs
 def machine_of_text(data: bytes, path: Path) -> Machine:
     """Return the machine of a definition's content; ``path`` names it, errors as `load_machine`."""
     table, source = _extended(data, path, ())
@@ -335,7 +337,7 @@ def _extended(data: bytes, path: Path, extending: tuple[Path, ...]) -> tuple[dic
         )  # fmt: skip
         refuse([fault], source)
     base_path = machine_file(name)
-    base, base_source = _extended(read_bytes(base_path), base_path, (*extending, path))
+    base, base_source = _extended(read_input(base_path, SETTINGS_FILE), base_path, (*extending, path))
     inherited: set[tuple[str, ...]] = {(key,) for key in base if key not in table}
     statement, base_stated = table.get("type_b", {}), base.get("type_b", {})
     if isinstance(statement, dict):  # one new figure must not silently drop the others

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from toolkit.declared import plain, toml_text
 from toolkit.declared.lines import lines_of
 from toolkit.errors import ConfigError
-from toolkit.files import read_bytes, sha256_bytes
+from toolkit.files import sha256_bytes
+from toolkit.inputs import SETTINGS_FILE, read_input
 from toolkit.machine.correction import Correction
 from toolkit.machine.definition import machine_file, machine_of_text
 
@@ -33,7 +34,7 @@ def next_version(
         no such machine; ``machine-correction``: it is corrected already, or the correction cannot be
     """
     path = machine_file(machine)
-    data = read_bytes(path)
+    data = read_input(path, SETTINGS_FILE)
     old = machine_of_text(data, path)
     for earlier in old.corrections:
         if earlier.label == correction.label and diagnosed_with != sha256_bytes(data):

@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from typing import NoReturn
 
 from toolkit.errors import UnreadableError
+from toolkit.inputs import RECORDING_FILE, limit_of, size_text
 
-MAX_FILE_BYTES = 128 * 2**20
 MAX_MEMBERS = 512
-MAX_TOTAL_BYTES = 128 * 2**20
 MAX_RATIO = 200
 """Inflated to stored size of one member; a worksheet of numbers has 5 to 20, a bomb about 1000."""
 
@@ -53,7 +52,7 @@ def read_members(data: bytes, *, where: object, only: tuple[str, ...] | None = N
             next_step="copy the file again from the machine; it was cut off or damaged on its way",
         )
     _check_names([member.filename for member in members], where)
-    budget = MAX_TOTAL_BYTES
+    budget = limit_of(RECORDING_FILE)
     contents: dict[str, bytes] = {}
     for member in members:
         if member.is_dir() or (only is not None and member.filename not in only):
@@ -124,7 +123,7 @@ def _inflate(data: bytes, member: zipfile.ZipInfo, budget: int, where: object) -
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         _refuse("zip-method", "a member of the archive is packed in a way that workbooks never are", where,
                 got=f"{name}: method {member.compress_type}", expected="stored or deflated")  # fmt: skip
-    if member.file_size > MAX_TOTAL_BYTES:
+    if member.file_size > limit_of(RECORDING_FILE):
         _too_large(name, where)  # what it claims is enough
     raw = _raw(data, member, where)
     if member.compress_type == zipfile.ZIP_STORED:
@@ -164,12 +163,13 @@ def _raw(data: bytes, member: zipfile.ZipInfo, where: object) -> bytes:
 
 
 def _too_large(name: str, where: object) -> NoReturn:
+    most = size_text(limit_of(RECORDING_FILE))
     _refuse(
         "inflation",
         "a member of the archive grows out of all proportion when it is unpacked",
         where,
         got=name,
-        expected=f"at most {MAX_TOTAL_BYTES // 2**20} MB in all and {MAX_RATIO} times its packed size",
+        expected=f"at most {most} in all and {MAX_RATIO} times its packed size",
     )
 
 

@@ -5,17 +5,22 @@ from __future__ import annotations
 import codecs
 import contextlib
 import csv
-import io
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.columns import header_of
 from toolkit.recording.safe_open import Gated
 from toolkit.recording.table import Table
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 # How a text table was saved: its encoding, what separates its cells, and its decimal sign.
 
@@ -27,6 +32,11 @@ _NUMBER = {
 }
 _HINT = re.compile(r"\A\"?sep=[,;\t]\"?(?=\r?\n)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
+_PLAIN = b"0123456789+-eE \n"
+_LONG_EXPONENT = re.compile(rb"[eE][+-]?[0-9]{5}")  # no number in plain digits
+_PART = 1 << 20  # bytes at a time
+_BLANK_LINES = 64
 _NO_NUMBER = frozenset("nan +nan -nan inf +inf -inf infinity +infinity -infinity".split())
 
 
@@ -96,20 +106,23 @@ def decimal_sign(cells: Iterable[str], separator: str, *, where: Path) -> str:
     """
     if separator == ",":
         return "."
-    texts = [cell.strip() for cell in cells]
-    commas = [text for text in texts if "," in text and _NUMBER[","].fullmatch(text)]
-    if not commas or any("." in text and _NUMBER[r"\."].fullmatch(text) for text in texts):
-        return "."  # a comma among points is told with its cell
-    if all(_GROUPED.fullmatch(text) for text in commas):
+    first, count, grouped = "", 0, True
+    for text in map(str.strip, cells):
+        if "." in text and _NUMBER[r"\."].fullmatch(text):
+            return "."  # a comma among points is told with its cell
+        if "," in text and _NUMBER[","].fullmatch(text):
+            first, count = first or text, count + 1
+            grouped = grouped and _GROUPED.fullmatch(text) is not None
+    if count and grouped:
         raise UnreadableError(
             "the commas in the numbers may be decimal signs or stand between thousands",
             where=where,
-            got=f"{commas[0]!r}, and {len(commas) - 1} others with three digits behind the comma",
+            got=f"{first!r}, and {count - 1} others with three digits behind the comma",
             expected="numbers that can be read in one way only",
             next_step="save it again with a point as the decimal sign and nothing between thousands",
             rule="ambiguous-text",
         )
-    return ","
+    return "," if count else "."
 
 
 def number_or_text(cell: str, decimal: str = ".") -> float | str:
@@ -145,6 +158,9 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
         rule ``not-a-workbook encoding unreadable ambiguous-text``: text without such a header row, in
         another encoding, or that can be read in more than one way
     """
+    plain = _plain_table(gated, machine)
+    if plain is not None:
+        return plain
     text = decode(gated.data, where=gated.path)
     head = first_line(text)
     separator = separator_of(head, header_of(machine), where=gated.path)
@@ -158,12 +174,100 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
             next_step="give the file that the acquisition program wrote",
             rule="not-a-workbook",
         )
-    cells = split_rows(text, separator, where=gated.path)
-    first = next((i for i, row in enumerate(cells) if any(cell.strip() for cell in row)), len(cells))
-    decimal = decimal_sign(chain.from_iterable(cells[first + 1 :]), separator, where=gated.path)
-    rows = [[number_or_text(cell, decimal) for cell in row] for row in cells]
+    below = _iterate_rows(text, separator, where=gated.path)
+    next((row for row in below if any(cell.strip() for cell in row)), None)
+    decimal = decimal_sign(chain.from_iterable(below), separator, where=gated.path)
+    rows: list[list[float | str]] = [
+        [number_or_text(cell, decimal) for cell in row]
+        for row in _iterate_rows(text, separator, where=gated.path)
+    ]
     width = max(map(len, rows), default=0)
-    return Table(where=str(gated.path), rows=[row + [""] * (width - len(row)) for row in rows])
+    for row in rows:
+        row += [""] * (width - len(row))
+    return Table(where=str(gated.path), rows=rows)
+
+
+# Nearly every CSV file is a header and rows of plain numbers, all as wide. Such a table goes from bytes to
+# doubles part by part, without an object for each cell; whatever departs from it is read cell by cell.
+
+
+def _plain_table(gated: Gated, machine: Machine) -> Table | None:
+    data, where = gated.data, gated.path
+    try:
+        if data[:2] in _WIDE:
+            data = decode(data, where=where).encode()
+        begin, head = _head(data, where)
+        separator = separator_of(first_line(head), header_of(machine), where=where)
+        if separator is None:
+            return None
+        top = split_rows(head, separator, where=where)
+        decimal = _decimal_of(data[begin : begin + _PART], separator, where)
+    except UnreadableError:
+        return None  # what it is about is told when the cells are read
+    if any(cell.strip() for row in top[:-1] for cell in row):
+        return None
+    numbers = _plain_numbers(data, begin, separator.encode(), decimal.encode(), len(top[-1]))
+    if numbers is None:
+        return None
+    rows = [[number_or_text(cell, decimal) for cell in row] for row in top]
+    return Table(where=str(where), rows=rows, numbers=numbers)
+
+
+def _head(data: bytes, where: Path) -> tuple[int, str]:
+    # Everything down to the end of the header row; nothing where that is not near.
+    end = 0
+    for _ in range(_BLANK_LINES):
+        end = data.find(b"\n", end) + 1
+        head = decode(data[:end], where=where)
+        if not end or first_line(head):
+            return end, head
+    return 0, ""
+
+
+def _decimal_of(part: bytes, separator: str, where: Path) -> str:
+    # By the first part: where a later one departs from it, the table is not plain.
+    if separator == "," or b"," not in part:
+        return "."
+    cells = re.split(f"[{separator}\r\n]", part.decode("ascii", "replace"))
+    return decimal_sign(cells[:-1] or cells, separator, where=where)
+
+
+def _plain_numbers(
+    data: bytes, begin: int, separator: bytes, decimal: bytes, width: int
+) -> NDArray[np.float64] | None:
+    """Return what stands from ``begin`` on (rows, columns); None where it is anything but plain numbers."""
+    tail = data[max(begin, len(data) - _BLANK_LINES) :]
+    end = len(data) - (len(tail) - len(tail.rstrip(b"\r\n")))
+    rows = data.count(b"\n", begin, end) + 1
+    if end <= begin or 2 * rows * width > end - begin + 1:  # a digit and a separator each, at least
+        return None
+    columns = np.empty((width, rows))
+    row = 0
+    while begin < end:
+        stop = end if end - begin <= _PART else data.rfind(b"\n", begin, begin + _PART) + 1
+        values = _numbers_of(data[begin:stop], separator, decimal, width)
+        if values is None:
+            return None
+        columns[:, row : row + len(values)] = values.T
+        row, begin = row + len(values), stop
+    return columns.T
+
+
+def _numbers_of(part: bytes, separator: bytes, decimal: bytes, width: int) -> NDArray[np.float64] | None:
+    part = part.replace(b"\r\n", b"\n")
+    if part.translate(None, _PLAIN + separator + decimal) or _LONG_EXPONENT.search(part):
+        return None
+    part = part.replace(decimal, b".").removesuffix(b"\n") + b"\n"
+    octets = np.frombuffer(part, np.uint8)
+    marks = octets[(octets == ord(separator)) | (octets == ord("\n"))]
+    row = np.frombuffer(separator * (width - 1) + b"\n", np.uint8)
+    if len(marks) % width or not np.all(marks.reshape(-1, width) == row):
+        return None
+    try:
+        values = np.array([float(cell) for cell in part[:-1].replace(b"\n", separator).split(separator)])
+    except ValueError:
+        return None
+    return values.reshape(-1, width) if np.isfinite(values).all() else None
 
 
 def first_line(text: str) -> str:
@@ -179,8 +283,13 @@ def split_rows(text: str, separator: str, *, where: Path) -> list[list[str]]:
     UnreadableError
         rule ``unreadable``
     """
+    return list(_iterate_rows(text, separator, where=where))
+
+
+def _iterate_rows(text: str, separator: str, *, where: Path) -> Iterator[list[str]]:
+    lines = (line[0] for line in _LINE.finditer(text))
     try:
-        return list(csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True))
+        yield from csv.reader(lines, delimiter=separator, strict=True)
     except csv.Error as error:
         raise UnreadableError(
             "the CSV file cannot be read",

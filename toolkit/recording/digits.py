@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 FULL_DIGITS = 15
 _FEW = 6
 _FULL = 999
+_ROWS = 1 << 15  # at a time
+_LOWEST = 325  # decades below one, down to the smallest double
+_ZERO = 2 * (_LOWEST + 309)  # decades and signs; as a value's own, that it is zero
 _SMALL = -8  # below this decade the powers of ten that are needed are no longer exact in a double
 _TEN = 10.0 ** np.arange(23)
 _LEAST = 307
@@ -88,65 +91,86 @@ def roundings(series: Sequence[Series]) -> NDArray[np.float64]:
 
 
 def _halves(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    # All columns (columns, rows) at once: what is looked for is one number a column, decade and sign.
+    # All columns (columns, rows) at once, some thousand rows at a time: what is looked for is one number a
+    # column, decade and sign, and of every value only these two are kept.
+    n, rows = columns.shape
     if not columns.size:
         return np.zeros(columns.shape)
-    size = np.abs(columns)
-    zero = size == 0
-    any_zero = bool(zero.any())
-    decade = _decades(np.where(zero, 1.0, size) if any_zero else size)
-    places = _places(size, decade)
-    low = int(decade.min())
-    n, decades = len(columns), int(decade.max()) - low + 1
-    group = (decade - low) + decades * np.arange(n)[:, None]
-    side = 2 * group + (columns < 0)
-    counted = (side[~zero], places[~zero]) if any_zero else (side.ravel(), places.ravel())
-    most = np.zeros(2 * n * decades, dtype=np.int64)
-    np.maximum.at(most, *counted)
-    count = np.bincount(counted[0], minlength=len(most)).reshape(-1, 2)
-    sides = most.reshape(-1, 2)
-    finest = sides.max(axis=1)
-    # A sign of which there are enough, beside the other one, has the place that it shows.
-    enough = (count >= _FEW) & (count < count.sum(axis=1)[:, None]) & (finest != _FULL)[:, None]
-    half: NDArray[np.float64] = _HALF[np.where(enough, sides, finest[:, None]).ravel()[side]]
-    single = _single_floats(columns, size, decade, places, zero)
-    if any_zero:
-        there = (count.sum(axis=1) > 0).reshape(n, decades)
-        smallest = np.where(there, _HALF[finest].reshape(n, decades), np.inf).min(axis=1)
-        half = np.where(zero, np.where(np.isinf(smallest), 0.0, smallest)[:, None], half)
-    for column in np.flatnonzero(single):
+    sides = np.full(columns.shape, _ZERO, dtype=np.uint16)
+    most = np.zeros((n, _ZERO), dtype=np.int64)
+    count = np.zeros((n, _ZERO), dtype=np.int64)
+    single = np.zeros(n, dtype=np.bool_)  # may be single floats: a value of enough digits,
+    normal = np.ones(n, dtype=np.bool_)  # and none out of their range
+    for part in _parts(rows):
+        values = columns[:, part]
+        size = np.abs(values)
+        zero = size == 0
+        part_zero = bool(zero.any())
+        decade = _decades(np.where(zero, 1.0, size) if part_zero else size)
+        places = _places(size, decade)
+        side = 2 * (decade + _LOWEST) + (values < 0)
+        sides[:, part] = np.where(zero, _ZERO, side) if part_zero else side
+        index = side + _ZERO * np.arange(n)[:, None]
+        counted = (index[~zero], places[~zero]) if part_zero else (index.ravel(), places.ravel())
+        np.maximum.at(most.reshape(-1), *counted)
+        count += np.bincount(counted[0], minlength=count.size).reshape(n, _ZERO)
+        # Seven digits and less name a single float, whatever was measured: only longer values can tell.
+        single |= (((places + decade >= FULL_DIGITS // 2) | (places == _FULL)) & ~zero).any(axis=1)
+        normal &= ((size < _LARGEST_SINGLE) & ((size > _SMALLEST_SINGLE) | zero)).all(axis=1)
+    shown = _shown(most.reshape(n, -1, 2), count.reshape(n, -1, 2))
+    half = np.stack([of_column[side] for of_column, side in zip(shown, sides, strict=True)])
+    for column in np.flatnonzero(single & normal):
+        if not _single_floats(columns[column]):
+            continue
         nearest = columns[column].astype(np.float32)
         step = np.abs(np.spacing(nearest)).astype(np.float64)
         off = np.abs(columns[column] - nearest)
         # Digits that are whole leave nothing out, however few they are: 101234.5 is a single float.
         printed = np.maximum(half[column], off) if off.any() else off
-        half[column] = np.where(zero[column], 0.0, printed + step / 2)
+        half[column] = np.where(columns[column] == 0, 0.0, printed + step / 2)
     return half
 
 
-def _single_floats(
-    columns: NDArray[np.float64],
-    size: NDArray[np.float64],
-    decade: NDArray[np.int64],
-    places: NDArray[np.int64],
-    zero: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
-    """Return which columns (columns,) hold single floats, by the digits that their values show."""
-    single = np.zeros(len(columns), dtype=np.bool_)
-    # Seven digits and less name a single float, whatever was measured: only longer values can tell.
-    may = (((places + decade >= FULL_DIGITS // 2) | (places == _FULL)) & ~zero).any(axis=1)
-    may &= ((size < _LARGEST_SINGLE) & ((size > _SMALLEST_SINGLE) | zero)).all(axis=1)
-    for column in np.flatnonzero(may):
-        values = size[column][~zero[column]]
-        decimals = np.where(places[column] == _FULL, FULL_DIGITS - 1 - decade[column], places[column])[
-            ~zero[column]
-        ]
+def _parts(rows: int) -> list[slice]:
+    return [slice(start, start + _ROWS) for start in range(0, rows, _ROWS)]
+
+
+def _shown(most: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return half a last place by column, decade and sign (columns, 2 decades + 1), that of zeros last.
+
+    ``most`` and ``count`` (columns, decades, 2): decimals of the finest value, and how many values there are.
+    """
+    table = np.zeros((len(most), _ZERO + 1))
+    there = np.flatnonzero(count.any(axis=(0, 2)))
+    if not len(there):  # nothing but zeros
+        return table
+    decades = slice(int(there[0]), int(there[-1]) + 1)
+    most, count = most[:, decades], count[:, decades]
+    finest = most.max(axis=2)
+    # A sign of which there are enough, beside the other one, has the place that it shows.
+    enough = (count >= _FEW) & (count < count.sum(axis=2)[..., None]) & (finest != _FULL)[..., None]
+    shown = _HALF[np.where(enough, most, finest[..., None])]
+    table[:, 2 * decades.start : 2 * decades.stop] = shown.reshape(len(most), -1)
+    smallest = np.where(count.any(axis=2), _HALF[finest], np.inf).min(axis=1)
+    table[:, _ZERO] = np.where(np.isinf(smallest), 0.0, smallest)
+    return table
+
+
+def _single_floats(column: NDArray[np.float64]) -> bool:
+    """Tell whether a column (rows,) holds single floats, by the digits that its values show."""
+    log_chance = 0.0
+    for part in _parts(len(column)):
+        values = np.abs(column[part])
+        values = values[values != 0]
+        decade = _decades(values)
+        places = _places(values, decade)
+        decimals = np.where(places == _FULL, FULL_DIGITS - 1 - decade, places)
         shown = 0.5 * 10.0 ** -decimals.astype(np.float64)
         nearest = values.astype(np.float32)
-        if (np.abs(values - nearest) <= shown + np.spacing(values)).all():
-            chance = np.minimum(2 * shown / np.spacing(nearest), 1.0)
-            single[column] = np.log10(chance).sum() <= _BY_CHANCE
-    return single
+        if not (np.abs(values - nearest) <= shown + np.spacing(values)).all():
+            return False
+        log_chance += float(np.log10(np.minimum(2 * shown / np.spacing(nearest), 1.0)).sum())
+    return log_chance <= _BY_CHANCE
 
 
 def _decades(size: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -11,8 +11,9 @@ from pathlib import Path
 from toolkit.channels import Rotation
 from toolkit.declared import Fault, Format, Quantity, Source, nearest, read_text, refuse
 from toolkit.errors import ConfigError, RecordingError
-from toolkit.files import read_bytes
+from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine import Machine, Protocol, load_machine, read_protocol
+from toolkit.publication import settle
 from toolkit.recording.details import StatedTest, Tare, TireLabel
 from toolkit.recording.marks import is_own_output
 from toolkit.recording.model import TestInfo
@@ -86,6 +87,7 @@ def read_test_folder(folder: Path) -> TestFolder:
             next_step="check the path",
             rule="no-test",
         )
+    settle(folder)
     toml = folder / TEST_FILE
     if not toml.is_file():
         raise ConfigError(
@@ -96,7 +98,7 @@ def read_test_folder(folder: Path) -> TestFolder:
             next_step=f"write {TEST_FILE}; 'toolkit demo --out DIR' shows one",
             rule="no-test",
         )
-    data = read_bytes(toml)
+    data = read_input(toml, SETTINGS_FILE)
     entries = read_text(StatedTest, data, where=toml)
     source = Source(where=toml, text=data.decode("utf-8-sig"))
     machine_name = _machine_name(entries, toml)
@@ -222,7 +224,7 @@ def _tare(
     if tare.file is not None:
         path = folder / tare.file
         inside = ".." not in Path(tare.file).parts and not Path(tare.file).is_absolute()
-        if not inside or path.is_symlink() or not path.is_file():
+        if not inside or path.is_symlink() or not is_regular(path):
             files = tuple(sorted(_recordings(folder)))
             return _named_file(tare.file, ("tare", "file"), folder, files, source), ()
         return path, ()

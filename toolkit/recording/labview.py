@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.errors import OutputError
-from toolkit.files import write_atomic
 from toolkit.machine import Machine
+from toolkit.publication import write_result
 from toolkit.recording.cells import reference
 from toolkit.recording.marks import GENERATOR, STAMP, recording_keywords
 
@@ -65,7 +65,7 @@ def write_labview(
         keywords=recording_keywords(machine=machine.name, simulated=simulated),
         created=created,
     )
-    write_atomic(path, _filled(shell, _rows_xml(values), created))
+    write_result(path, _filled(shell, _rows_xml(values), created))
 
 
 def _shell(headers: list[str], *, sheet: str, title: str, keywords: str, created: dt.datetime) -> bytes:

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.errors import OutputError
-from toolkit.recording.archive import MAX_FILE_BYTES, read_members
+from toolkit.inputs import RECORDING_FILE, read_regular
+from toolkit.recording.archive import read_members
 from toolkit.recording.sniff import sniff
 
 GENERATOR = "toolkit"
@@ -171,10 +172,8 @@ def own_output(data: bytes) -> bool:
 
 def _content(path: Path) -> bytes:
     try:
-        if not path.is_file() or path.stat().st_size > MAX_FILE_BYTES:
-            return b""
-        return path.read_bytes()
-    except OSError:
+        return read_regular(path, RECORDING_FILE)
+    except (OSError, ValueError):
         return b""
 
 

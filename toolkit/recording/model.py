@@ -41,6 +41,10 @@ class Series:
         """The values in SI (rows,)."""
         return to_si(self.values, self.unit)
 
+    def si_of(self, rows: slice) -> NDArray[np.float64]:
+        """Return the values of some rows in SI."""
+        return to_si(self.values[rows], self.unit)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Recording:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toolkit.errors import CellError, RecordingError, UnreadableError
+from toolkit.files import LARGEST
 from toolkit.machine import Machine
 from toolkit.recording.archive import stored_archive
 from toolkit.recording.cells import reference
@@ -16,7 +17,7 @@ from toolkit.recording.csvfile import read_csv
 from toolkit.recording.formats import READERS
 from toolkit.recording.formats.vectors import series_of
 from toolkit.recording.marks import OWN_OUTPUT, SIMULATED, keywords_of, machine_named, saved_on
-from toolkit.recording.model import Recording
+from toolkit.recording.model import Recording, Series
 from toolkit.recording.safe_open import Gated, gate
 from toolkit.recording.table import Table, read_table
 from toolkit.recording.xlsx import read_sheet
@@ -55,7 +56,7 @@ def read_recording(
             path=path,
             sha256=gated.sha256,
             machine=machine,
-            series=read_table(read_csv(gated, machine), machine),
+            series=_measurable(path, read_table(read_csv(gated, machine), machine)),
             simulated=machine.simulated,
             format="csv",
         )
@@ -64,7 +65,7 @@ def read_recording(
             path=path,
             sha256=gated.sha256,
             machine=machine,
-            series=series_of(READERS[gated.kind](gated, machine), machine),
+            series=_measurable(path, series_of(READERS[gated.kind](gated, machine), machine)),
             simulated=machine.simulated,
             format=gated.kind,
         )
@@ -72,7 +73,7 @@ def read_recording(
     keywords = keywords_of(properties)
     _check_origin(path, keywords, machine)
     sheet, table = read_sheet(gated, header_of(machine))
-    series = read_table(table, machine)
+    series = _measurable(path, read_table(table, machine))
     if reader == "both":
         cross_check(gated, sheet, table)
     return Recording(
@@ -84,6 +85,21 @@ def read_recording(
         format="xlsx",
         saved=saved_on(properties),
     )
+
+
+def _measurable(path: Path, series: tuple[Series, ...]) -> tuple[Series, ...]:
+    # Finite in its own unit is not finite in SI, let alone squared; and some solvers wait for ever on inf.
+    for column in series:
+        largest = max(column.values.max(), -column.values.min())
+        if largest > LARGEST:
+            row = int(abs(column.values).argmax())
+            raise CellError(
+                f"data row {row + 1}, column {column.header!r}: no number that can be measured",
+                where=path, got=column.values[row], expected=f"at most {LARGEST:g} in any unit",
+                next_step="look at that value in the file; repeat the recording or mend a copy of the file",
+                rule="nan-cell",
+            )  # fmt: skip
+    return series
 
 
 def _check_origin(path: Path, keywords: tuple[str, ...], machine: Machine) -> None:

@@ -16,7 +16,8 @@ from xml.etree import ElementTree as ET
 
 from toolkit.errors import UnreadableError
 from toolkit.files import sha256_bytes
-from toolkit.recording.archive import MAX_FILE_BYTES, read_members
+from toolkit.inputs import RECORDING_FILE, read_input
+from toolkit.recording.archive import read_members
 from toolkit.recording.cells import MalformedSheetError, find_cells
 from toolkit.recording.grid import Grid, find_grid
 from toolkit.recording.integrity.mat import unpack_mat
@@ -61,7 +62,7 @@ def gate(path: Path, data: bytes | None = None) -> Gated:
         the file is missing, too large, no workbook and no text, damaged or hostile; see the rules above
     """
     if data is None:
-        data = _bytes(path)
+        data = read_input(path, RECORDING_FILE)
     kind = sniff(data)
     if kind.id in _PLAIN:
         return Gated(path=path, data=data, sha256=sha256_bytes(data), kind=_PLAIN[kind.id], members={})
@@ -209,27 +210,6 @@ def _check_sheet(name: str, xml: bytes, where: Path) -> Grid | None:
         _refuse("doubled-cell", "a cell occurs twice in a worksheet", where, f"{name}: cell {doubled}",
                 "every cell once", _FOREIGN)  # fmt: skip
     return grid
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        if not path.is_file():
-            _refuse("no-file", "there is no such file", path, "a folder" if path.is_dir() else "nothing",
-                    "a recording", "check the path")  # fmt: skip
-        size = path.stat().st_size
-        if size > MAX_FILE_BYTES:
-            _refuse("inflation", "the file is too large for a recording", path, f"{size / 2**20:.0f} MB",
-                    f"at most {MAX_FILE_BYTES // 2**20} MB", _FOREIGN)  # fmt: skip
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        raise UnreadableError(
-            "the file cannot be read",
-            where=path,
-            got=getattr(error, "strerror", None) or error,
-            expected="a readable file",
-            next_step="check the path and its permissions",
-            rule="no-file",
-        ) from error
 
 
 def _no_workbook(where: Path, kind: Kind) -> NoReturn:

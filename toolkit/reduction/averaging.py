@@ -97,7 +97,7 @@ def revolutions(
     ):
         if not recording.has(symbol):
             continue
-        angle = np.unwrap(recording[symbol].si[block.rows])
+        angle = np.unwrap(recording[symbol].si_of(block.rows))
         turns = np.asarray(np.abs(angle - angle[0]) / (2 * np.pi))
         if shaft == machine.protocol.revolutions_of:
             return turns
@@ -108,7 +108,7 @@ def revolutions(
     protocol = machine.protocol
     per_second = (protocol.speed_m_s or machine.drum.speed_m_s) / source
     if recording.has("t"):
-        time = recording["t"].si[block.rows]
+        time = recording["t"].si_of(block.rows)
         return np.asarray((time - time[0]) * per_second)
     if machine.sample_rate_Hz and protocol.acquisition == "continuous":
         return np.arange(block.n) / machine.sample_rate_Hz * per_second

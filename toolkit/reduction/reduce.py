@@ -216,7 +216,7 @@ def _revolutions(chosen: Window, machine: Machine) -> float | None:
 
 
 def _acquired(recording: Recording, symbol: str, rows: slice, sign: int) -> float | None:
-    return sign * float(np.mean(recording[symbol].si[rows])) if recording.has(symbol) else None
+    return sign * float(np.mean(recording[symbol].si_of(rows))) if recording.has(symbol) else None
 
 
 def _own_loads(conditions: Sequence[Condition]) -> list[Condition]:

@@ -1,4 +1,4 @@
-"""Make reports and hand them over: written beside, verified, then renamed into their output folders.
+"""Make reports and hand them over: staged, verified, then published in their output folders.
 
 Several reports are converted in one call of LibreOffice, whose start is paid for once.
 """
@@ -6,17 +6,17 @@ Several reports are converted in one call of LibreOffice, whose start is paid fo
 from __future__ import annotations
 
 import contextlib
-import errno
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.errors import OutputError, RenderError, ToolkitError
+from toolkit.errors import RenderError, ToolkitError
+from toolkit.publication import publication
 from toolkit.recording.marks import refuse_original
 from toolkit.report.content import Plot, ReportContent
 from toolkit.report.handover import MANIFEST, content_hash, manifest_json
@@ -32,13 +32,9 @@ if TYPE_CHECKING:
     from toolkit.report.drawer import Drawer
     from toolkit.report.figures import Picture
 
-# What a disk says that is full, over its quota, read only or broken: the place is to blame, not the report.
-_DISK = frozenset(
-    (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
-)
-
 Step = Callable[[str], None]
 Writer = Callable[[Path], object]
+Seal = Callable[[Path, Sequence[Path]], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +47,9 @@ class Job:
     out, name : output folder, made where it does not exist, and the name of the two files in it
     companions : files that are handed over with the two, suffix to content (``.xml``)
     extras : further files by name, each with a function that writes it to the path it is given
+    seal : seals the PDF in place, told which files are handed over with it; None for no seal
     provenance : what the manifest of the hand-over names besides the outputs; None for no manifest
+    stage : staging folder of a publication in ``out`` that the caller ends; None: one of its own
     """
 
     template: Template
@@ -61,6 +59,8 @@ class Job:
     companions: Mapping[str, bytes] = field(default_factory=dict)
     extras: Mapping[str, Writer] = field(default_factory=dict)
     provenance: Mapping[str, Any] | None = None
+    seal: Seal | None = None
+    stage: Path | None = None
 
     def names(self) -> list[str]:
         """Return the names of every file that the job hands over."""
@@ -110,16 +110,21 @@ def deliver(
     allow_missing: bool = False,
     keep: bool = False,
     companions: Mapping[str, bytes] | None = None,
+    seal: Seal | None = None,
+    stage: Path | None = None,
     step: Step = lambda _text: None,
 ) -> Delivered:
-    """Fill, convert, verify and deliver ``<name>.docx`` and ``<name>.pdf`` (see `deliver_all`).
+    """Fill, convert, verify and deliver ``<name>.docx`` and ``<name>.pdf`` (see `deliver_all` and `Job`).
 
     Raises
     ------
     TemplateError, RenderError, OutputError
         nothing is left in the output folder then
     """
-    job = Job(template=template, content=content, out=out, name=name, companions=companions or {})
+    job = Job(
+        template=template, content=content, out=out, name=name, companions=companions or {}, seal=seal,
+        stage=stage,
+    )  # fmt: skip
     reports = deliver_all(
         [job], office=office, drawer=drawer, allow_missing=allow_missing, keep=keep, step=step
     )
@@ -205,7 +210,7 @@ class _Run:
 
     def __init__(self, *, job: Job, keep: bool) -> None:
         self.job, self.keep = job, keep
-        self.stack = contextlib.ExitStack()
+        self.publication = contextlib.ExitStack()
         self.stage: Path | None = None
         self.figures: tuple[str, ...] = ()
         self.filled: Filled | None = None
@@ -218,30 +223,27 @@ class _Run:
         if self.error is not None:
             return
         try:
+            work()
+        except (OSError, ToolkitError) as error:
+            self.filled = None
             try:
-                work()
-            except OSError as error:
-                if error.errno not in _DISK:
+                with self.publication:  # takes the staging away, and tells of a disk that is to blame
+                    if self.keep and isinstance(error, RenderError) and self.stage is not None:
+                        _reject(self.stage, self.job.out, self.job.name, str(error))
                     raise
-                raise _unwritable("the report cannot be written", self.job.out, error) from error
-        except ToolkitError as error:
-            self.error, self.filled = error, None
-            if self.keep and isinstance(error, RenderError) and self.stage is not None:
-                _reject(self.stage, self.job.out, self.job.name, str(error))
-            self.stack.__exit__(type(error), error, error.__traceback__)
+            except ToolkitError as told:
+                self.error = told
 
     def open(self) -> None:
-        for name in self.job.names():
-            refuse_original(self.job.out / name, suffix=Path(name).suffix)
-        self.stage = self.stack.enter_context(_staging(self.job.out))
+        job = self.job
+        self.stage = job.stage or self.publication.enter_context(publication(job.out))
+        for name in job.names():
+            refuse_original(job.out / name, suffix=Path(name).suffix)
 
     def close(self) -> None:
-        """Take the staging away; without a report the folders that were made for it too."""
-        if self.error is None and self.delivered is None:
-            stop = RenderError("the report was not finished")
-            self.stack.__exit__(type(stop), stop, None)
-        elif self.error is None:
-            self.stack.close()
+        """Take the staging of a report away that was not finished."""
+        stop = RenderError("the report was not finished")
+        self.publication.__exit__(type(stop), stop, None)
 
     def choose(self) -> None:
         self.figures = needed_figures(self.job.template, self.job.content)
@@ -271,19 +273,23 @@ class _Run:
         _demand(self.checks)
         for suffix, data in job.companions.items():
             self._file(suffix).write_bytes(data)
+        if job.seal is not None:
+            beside = [self._stage() / name for name in job.names() if name != MANIFEST]
+            job.seal(pdf, [file for file in beside if file != pdf])
         digest = content_hash(self.filled, job.template)
         names = job.names()
         if job.provenance is not None:
             outputs = [self._stage() / name for name in names if name != MANIFEST]
             text = manifest_json(job.provenance, job.content, job.template, digest, outputs)
             (self._stage() / MANIFEST).write_text(text, encoding="utf-8")
-        targets = _hand_over([self._stage() / name for name in names], job.out)
-        beside = 2 + len(job.companions)
+        self.publication.close()
+        targets = [job.out / name for name in names]
+        last = 2 + len(job.companions)
         self.delivered = Delivered(
             docx=targets[0],
             pdf=targets[1],
-            companions=tuple(targets[2:beside]),
-            extras=tuple(targets[beside : beside + len(job.extras)]),
+            companions=tuple(targets[2:last]),
+            extras=tuple(targets[last : last + len(job.extras)]),
             manifest=targets[-1] if job.provenance is not None else None,
             pages=pages,
             checks=tuple(self.checks),
@@ -320,59 +326,10 @@ def _demand(checks: list[Check]) -> None:
         )
 
 
-@contextlib.contextmanager
-def _staging(out: Path) -> Iterator[Path]:
-    """Yield a folder beside ``out`` that goes away; one that did not exist before leaves no trace."""
-    parent = out.parent if not out.exists() else out
-    try:
-        if out.exists() and not out.is_dir():
-            raise NotADirectoryError(20, "a file stands where the folder should be")
-        absent = [folder for folder in (parent, *parent.parents) if not folder.exists()]
-        parent.mkdir(parents=True, exist_ok=True)
-        stage = Path(tempfile.mkdtemp(prefix=".report-", dir=parent))
-    except OSError as error:
-        raise _unwritable("the output folder cannot be written", out, error) from error
-    try:
-        yield stage
-    except BaseException:
-        shutil.rmtree(stage, ignore_errors=True)
-        for folder in absent:
-            with contextlib.suppress(OSError):
-                folder.rmdir()
-        raise
-    shutil.rmtree(stage, ignore_errors=True)
-
-
-def _hand_over(files: list[Path], out: Path) -> list[Path]:
-    from toolkit.files import sync_folder
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        targets = [out / file.name for file in files]
-        for source, target in zip(files, targets, strict=True):
-            source.replace(target)
-        sync_folder(out)
-    except OSError as error:
-        raise _unwritable("the report cannot be written", out, error) from error
-    return targets
-
-
-def _unwritable(what: str, out: Path, error: OSError) -> OutputError:
-    return OutputError(
-        what,
-        where=out,
-        got=error.strerror or str(error),
-        expected="a folder with write permission and free space",
-        next_step="free space there, or choose another folder with --out",
-        rule="not-writable",
-    )
-
-
 def _reject(stage: Path, out: Path, name: str, reason: str) -> None:
-    rejected = out / "rejected"
-    rejected.mkdir(parents=True, exist_ok=True)
-    for suffix in (".docx", ".pdf"):
-        file = stage / f"{name}{suffix}"
-        if file.is_file():
-            file.replace(rejected / file.name)
-    (rejected / "reason.txt").write_text(reason + "\n")
+    with publication(out / "rejected") as rejected:
+        for suffix in (".docx", ".pdf"):
+            file = stage / f"{name}{suffix}"
+            if file.is_file():
+                file.replace(rejected / file.name)
+        (rejected / "reason.txt").write_text(reason + "\n")

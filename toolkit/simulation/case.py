@@ -14,7 +14,8 @@ import numpy as np
 
 from toolkit.effects.signals import Drive, drive
 from toolkit.errors import ConfigError
-from toolkit.files import read_bytes, write_atomic
+from toolkit.inputs import TIRE_FILE, read_input
+from toolkit.publication import publication
 from toolkit.simulation.case_plan import COLUMNS, CaseParameter
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.file_tire import FileTire
@@ -47,10 +48,10 @@ def write_runs(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
         "MZ",
         *(column for column in COLUMNS if column not in ("SA", "FZ")),
     )
-    return tuple(
-        _csv(folder / name, _columns(file, names, []))
-        for name, file in zip(run_names(test.plan), test.files, strict=True)
-    )
+    with publication(folder) as stage:
+        for name, file in zip(run_names(test.plan), test.files, strict=True):
+            _csv(stage / name, _columns(file, names, []))
+    return tuple(folder / name for name in run_names(test.plan))
 
 
 def write_case(test: VirtualTest, folder: Path, *, record: str | None = None) -> tuple[Path, ...]:
@@ -72,18 +73,22 @@ def write_case(test: VirtualTest, folder: Path, *, record: str | None = None) ->
     outputs = list(CELLS) if cells else ["FY", "MZ"]
     names = ("t", *inputs, *_judged(plan), *outputs)
     simulated = [] if kind == "machine" else ["FY", "MZ"]
-    lines = []
-    for name, file in zip(run_names(plan), test.files, strict=True):
-        nominal = _nominal(test, file) if simulated else []
-        lines.append(_csv(folder / RUNS / name, _columns(file, names, nominal)))
-    if cells:
-        lines.append(_csv(folder / RUNS / _TARE, _tare(test, names)))
-    if plan.tire_file is not None:
-        # As the plan has it: of a model file the coefficients that were refitted.
-        write_atomic(folder / TIRE, _tire_text(plan.tire_file))
-        lines.append(folder / TIRE)
-    write_atomic(folder / CASE, case_toml(test, kind=kind, record=record, inputs=inputs, outputs=outputs))
-    return (folder / CASE, *lines)
+    written = [CASE, *(f"{RUNS}/{name}" for name in run_names(plan))]
+    with publication(folder) as stage:
+        (stage / RUNS).mkdir()
+        for name, file in zip(run_names(plan), test.files, strict=True):
+            nominal = _nominal(test, file) if simulated else []
+            _csv(stage / RUNS / name, _columns(file, names, nominal))
+        if cells:
+            _csv(stage / RUNS / _TARE, _tare(test, names))
+            written.append(f"{RUNS}/{_TARE}")
+        if plan.tire_file is not None:
+            # As the plan has it: of a model file the coefficients that were refitted.
+            (stage / TIRE).write_bytes(_tire_text(plan.tire_file))
+            written.append(TIRE)
+        text = case_toml(test, kind=kind, record=record, inputs=inputs, outputs=outputs)
+        (stage / CASE).write_text(text, encoding="utf-8")
+    return tuple(folder / name for name in written)
 
 
 def case_toml(
@@ -149,7 +154,7 @@ def check_case(plan: Plan, record: str | None) -> str:
 
 def _tire_text(file: FileTire) -> bytes:
     same = read_tir(file.path).coefficients() == file.tir.coefficients()
-    return read_bytes(file.path) if same else file_text(file.tir).encode()
+    return read_input(file.path, TIRE_FILE) if same else file_text(file.tir).encode()
 
 
 def _inputs(test: VirtualTest) -> list[str]:
@@ -227,12 +232,11 @@ def run_names(plan: Plan) -> tuple[str, ...]:
     return tuple(f"run{number:0{width}d}.csv" for number in range(1, count + 1))
 
 
-def _csv(path: Path, columns: list[tuple[str, Any]]) -> Path:
+def _csv(path: Path, columns: list[tuple[str, Any]]) -> None:
     # repr of a rounded double is the shortest text that reads back as the same number.
     rows = zip(*(values.tolist() for _, values in columns), strict=True)
     lines = [",".join(name for name, _ in columns), *(",".join(map(repr, row)) for row in rows)]
-    write_atomic(path, "\n".join(lines) + "\n")
-    return path
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _text(value: str) -> str:

@@ -19,7 +19,9 @@ from toolkit.effects.applied import AppliedEffect, Condition
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, is_number, parse_toml, read_bytes, sha256_bytes
+from toolkit.files import check_keys, is_number, parse_toml, sha256_bytes
+from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, read_input
+from toolkit.publication import settle
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -116,7 +118,8 @@ def read_model(path: Path) -> ModelFile:
         ``no-file``, ``not-toml``; ``model-file``: it is none, or an entry is missing or of the wrong kind;
         ``model-changed``: a file of the simulation is not the one that the model was fitted with
     """
-    data = read_bytes(path)
+    settle(path.parent)
+    data = read_input(path, SETTINGS_FILE)
     table = parse_toml(data, where=path)
     if not is_model(table):
         raise _wrong("the file is no model file", path, table.get("content"), f'content = "{CONTENT}"')
@@ -169,7 +172,7 @@ def _same(path: Path, key: str, name: object, digest: object) -> Path:
     """Return a file of the simulation, or refuse one that has changed."""
     where = f"{path}: simulation.{key}"
     file = path.parent / _text(name, where)
-    actual = sha256_bytes(read_bytes(file))
+    actual = sha256_bytes(read_input(file, NAMED_FILE))
     if actual != digest:
         raise ConfigError(
             "a file of the model is not the one that was fitted", where=where,

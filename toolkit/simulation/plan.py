@@ -15,7 +15,7 @@ from toolkit.channels import Rotation
 from toolkit.declared import Fault, Source, read_text, refuse
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError
-from toolkit.files import read_bytes
+from toolkit.inputs import SETTINGS_FILE, read_input
 from toolkit.machine.definition import Machine, load_machine
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth
@@ -79,7 +79,7 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
         no TOML; every entry that is unknown, missing or cannot be used; an unknown machine or effect, a tire
         file that cannot be used
     """
-    data = read_bytes(path)
+    data = read_input(path, SETTINGS_FILE)
     stated = read_text(PlanFile, data, where=path)
     machine = load_machine(stated.machine)
     if not machine.simulated:

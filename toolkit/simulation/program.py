@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.record import from_bytes
 from toolkit.errors import ConfigError, RecordError
-from toolkit.files import read_bytes
+from toolkit.inputs import RECORD_FILE, is_regular, read_input
 from toolkit.simulation.acquisition import OwnProgram
 from toolkit.simulation.cells import CELLS
 from toolkit.units import si_scale, unit
@@ -52,8 +52,8 @@ def other_programs(plan: Plan, registry: Registry | None) -> dict[str, OwnProgra
         if not effect.effect.replaces_record or effect.source is None or effect.source in own_programs:
             continue
         path = Path(effect.source)
-        if path.suffix == ".json" and path.is_file():
-            record = from_bytes(read_bytes(path), where=path)
+        if path.suffix == ".json" and is_regular(path):
+            record = from_bytes(read_input(path, RECORD_FILE), where=path)
         elif registry is None:
             raise ConfigError(
                 "a wrong calibration is named and there is no registry",

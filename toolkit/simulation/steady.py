@@ -11,7 +11,7 @@ from toolkit.channels import Rotation
 from toolkit.effects.applied import acting
 from toolkit.effects.forward import Steady, tire_forces
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
-from toolkit.files import write_atomic
+from toolkit.publication import write_result
 from toolkit.simulation import tire as bakker
 from toolkit.simulation.file_tire import file_forces
 from toolkit.simulation.plan import Plan
@@ -100,5 +100,5 @@ def table_csv(plan: Plan) -> str:
 def write_table(plan: Plan, folder: Path) -> Path:
     """Write the table into a folder; return the file."""
     path = folder / TABLE
-    write_atomic(path, table_csv(plan))
+    write_result(path, table_csv(plan))
     return path

@@ -1,7 +1,7 @@
 """Write what the virtual machine made: recordings as LabVIEW writes them, test.toml, truth.json.
 
-Every file says that it is simulated. Everything is computed before the first file is written, each file is
-whole or absent, and a folder that holds anything else is refused.
+Every file says that it is simulated. The files enter their folder together; one that holds anything else is
+refused.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.errors import OutputError
-from toolkit.files import write_atomic
+from toolkit.publication import publication
 from toolkit.recording.labview import write_labview
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
 from toolkit.simulation.run import VirtualTest
@@ -28,6 +28,7 @@ from toolkit.simulation.session import (
     shunt_step,
 )
 from toolkit.simulation.truth import truth_document
+from toolkit.staging import PASSING
 from toolkit.units import from_si, si_scale
 
 if TYPE_CHECKING:
@@ -91,24 +92,35 @@ def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
     OutputError
         the folder holds other files, or cannot be written to
     """
-    names = [file.name for file in test.files]
-    check_folder(folder, {*names, TEST, TRUTH})
-    for file in test.files:
-        columns = file.columns if test.plan.record == "dwell" else file.columns | further(file.signals)
-        write_labview(folder / file.name, test.plan.machine, columns, simulated=True)
-    write_atomic(folder / TEST, test_toml(test))
-    write_atomic(folder / TRUTH, _json(truth_document(test)))
-    return tuple(folder / name for name in (*names, TEST, TRUTH))
+    names = test_names(test)
+    check_folder(folder, set(names))
+    with publication(folder) as stage:
+        for file in test.files:
+            columns = file.columns if test.plan.record == "dwell" else file.columns | further(file.signals)
+            write_labview(stage / file.name, test.plan.machine, columns, simulated=True)
+        (stage / TEST).write_text(test_toml(test), encoding="utf-8")
+        (stage / TRUTH).write_text(_json(truth_document(test)), encoding="utf-8")
+    return tuple(folder / name for name in names)
+
+
+def test_names(test: VirtualTest) -> tuple[str, ...]:
+    """Return the names of a virtual test's files, recordings first."""
+    return (*(file.name for file in test.files), TEST, TRUTH)
 
 
 def write_session(session: VirtualSession, folder: Path) -> tuple[Path, ...]:
     """Write a virtual reference-load session into a folder; return the files, SESSION.toml first."""
-    check_folder(folder, {SESSION, LOADS_CSV, CHECK_CSV, TRUTH})
-    write_atomic(folder / LOADS_CSV, loads_csv(session))
-    write_atomic(folder / CHECK_CSV, check_csv(session))
-    write_atomic(folder / SESSION, session_toml(session))
-    write_atomic(folder / TRUTH, _json(session_truth(session)))
-    return tuple(folder / name for name in (SESSION, LOADS_CSV, CHECK_CSV, TRUTH))
+    files = {
+        SESSION: session_toml(session),
+        LOADS_CSV: loads_csv(session),
+        CHECK_CSV: check_csv(session),
+        TRUTH: _json(session_truth(session)),
+    }
+    check_folder(folder, set(files))
+    with publication(folder) as stage:
+        for name, text in files.items():
+            (stage / name).write_text(text, encoding="utf-8")
+    return tuple(folder / name for name in files)
 
 
 def test_toml(test: VirtualTest) -> str:
@@ -250,7 +262,11 @@ def check_folder(folder: Path, names: set[str]) -> None:
     if not folder.exists():
         return
     strangers = (
-        sorted(entry.name for entry in folder.iterdir() if entry.name not in names)
+        sorted(
+            entry.name
+            for entry in folder.iterdir()
+            if entry.name not in names and not entry.name.startswith(PASSING)
+        )
         if folder.is_dir()
         else [folder.name]
     )

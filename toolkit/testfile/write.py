@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.characteristics.characteristic import BOTH
 from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
-from toolkit.files import write_atomic
+from toolkit.publication import write_result
 from toolkit.recording.marks import mark_workbook
 from toolkit.testfile.layout import CONDITION_FIELDS, KIND, SCHEMA, cell, content_hash, header
 
@@ -23,12 +25,15 @@ if TYPE_CHECKING:
 
 Rows = Iterable[Sequence[Any]]
 
+_SHEET_ROWS = 2**20 - 1  # below the head: a worksheet has 2^20 rows
+_AT_A_TIME = 1 << 12  # rows, as objects
+
 
 def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Recording] | None = None) -> str:
     """Write the file whole or not at all and return the content's SHA-256.
 
-    ``recordings`` (by their path inside the test) fill the sheet ``raw``: every row of every file, in the
-    file's own units.
+    ``recordings`` (by their path inside the test) fill the sheet ``raw`` with every row of every file, in the
+    file's own units; beyond a worksheet's rows it goes on in ``raw 2``.
     """
     digest = content_hash(result)
     try:
@@ -41,7 +46,7 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
             expected="free space for temporary files",
             next_step="free space, or name another folder in TMPDIR; nothing was changed",
         ) from error
-    write_atomic(path, data)
+    write_result(path, data)
     return digest
 
 
@@ -64,7 +69,7 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
         ("budgets", _budgets(result)),
         ("characteristic_findings", _findings(result.characteristics.findings)),
         ("findings", _findings(result.reduced.findings)),
-        ("raw", _raw(recordings)),
+        *_raw_sheets(recordings),
     ):
         _sheet(book, name, rows, use.mark)
     bytes_io = BytesIO()
@@ -251,6 +256,16 @@ def _findings(findings: Sequence[Finding]) -> Rows:
         yield (finding.level, finding.rule, finding.where, finding.message)
 
 
+def _raw_sheets(recordings: Mapping[str, Recording]) -> Iterator[tuple[str, Rows]]:
+    # A sheet has so many rows and no more: what is beyond goes on in another one under the same head.
+    rows = iter(_raw(recordings))
+    head = next(rows)
+    count = sum(recording.rows for recording in recordings.values())
+    for sheet in range(max(1, math.ceil(count / _SHEET_ROWS))):
+        name = "raw" if sheet == 0 else f"raw {sheet + 1}"
+        yield name, itertools.chain([head], itertools.islice(rows, _SHEET_ROWS))
+
+
 def _raw(recordings: Mapping[str, Recording]) -> Rows:
     if not recordings:
         yield ("file", "row")
@@ -260,7 +275,11 @@ def _raw(recordings: Mapping[str, Recording]) -> Rows:
     )
     yield ["file", "row", *(f"{symbol} [{unit}]" for symbol, unit in columns)]
     for name, recording in recordings.items():
-        mine = {(s.symbol, s.unit): s.values.tolist() for s in recording.series}
-        lists = [mine.get(key, [None] * recording.rows) for key in columns]
-        for row, values in enumerate(zip(*lists, strict=True), start=1):
-            yield [name, row, *values]
+        mine = {(s.symbol, s.unit): s.values for s in recording.series}
+        for start in range(0, recording.rows, _AT_A_TIME):
+            rows = slice(start, min(start + _AT_A_TIME, recording.rows))
+            lists = [
+                mine[key][rows].tolist() if key in mine else [None] * (rows.stop - start) for key in columns
+            ]
+            for row, values in enumerate(zip(*lists, strict=True), start=start + 1):
+                yield [name, row, *values]

@@ -22,6 +22,7 @@ import numpy as np
 from toolkit.channels import AXES, CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
+from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.tires.plausibility import LARGEST
 from toolkit.units import unit
 
@@ -173,12 +174,7 @@ def _without_marks(
 def _cells(path: Path) -> list[tuple[int, list[str]]]:
     # (line number, cells) of every line that is not blank.
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise UnreadableError(
-            "the table cannot be read", where=path, got=error.strerror, expected="a readable CSV file",
-            next_step="check the path", rule="no-file",
-        ) from error  # fmt: skip
+        text = read_input(path, TABLE_FILE).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UnreadableError(
             "the table is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from toolkit.errors import CellError, ConfigError, UnreadableError
 from toolkit.findings import Finding
+from toolkit.inputs import TIRE_FILE, read_input
 
 # Which names of a tire file belong to which Magic Formula.
 
@@ -47,7 +48,6 @@ def ignored(version: str, coefficients: Mapping[str, float]) -> tuple[str, ...]:
 _MF52, _MF6 = (5, 6, 21, 52), (60, 61, 62)
 _LINE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)(.*)")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]{1,4})?")
-_LIMIT = 8_000_000  # bytes; a property file has some ten thousand
 _ALIASES = {"LFZ0": "LFZO"}
 _SHAPE = "sections such as [UNITS], [MODEL], [LATERAL_COEFFICIENTS]"
 
@@ -106,7 +106,8 @@ class TirFile:
             return default
         if not isinstance(value, float):
             raise ConfigError(
-                f"the tire file has no number {key}", where=self.where or None, got=value,
+                f"the tire file has no number {key}", where=self.where or None,
+                got="nothing" if value is None else value,
                 expected=f"{key} = NUMBER", next_step="add the entry to the file", rule="tir-missing-key",
             )  # fmt: skip
         return value
@@ -192,15 +193,9 @@ def read_tir(path: Path) -> TirFile:
     CellError
         a coefficient that is no finite number, or one that stands twice with different values
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise UnreadableError(
-            "the tire file cannot be read", where=path, got=error.strerror, expected="a readable .tir file",
-            next_step="check the path", rule="no-file",
-        ) from error  # fmt: skip
-    if b"\0" in data or len(data) > _LIMIT:
-        raise _no_tir(path, "bytes that are no text" if b"\0" in data else f"{len(data)} bytes")
+    data = read_input(path, TIRE_FILE)
+    if b"\0" in data:
+        raise _no_tir(path, "bytes that are no text")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

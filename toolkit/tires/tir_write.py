@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.errors import ConfigError
-from toolkit.files import write_atomic
 from toolkit.findings import Finding
+from toolkit.publication import write_result
 from toolkit.tires.global_data import Measured
 from toolkit.tires.global_model import GlobalModel, GlobalParameter, ModelFit
 from toolkit.tires.tir import TirFile, TirLine
@@ -153,7 +153,7 @@ def _limits(name: str, limits: tuple[float, float] | None) -> list[tuple[str, st
 
 def write_tir(path: Path, fit: TireFit, *, comments: Sequence[str] = ()) -> None:
     """Write the property file of a fit, whole or not at all."""
-    write_atomic(path, tir_text(fit, comments=comments))
+    write_result(path, tir_text(fit, comments=comments))
 
 
 def file_text(tir: TirFile) -> str:

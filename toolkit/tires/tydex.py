@@ -20,6 +20,7 @@ import numpy as np
 from toolkit.channels import CHANNELS
 from toolkit.errors import CellError, UnreadableError
 from toolkit.findings import Finding
+from toolkit.inputs import TYDEX_FILE, read_input
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -34,7 +35,6 @@ SYMBOLS = {channel.tydex: symbol for symbol, channel in CHANNELS.items() if chan
 _CARRIER = {"FYC": "FY", "FZC": "FZ", "MZC": "MZ"}
 NAMES = {symbol: channel.tydex for symbol, channel in CHANNELS.items() if channel.tydex} | {"t": "RUNTIME"}
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]{1,4})?")
-_LIMIT = 256_000_000
 _WIDTH = 10
 
 
@@ -70,13 +70,8 @@ def read_tydex(path: Path) -> TydexFile:
     UnitError
         the unit of a known channel is unknown or of another dimension
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise _refuse(
-            path, "no-file", "the TYDEX file cannot be read", error.strerror or error, "a readable file"
-        ) from error
-    if b"\0" in data or len(data) > _LIMIT:
+    data = read_input(path, TYDEX_FILE)
+    if b"\0" in data:
         raise _refuse(
             path, "not-a-tydex", "the file is no TYDEX file", "bytes that are no text", "sections of text"
         )

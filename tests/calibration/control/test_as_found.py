@@ -77,7 +77,7 @@ def test_the_record_of_the_day_itself_is_not_the_one_that_was_in_use(used: Regis
 
 def test_a_later_withdrawal_does_not_change_what_was_in_force_then(used: Registry, tmp_path: Path) -> None:
     made = enter(used, tmp_path / "s2", dt.date(2025, 1, 10), phase="as_found")
-    withdraw(used, "cell-r1", on=dt.date(2025, 6, 1), reason="the reference was wrong")
+    withdraw(used, "cell-r1", on=dt.date(2025, 6, 1), reason="the reference was wrong", by="B")
     assert as_found(used, made.record).record == "cell-r1"
     assert in_use_before(used, "cell", dt.date(2025, 7, 1)) is None
 
@@ -100,5 +100,5 @@ def test_a_history_of_results_without_those_withdrawn(used: Registry, tmp_path: 
         enter(used, tmp_path / f"y{at}", dt.date(year, 1, 20), span=span, phase="as_found")
     found = as_found_history(used, "cell")
     assert [(one.date.year, one.within) for one in found] == [(2024, True), (2025, True), (2026, False)]
-    withdraw(used, found[1].session_record, on=dt.date(2026, 2, 1), reason="a wrong weight")
+    withdraw(used, found[1].session_record, on=dt.date(2026, 2, 1), reason="a wrong weight", by="B")
     assert [one.date.year for one in as_found_history(used, "cell")] == [2024, 2026]

@@ -71,10 +71,10 @@ def test_names_that_differ_in_a_letter_or_an_accent_are_two() -> None:
         (("approve", "hub", *FROM), "record-id"),
         (("approve", "hub-r1", "--in-force-from", "soon", "--checked-by", "B"), "usage"),
         (("approve", "hub-r1", "--in-force-from", "2026-01-04", "--checked-by", "B"), "approval"),
-        (("withdraw", "hub-r9", "--on", "2026-02-01", "--reason", "x"), "missing"),
-        (("withdraw", "hub-r1", "--on", "2026-02-01", "--reason", " "), "withdrawal"),
-        (("withdraw", "hub-r1", "--on", "2026-02-30", "--reason", "x"), "usage"),
-        (("withdraw", "nothing-r1", "--on", "2026-02-01", "--reason", "x"), "missing"),
+        (("withdraw", "hub-r9", "--on", "2026-02-01", "--reason", "x", "--by", "B"), "missing"),
+        (("withdraw", "hub-r1", "--on", "2026-02-01", "--reason", " ", "--by", "B"), "withdrawal"),
+        (("withdraw", "hub-r1", "--on", "2026-02-30", "--reason", "x", "--by", "B"), "usage"),
+        (("withdraw", "nothing-r1", "--on", "2026-02-01", "--reason", "x", "--by", "B"), "missing"),
     ],
 )
 def test_a_decision_that_cannot_be_made(
@@ -101,9 +101,12 @@ def test_a_second_approval_moves_the_date_back_and_never_forward(run: Run, regis
 
 
 def test_what_is_withdrawn_stays_withdrawn(run: Run, registry: Registry) -> None:
-    assert run("withdraw", "hub-r1", "--on", "2026-02-01", "--reason", "overloaded")[0] == 0
+    assert run("withdraw", "hub-r1", "--on", "2026-02-01", "--reason", "overloaded", "--by", "B")[0] == 0
     head = registry.head("hub")
-    assert run("withdraw", "hub-r1", "--on", "2026-03-01", "--reason", "again")[1]["rule"] == "withdrawal"
+    assert (
+        run("withdraw", "hub-r1", "--on", "2026-03-01", "--reason", "again", "--by", "B")[1]["rule"]
+        == "withdrawal"
+    )
     assert run("approve", "hub-r1", *FROM, "--reason", "after all")[1]["rule"] == "approval"
     assert registry.head("hub") == head
 

@@ -18,7 +18,7 @@ from tests.calibration.calibration_factory import hub_data
 from tests.calibration.registry.test_legacy import GOOD
 from toolkit.calibration.control import calibrate as control
 from toolkit.calibration.control.chart import control_chart
-from toolkit.calibration.registry import store
+from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.approval import approve, discard, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.history import approved_ids
@@ -89,7 +89,7 @@ def test_it_can_never_be_approved_withdrawn_or_discarded_again(run: Run, registr
     decision = ("--in-force-from", "2026-02-01", "--checked-by", "B")
     for words, rule in (
         (("approve", "hub-r1", *decision), "approval"),
-        (("withdraw", "hub-r1", "--on", "2026-02-01", "--reason", "x"), "withdrawal"),
+        (("withdraw", "hub-r1", "--on", "2026-02-01", "--reason", "x", "--by", "B"), "withdrawal"),
         (("discard", "hub-r1", "--reason", "x"), "discard"),
     ):
         code, told = run("calibration", *words)
@@ -188,7 +188,7 @@ def test_a_killed_discard_happened_or_did_not(registry: Registry, tmp_path: Path
     for at in range(1, 12):
         folder = tmp_path / f"cal-{at}"
         folder.mkdir()
-        store.copy_files(registry.folder / "hub", folder / "hub")
+        settled.copy_files(registry.folder / "hub", folder / "hub")
         victim = FORK.Process(target=_killed, args=(folder, at))
         victim.start()
         victim.join()

@@ -11,7 +11,7 @@ import pytest
 
 from tests.calibration.control_factory import enter, write_session
 from tests.calibration.registry.test_legacy import GOOD
-from toolkit.calibration.registry import approval, candidate, clock
+from toolkit.calibration.registry import approval, candidate, clock, ledger
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
 from toolkit.calibration.registry.legacy import import_legacy
@@ -65,18 +65,22 @@ def test_a_decision_has_its_day_between_its_session_and_today(entered: Registry)
     assert approve(
         entered, "cell-r1", in_force_from=SESSION, checked_by="B", known_on=SESSION, reason="on paper"
     ).done
-    assert "future" in refused(entered, lambda: withdraw(entered, "cell-r1", on=LATER, reason="x")).what
+    assert (
+        "future" in refused(entered, lambda: withdraw(entered, "cell-r1", on=LATER, reason="x", by="B")).what
+    )
     early = SESSION - dt.timedelta(days=1)
-    assert "before" in refused(entered, lambda: withdraw(entered, "cell-r1", on=early, reason="x")).what
+    assert (
+        "before" in refused(entered, lambda: withdraw(entered, "cell-r1", on=early, reason="x", by="B")).what
+    )
 
 
 def test_a_withdrawal_that_is_dated_back_is_noted(entered: Registry) -> None:
-    withdraw(entered, "cell-r1", on=TODAY - dt.timedelta(days=1), reason="dropped")
+    withdraw(entered, "cell-r1", on=TODAY - dt.timedelta(days=1), reason="dropped", by="B")
     assert entered.ledger("cell").entries[-1].note == "entered 1 day after it became known"
 
 
 def test_a_withdrawal_of_today_has_no_note(entered: Registry) -> None:
-    withdraw(entered, "cell-r1", on=TODAY, reason="dropped")
+    withdraw(entered, "cell-r1", on=TODAY, reason="dropped", by="B")
     assert entered.ledger("cell").entries[-1].note is None
 
 
@@ -88,6 +92,23 @@ def test_a_clock_that_was_set_back_writes_nothing(entered: Registry, monkeypatch
     assert (error.got, error.expected) == (before, f"a time from {last} on")
     monkeypatch.setattr(approval, "now", lambda: last)
     assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B").done
+
+
+def test_a_clock_that_was_set_back_brings_no_withdrawn_record_back(
+    entered: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B").done
+    withdraw(entered, "cell-r1", on=TODAY, reason="dropped", by="B")
+    before = TODAY - dt.timedelta(days=30)
+    for module in (clock, ledger, approval):
+        monkeypatch.setattr(module, "today", lambda: before)
+    assert entered.status("cell-r1").state == "withdrawn"
+    assert entered.statuses("cell")["cell-r1"].state == "withdrawn"
+    assert entered.id_in_force("cell", on=TODAY) is None
+    with pytest.raises(RegistryError, match="no calibration of cell is in force"):
+        entered.in_force("cell", on=TODAY)
+    # Who asks for what was known on a day is answered for that day.
+    assert entered.status("cell-r1", known_at=before).state == "approved"
 
 
 def rewrite(registry: Registry, change: Callable[[int, dict[str, object]], None]) -> None:

@@ -134,7 +134,7 @@ def test_a_cell_that_hardly_moves_does_not_hide_its_sign(empty: Registry, tmp_pa
 
 
 def test_a_withdrawn_history_does_not_hide_a_sign(used: Registry, tmp_path: Path) -> None:
-    withdraw(used, "m15-virtual-r1", on=dt.date(2026, 11, 2), reason="to make room")
+    withdraw(used, "m15-virtual-r1", on=dt.date(2026, 11, 2), reason="to make room", by="B")
     _, decision = judged(used, write_virtual(tmp_path / "s", columns(E5=-1.0)))
     assert failed(decision) == {"polarity"}
 

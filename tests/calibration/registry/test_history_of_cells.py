@@ -111,7 +111,7 @@ def test_a_serial_that_is_no_longer_stated_is_a_replacement(exchanged: Registry,
 def test_a_withdrawn_record_is_no_history(exchanged: Registry, tmp_path: Path) -> None:
     from toolkit.calibration.registry.approval import withdraw
 
-    withdraw(exchanged, "cell-r1", on=dt.date(2025, 6, 1), reason="the standard was wrong")
+    withdraw(exchanged, "cell-r1", on=dt.date(2025, 6, 1), reason="the standard was wrong", by="B")
     (told,) = messages(entered(exchanged, tmp_path, 2026, "A", 1.3), "serial")
     assert "a replacement" in told
 
@@ -133,12 +133,18 @@ def test_a_session_is_found_again_by_its_ledger_line_without_reading_others(
     read: list[str] = []
     kept = Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda self: (read.append(self.name), kept(self))[1])
-    from toolkit.calibration.registry.candidate import _recorded
+    from toolkit.calibration.registry.candidate import recorded
     from toolkit.calibration.session.read import read_session
 
     session = read_session(paths[3])
     read.clear()
-    found = _recorded(registry.folder / "cell", session, registry.ledger("cell"))
+    found = recorded(
+        registry.folder / "cell",
+        registry.ledger("cell"),
+        session.inputs_sha256,
+        what="it",
+        where=session.path,
+    )
     assert found is not None
     assert found.id == "cell-r4"
     assert {name.split(".")[0] for name in read} <= {"cell-r4", "ledger", "head"}

@@ -43,7 +43,7 @@ def test_before_every_record_is_an_error_that_lists_the_candidates(two: Registry
 
 
 def test_a_withdrawal_counts_from_the_day_it_became_known(two: Registry) -> None:
-    withdraw(two, "hub-r2", on=date(2026, 6, 1), void_from=date(2026, 5, 1), reason="cell overloaded")
+    withdraw(two, "hub-r2", on=date(2026, 6, 1), void_from=date(2026, 5, 1), reason="cell overloaded", by="B")
     day = date(2026, 5, 10)
     assert two.in_force("hub", on=day, known_at=date(2026, 5, 31)).id == "hub-r2"
     assert two.in_force("hub", on=day, known_at=date(2026, 6, 1)).id == "hub-r1"
@@ -54,7 +54,7 @@ def test_a_withdrawal_counts_from_the_day_it_became_known(two: Registry) -> None
 
 
 def test_without_a_first_void_day_a_record_is_void_on_every_day(two: Registry) -> None:
-    withdraw(two, "hub-r1", on=date(2026, 6, 1), reason="wrong sign")
+    withdraw(two, "hub-r1", on=date(2026, 6, 1), reason="wrong sign", by="B")
     assert two.status("hub-r1").void_always
     with pytest.raises(RegistryError):
         two.in_force("hub", on=date(2026, 3, 1), known_at=date(2026, 6, 1))
@@ -72,7 +72,7 @@ def test_a_repair_in_the_past_is_known_from_its_own_day(
         two, "hub-r3", in_force_from=date(2026, 1, 1), checked_by="B", reason="repairs the tests since",
         known_on=date(2026, 7, 1),
     )  # fmt: skip
-    withdraw(two, "hub-r1", on=date(2026, 7, 1), reason="wrong sign")
+    withdraw(two, "hub-r1", on=date(2026, 7, 1), reason="wrong sign", by="B")
     assert two.in_force("hub", on=date(2026, 3, 1), known_at=date(2026, 7, 1)).id == "hub-r3"
     assert two.in_force("hub", on=date(2026, 3, 1), known_at=date(2026, 6, 30)).id == "hub-r1"
 
@@ -86,12 +86,12 @@ def test_names_must_differ_and_a_decision_is_made_once(registry: Registry) -> No
     approve(registry, "hub-r1", in_force_from=day, checked_by="B", approved_by="C")
     with pytest.raises(RegistryError):
         approve(registry, "hub-r1", in_force_from=day, checked_by="B")
-    withdraw(registry, "hub-r1", on=day, reason="x")
+    withdraw(registry, "hub-r1", on=day, reason="x", by="B")
     for again in (
-        lambda: withdraw(registry, "hub-r1", on=day, reason="x"),
+        lambda: withdraw(registry, "hub-r1", on=day, reason="x", by="B"),
         lambda: approve(registry, "hub-r1", in_force_from=day, checked_by="B", reason="y"),
-        lambda: withdraw(registry, "hub-r9", on=day, reason="x"),
-        lambda: withdraw(registry, "other-r1", on=day, reason="x"),
+        lambda: withdraw(registry, "hub-r9", on=day, reason="x", by="B"),
+        lambda: withdraw(registry, "other-r1", on=day, reason="x", by="B"),
     ):
         with pytest.raises(RegistryError):
             again()

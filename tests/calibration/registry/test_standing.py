@@ -110,7 +110,7 @@ def test_an_approval_of_later_does_not_count_where_an_earlier_one_was_known(two:
 
 def test_a_withdrawal_counts_from_its_day_and_for_void_days_alone(two: Registry) -> None:
     known = date(2026, 6, 1)
-    withdraw(two, "hub-r2", on=known, void_from=date(2026, 5, 1), reason="cell overloaded")
+    withdraw(two, "hub-r2", on=known, void_from=date(2026, 5, 1), reason="cell overloaded", by="B")
     assert reasons(two, "hub-r2", MAY, known) == [
         "withdrawn on 2026-06-01, void from 2026-05-01: cell overloaded"
     ]

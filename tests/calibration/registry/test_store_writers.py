@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.calibration.calibration_factory import hub_data
-from toolkit.calibration.registry import store
+from toolkit.calibration.registry import settled, store
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RegistryError
 
 FORK = multiprocessing.get_context("fork")
-POINTS = ["mkstemp", "fsync", "replace", "sync_folder", "unlink"]
+POINTS = ["part", "fsync", "replace", "sync_folder", "unlink"]
 
 
 def _enter(path: Path, folder: Path) -> None:
@@ -26,12 +28,10 @@ def _enter(path: Path, folder: Path) -> None:
 
 def _killed(path: Path, folder: Path, name: str, at: int) -> None:
     """Calibrate in a process that dies at the n-th call of one step of a write."""
-    import tempfile
-
     from toolkit import files
 
     owner, attribute = {
-        "mkstemp": (tempfile, "mkstemp"),
+        "part": (files, "_new_part"),
         "fsync": (os, "fsync"),
         "replace": (Path, "replace"),
         "sync_folder": (files, "sync_folder"),
@@ -86,6 +86,8 @@ def test_a_killed_write_happened_or_did_not(
         made = calibrate(second, registry)
         assert made.record.id == "hub-r2"
         assert len(verify_registry(registry)) == 2
+        # A reader removes nothing: the next writer does.
+        store.commit(folder / "hub", lambda _ledger: None)
         assert not [p.name for p in (folder / "hub").iterdir() if p.name.startswith(".")]
         if victim.exitcode == 0:
             return
@@ -105,7 +107,74 @@ def test_nothing_is_written_onto_a_damaged_ledger(
 
 
 def test_a_journal_that_does_not_fit_its_ledger_is_told(registry: Registry) -> None:
-    (registry.folder / "hub" / store.JOURNAL).write_text("{}")
+    (registry.folder / "hub" / settled.JOURNAL).write_text("{}")
     assert not any(row.ok for row in verify_registry(registry))
     with pytest.raises(RegistryError):
         store.commit(registry.folder / "hub", lambda _ledger: None)
+
+
+@pytest.mark.parametrize("name", ["HUB", "Hub"])
+def test_a_name_that_differs_by_case_alone_is_refused(
+    registry: Registry, make_session: Callable[..., Path], name: str
+) -> None:
+    session = make_session(hub_data(40, 30), name="more", instrument=f'"{name}"')
+    with pytest.raises(RegistryError) as caught:
+        calibrate(session, registry)
+    assert (caught.value.rule, caught.value.got) == ("instrument-case", name)
+    assert registry.instruments() == ("hub",)
+    assert not (registry.folder / name).exists()
+    # Two that are there already, from a time when nobody asked, are served.
+    (registry.folder / name).mkdir()
+    assert calibrate(session, registry).record.id == f"{name}-r1"
+
+
+def test_a_write_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
+    def refuse(_ledger: object) -> None:
+        raise RegistryError("no", rule="time")
+
+    with pytest.raises(RegistryError):
+        store.commit(tmp_path / "cal" / "hub", refuse)
+    assert not (tmp_path / "cal").exists()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"files": ["hub-r1.json"]},
+        {"files": ["../hub-r2.json"]},
+        {"files": ["hub-r2/../hub-r1.json"]},
+        {"files": ["head.json"]},
+        {"before": "0" * 64},
+        {"bytes": -1},
+        {"line": "{}"},
+        {"line": None},
+    ],
+)
+def test_a_journal_of_another_hand_hides_and_removes_nothing(
+    registry: Registry, make_session: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, changes: Any
+) -> None:
+    folder = registry.folder / "hub"
+    with monkeypatch.context() as patch:
+        # A write that is cut off before it is decided.
+        patch.setattr(Path, "replace", _stopping(Path.replace, settled.JOURNAL + ".part"))
+        patch.setattr(store, "_tried_to_undo", lambda _folder: False)
+        with pytest.raises(KeyboardInterrupt):
+            calibrate(make_session(hub_data(40, 30), name="more"), registry)
+    assert registry.ids("hub") == ("hub-r1",)
+    journal = json.loads((folder / settled.JOURNAL).read_text())
+    (folder / settled.JOURNAL).write_text(json.dumps({**journal, **changes}))
+    before = sorted((path.name, path.read_bytes()) for path in folder.iterdir())
+    assert not any(row.ok for row in verify_registry(registry))
+    with pytest.raises(RegistryError) as caught:
+        store.commit(folder, lambda _ledger: None)
+    assert caught.value.rule == "ledger"
+    assert sorted((path.name, path.read_bytes()) for path in folder.iterdir()) == before
+
+
+def _stopping(real: Callable[..., Path], name: str) -> Callable[..., Path]:
+    def replace(path: Path, target: Path) -> Path:
+        if target.name == name:
+            raise KeyboardInterrupt
+        return real(path, target)
+
+    return replace

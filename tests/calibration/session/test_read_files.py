@@ -312,4 +312,4 @@ def test_a_file_without_end_is_never_read(tmp_path: Path, make_session: Make) ->
         stream.truncate(2**34)  # a hole: no byte of it is on the disk
     with pytest.raises(ToolkitError) as caught:
         calibrate(path, Registry(tmp_path / "cal"))
-    assert caught.value.rule == "inflation"
+    assert caught.value.rule == "too-large"

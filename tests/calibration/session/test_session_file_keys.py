@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.stored import stored_session
 from toolkit.calibration.session import read
-from toolkit.calibration.session.session_file import TEXTS, SessionFile
+from toolkit.calibration.session.session_file import TEXTS, SessionFile, session_faults
 from toolkit.declared import table_of
 from toolkit.errors import ConfigError
 from toolkit.report.certificate.collect import collect
@@ -140,3 +141,30 @@ def test_a_record_from_before_these_checks_is_read_and_says_what_it_does_not_pri
     assert found["certificate-key"] == "'custmer' is not known and is not printed; did you mean 'customer'?"
     assert "by eye" in found["certificate-rule"]
     assert "Germany" in found["certificate-country"]
+
+
+MISTYPED = """
+model = "liner"
+model = 1
+degree = 2.5
+degree = 10
+method = "OLS"
+drop = 1
+drop = [1]
+phase = "left"
+cells.D51.serial = []
+cells.D51.serial = 1.5
+cells.D51.serial = true
+standard.preloads = 100
+reference.standard = "a\\u0000b"
+customer.name = "a"
+"""
+
+
+@pytest.mark.parametrize("line", MISTYPED.split("\n")[1:-1])
+def test_a_mistyped_entry_is_refused_by_its_key(line: str) -> None:
+    text = 'instrument = "hub"\ndate = 2026-03-02\noperator = "a person"\ndata = "loads.csv"\n'
+    text += 'indications = ["D51"]\nloads = ["FY"]\n'
+    (fault,) = session_faults(tomllib.loads(text + line))
+    key = line.partition(" = ")[0].split(".")
+    assert list(fault.key)[: len(key)] == key or fault.key == (key[0],)

@@ -58,7 +58,7 @@ def test_a_simulator_that_does_not_even_load_in_time_gives_a_partial_answer(tmp_
 
 def test_a_budget_that_ends_in_the_refit_still_tells_the_error_as_declared(tmp_path):
     case = read_case(write_case(tmp_path, simulator=WAITS.replace("WAIT", "time.sleep(0.2)")))
-    made = diagnose(case, None, budget_s=2.0).diagnosis
+    made = diagnose(case, None, budget_s=5.0).diagnosis
     assert not made.complete
     # 20 N of dry friction, and parameters off by 1 kg and 10 N s/m: about 20 N
     assert made.held_out[0].nominal_rmse == pytest.approx(20.0, abs=3.0)

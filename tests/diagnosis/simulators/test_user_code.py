@@ -115,7 +115,7 @@ import pathlib
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 try:
-    print(diagnose(read_case(pathlib.Path({str(case)!r})), None, budget_s=2.0).diagnosis.complete)
+    print(diagnose(read_case(pathlib.Path({str(case)!r})), None, budget_s=8.0).diagnosis.complete)
 except Exception as error:
     print(error.got)
 print("left:", input())

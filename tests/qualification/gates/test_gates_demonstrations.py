@@ -31,6 +31,11 @@ SOURCES = [
 NO_GATE = {
     "record-id": "a text that is no id",
     "not-writable": "a folder without write permission",
+    "instrument-case": "a name that some file systems take for another's",
+    "not-allowed": "people who may not decide: tests/calibration/registry/test_signatures.py",
+    "people-log": "a forged log of people: tests/calibration/registry/test_signatures.py",
+    "locked": "another writer, or the lock file of one that ended",
+    "no-locks": "a file system that keeps no writers apart",
     "unknown-machine": "a machine definition of another instrument is named",
     "session": "a file of polarity readings that has none",
     "unit-dimension": "a legacy file's units, refused when it is read",

@@ -12,7 +12,7 @@ import scipy.sparse
 from tests.recording.format_checks import ROWS, refused, same
 from tests.recording.format_factory import mat
 from toolkit.errors import ColumnError
-from toolkit.recording.archive import MAX_TOTAL_BYTES
+from toolkit.inputs import RECORDING_FILE
 
 
 def test_mat_without_compression_and_as_big_endian_rows(read, table):
@@ -60,7 +60,7 @@ def test_mat_lengths_that_lie(read, table):
 
 
 def test_a_mat_that_grows_out_of_all_proportion(read):
-    bomb = zlib.compress(bytes(MAX_TOTAL_BYTES + 2**20), 9)
+    bomb = zlib.compress(bytes(RECORDING_FILE.limit + 2**20), 9)
     head = b"MATLAB 5.0 MAT-file".ljust(116) + bytes(8) + b"\x00\x01IM"
     refused(read, head + struct.pack("<LL", 15, len(bomb)) + bomb, "inflation")
 

@@ -202,19 +202,83 @@ def test_elements_that_import_are_refused(tmp_path: Path, tag: str) -> None:
         opened(tmp_path, f'<w:{tag} r:id="rId1"/>')
 
 
-def test_hyperlinks_are_allowed_and_a_file_template_is_dropped(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "target", ["http://example.org", "HTTPS://example.org/a", "mailto:a@b.org", "#table", ""]
+)
+def test_hyperlinks_to_pages_and_to_mail_are_allowed(tmp_path: Path, target: str) -> None:
+    template = read_template(make(tmp_path, p("x"), edit=add_rel("hyperlink", target)))
+    assert check_template(template, Style(), fonts=False) == ()
+    field = p(FIELD.format(f'HYPERLINK "{target}" \\o "a tip"'))
+    assert check_template(opened(tmp_path, field), Style(), fonts=False) == ()
     assert (
-        read_template(make(tmp_path, p("x"), edit=add_rel("hyperlink", "http://example.org"))).dropped == ()
+        check_template(opened(tmp_path, p(FIELD.format('HYPERLINK \\l "mark"'))), Style(), fonts=False) == ()
     )
-    path = make(
-        tmp_path,
-        p("x"),
-        edit=add_rel("attachedTemplate", "file:///C:/x.dotx", rels="word/_rels/settings.xml.rels"),
-    )
-    template = read_template(path)
-    assert template.dropped == ("file:///C:/x.dotx",)
-    assert b"x.dotx" not in template.data
-    assert [one.rule for one in check_template(template, Style(), fonts=False)] == ["attached-template"]
+
+
+OUTSIDE = (
+    "file:///C:/x.dotx", "FILE:x", "\\\\server\\share\\x.dotx", "//server/x.dotx", "C:\\x.dotx", "x.dotx", "smb://a/b",
+    "ftp://a/b", "javascript:alert(1)", "ms-word:ofe|u|http://a", " \\\\?\\UNC\\a\\b", "data:text/html,x",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("target", OUTSIDE)
+@pytest.mark.parametrize("kind", ["attachedTemplate", "hyperlink", "image", "footer", "unheardOf"])
+def test_whatever_else_leads_outside_is_refused(tmp_path: Path, kind: str, target: str) -> None:
+    rule = "attached-template" if kind == "attachedTemplate" else "external-content"
+    # A mode in other letters, and an address that needs none to lead outside.
+    modes = [EXTERNAL, 'TargetMode="external"', *([""] if ":" in target or "\\" in target else [])]
+    for mode in modes:
+        path = make(tmp_path, p("x"), edit=add_rel(kind, target, mode, rels="word/_rels/settings.xml.RELS"))
+        with pytest.raises(TemplateError) as caught:
+            read_template(path)
+        assert caught.value.rule == rule
+        assert caught.value.got == target
+
+
+@pytest.mark.parametrize("code", ['HYPERLINK "file:///etc/passwd"', "hyperlink \\\\server\\x", "PRINT 27"])
+def test_fields_that_lead_outside_are_refused(tmp_path: Path, code: str) -> None:
+    with pytest.raises(TemplateError) as caught:
+        opened(tmp_path, p(FIELD.format(code)))
+    assert caught.value.rule == "unsafe-field"
+
+
+def test_a_main_part_elsewhere_is_looked_through_as_well(tmp_path: Path) -> None:
+    def moved(members: dict[str, bytes]) -> None:
+        members["own/main.xml"] = members.pop("word/document.xml")
+        for name in ("[Content_Types].xml", "_rels/.rels"):
+            members[name] = members[name].replace(b"word/document.xml", b"own/main.xml")
+
+    with pytest.raises(TemplateError) as caught:
+        read_template(make(tmp_path, p(FIELD.format('INCLUDETEXT "/etc/passwd"')), edit=moved))
+    assert caught.value.rule == "unsafe-field"
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:k="http://www.w3.org/1999/xlink">{}</svg>'
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        '<image href="http://x.org/a"/>',
+        "<image k:href='//x.org/a'/>",
+        '<image href="&#102;ile:///etc/passwd"/>',
+        '<use href="other.svg#a"/>',
+        '<rect style="fill:url( http://x.org/a )"/>',
+        "<style>@import 'http://x.org/a.css';</style>",
+        '<?xml-stylesheet href="http://x.org/a.css"?>',
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_drawing_fetches_nothing_whatever_its_name_and_encoding(
+    tmp_path: Path, inside: str, encoding: str
+) -> None:
+    data = SVG.format(inside).encode(encoding)
+    for name in ("a.svg", "a.png", "A.SVG", "a"):
+        with pytest.raises(TemplateError) as caught:
+            read_template(make(tmp_path, p("x"), edit=put(f"word/media/{name}", data)))
+        assert caught.value.rule == "external-content"
+    whole = SVG.format('<use href="#a"/><image href="data:image/png;base64,AA"/><rect fill="url(#a)"/>')
+    read_template(make(tmp_path, p("x"), edit=put("word/media/a.svg", whole.encode(encoding))))
 
 
 @pytest.mark.parametrize("data", [b"", b"not word", b"PK\x03\x04 torn", b"{\\rtf1}"])

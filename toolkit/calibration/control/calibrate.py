@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.control.as_found import as_found, as_found_findings, phase_of
 from toolkit.calibration.control.chart import chart_findings, control_chart
-from toolkit.calibration.registry import store
+from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.candidate import Candidate
 from toolkit.calibration.registry.candidate import calibrate as enter
 from toolkit.calibration.registry.registry import Registry
@@ -21,6 +21,7 @@ from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.calibration.dcc.standard import Standards
     from toolkit.calibration.records.record import CalibrationRecord
 
 # A copy of an instrument's folder in which a change can be tried: the registry itself is only read.
@@ -30,12 +31,12 @@ if TYPE_CHECKING:
 def rehearsal(registry: Registry, instrument: str) -> Iterator[Registry]:
     """Yield a registry of one instrument that is thrown away at the end.
 
-    What is done there meets the same gates and answers the same as in the registry; an interrupted write is
-    finished in the copy alone. Errors name the places of the registry.
+    What is done there meets the same gates and answers the same as in the registry; a write that was
+    cut off is none of the copy. Errors name the places of the registry.
     """
     with tempfile.TemporaryDirectory(prefix="toolkit-rehearsal-") as place:
         copy = Path(place)
-        store.copy_files(registry.folder / instrument, copy / instrument)
+        settled.copy_files(registry.folder / instrument, copy / instrument)
         try:
             yield Registry(copy)
         except ToolkitError as error:
@@ -48,7 +49,12 @@ def rehearsal(registry: Registry, instrument: str) -> Iterator[Registry]:
 
 
 def calibrate(
-    session_file: Path, registry: Registry, *, machine: str | None = None, again: bool = False
+    session_file: Path,
+    registry: Registry,
+    *,
+    machine: str | None = None,
+    again: bool = False,
+    standards: Standards | None = None,
 ) -> Candidate:
     """Enter a session's candidate record and judge it against the instrument's history.
 
@@ -59,14 +65,19 @@ def calibrate(
     ToolkitError
         as `registry.candidate.calibrate`; nothing is written
     """
-    candidate = enter(session_file, registry, machine=machine, again=again)
+    candidate = enter(session_file, registry, machine=machine, again=again, standards=standards)
     return dataclasses.replace(
         candidate, findings=candidate.findings + control_findings(registry, candidate.record)
     )
 
 
 def rehearse(
-    session_file: Path, registry: Registry, *, machine: str | None = None, again: bool = False
+    session_file: Path,
+    registry: Registry,
+    *,
+    machine: str | None = None,
+    again: bool = False,
+    standards: Standards | None = None,
 ) -> Candidate:
     """Return what `calibrate` would, and make nothing: it is done in a copy of the instrument's folder.
 
@@ -77,9 +88,9 @@ def rehearse(
     ToolkitError
         as `calibrate`
     """
-    instrument = read_session(session_file).instrument
+    instrument = read_session(session_file, standards=standards).instrument
     with rehearsal(registry, instrument) as copy:
-        candidate = calibrate(session_file, copy, machine=machine, again=again)
+        candidate = calibrate(session_file, copy, machine=machine, again=again, standards=standards)
     return dataclasses.replace(candidate, path=registry.folder / candidate.path.relative_to(copy.folder))
 
 

@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.registry.legacy_file import read_legacy
-from toolkit.calibration.session.settings import Settings, inputs_hash, parse_session, settings_of
+from toolkit.calibration.session.settings import (
+    Settings,
+    dcc_name,
+    inputs_hash,
+    parse_session,
+    settings_of,
+)
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
@@ -24,7 +30,7 @@ if TYPE_CHECKING:
 _RESTORE = "restore the record from a backup; a correction is a new record, made by a new session"
 
 
-def check_agrees(record: CalibrationRecord, session: bytes, table: Table) -> None:
+def check_agrees(record: CalibrationRecord, session: bytes, table: Table, dcc: bytes | None = None) -> None:
     """Refuse a record whose settings are not those of its stored session.
 
     Parameters
@@ -32,6 +38,7 @@ def check_agrees(record: CalibrationRecord, session: bytes, table: Table) -> Non
     record : the record as read
     session : the stored session file
     table : the stored reference loads
+    dcc : the stored digital certificate of the standard, where the session names one
 
     Raises
     ------
@@ -41,8 +48,15 @@ def check_agrees(record: CalibrationRecord, session: bytes, table: Table) -> Non
     stored = record.data_file("session")
     file = "the session" if stored is None else stored.file
     try:
-        settings = settings_of(parse_session(session, where=file), where=file)
-        for name, got, expected in _entries(record, settings, table, file):
+        raw = parse_session(session, where=file)
+        if dcc is not None and dcc_name(raw) is not None:
+            # Few sessions have one: the others do not wait for cryptography.
+            from toolkit.calibration.dcc.standard import with_standard
+
+            raw = with_standard(raw, dcc, where=file)
+        settings = settings_of(raw, where=file)
+        roles = {"loads", "session"} | ({"dcc"} if "dcc" in raw.get("reference", {}) else set())
+        for name, got, expected in _entries(record, settings, table, file, roles):
             if got != expected:
                 raise _differs(record, file, name, got, expected)
     except RecordError:
@@ -101,7 +115,7 @@ def check_inputs(record: CalibrationRecord) -> None:
 
 
 def _entries(
-    record: CalibrationRecord, settings: Settings, table: Table, file: str
+    record: CalibrationRecord, settings: Settings, table: Table, file: str, roles: set[str]
 ) -> Iterator[tuple[str, object, object]]:
     yield "instrument", record.instrument, settings.instrument
     yield "date", record.date, settings.date.isoformat()
@@ -119,9 +133,8 @@ def _entries(
     if record.settings != settings.text:
         yield _first_difference(record.settings, settings.text)
     hashes = {one.role: one.sha256 for one in record.data}
-    roles = {"loads", "session"}
     if settings.check is not None or (settings.check_table and "check" in hashes):
-        roles.add("check")
+        roles = {*roles, "check"}
     yield "files", (*sorted(hashes), len(record.data)), (*sorted(roles), len(roles))
 
 

@@ -16,11 +16,11 @@ from toolkit.calibration.registry.clock import check_begun, now, today, untimely
 from toolkit.calibration.registry.judgement import judge_stored, machine_of, read_polarity_file
 from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.calibration.registry.status import RecordStatus, parse_interval, status_of
-from toolkit.calibration.registry.store import Change, commit
+from toolkit.calibration.registry.store import Change
 from toolkit.calibration.registry.stored import stored_check
 from toolkit.errors import RegistryError, ToolkitError
-from toolkit.files import read_regular
 from toolkit.findings import Finding
+from toolkit.inputs import read_regular
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -210,7 +210,7 @@ def approve(
         event |= {key: value for key, value in more.items() if value}
         return Change(files={}, event=event)
 
-    commit(folder, build)
+    registry.commit(folder.name, build)
     return decided[0]
 
 
@@ -221,9 +221,11 @@ def withdraw(
     on: dt.date,
     void_from: dt.date | None = None,
     reason: str,
-    by: str = "not stated",
+    by: str,
 ) -> RecordStatus:
     """Withdraw a record: ``on`` is when the fault became known, ``void_from`` the first void day.
+
+    ``by`` names who withdraws.
 
     Without ``void_from`` the record is void from its in-force date, hence on every day. Where ``on`` lies
     before today, the ledger notes by how many days the entry is dated back.
@@ -231,11 +233,14 @@ def withdraw(
     Raises
     ------
     RegistryError
-        no such record, no reason, or withdrawn already; ``time``: a day in the future, or before the session
+        no such record, no reason, or withdrawn already; ``names``: a name in which nothing can be seen;
+        ``time``: a day in the future, or before the session
     """
     folder = registry.folder / instrument_of(record_id)
     if not reason.strip():
         raise _refused(record_id, "a withdrawal needs a reason", "nothing", "--reason TEXT", "withdrawal")
+    if not name_key(by):
+        raise _refused(record_id, "a withdrawal needs a name", "nothing", "--by NAME: who withdraws", "names")
     check_begun(on, "the day on which the fault became known", record_id)
 
     def build(ledger: Ledger) -> Change:
@@ -268,7 +273,7 @@ def withdraw(
 
     if not folder.is_dir():
         raise _refused(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
-    commit(folder, build)
+    registry.commit(folder.name, build)
     return registry.status(record_id, known_at=max(on, today()))
 
 
@@ -357,5 +362,5 @@ def discard(registry: Registry, record_id: str, *, reason: str, by: str = "not s
     if not folder.is_dir():
         instruments = ", ".join(registry.instruments()) or "a record"
         raise _refused(record_id, "no such record", record_id, instruments, "missing")
-    commit(folder, build)
+    registry.commit(folder.name, build)
     return registry.status(record_id)

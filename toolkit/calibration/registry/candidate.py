@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,18 +41,20 @@ from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.refit import check_reproduces, polarity, reference_u
 from toolkit.calibration.registry.registry import ID, Registry, load_checked
 from toolkit.calibration.registry.status import discarded_before, is_discarded
-from toolkit.calibration.registry.store import Change, commit
+from toolkit.calibration.registry.store import Change
 from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
-from toolkit.files import read_regular, sha256_bytes
+from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
+from toolkit.inputs import read_regular
 from toolkit.recording.sniff import sniff
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from fractions import Fraction
 
+    from toolkit.calibration.dcc.standard import Standards
     from toolkit.calibration.session.read import LoadSetting
 
 
@@ -68,7 +71,12 @@ class Candidate:
 
 
 def calibrate(
-    session_file: Path, registry: Registry, *, machine: str | None = None, again: bool = False
+    session_file: Path,
+    registry: Registry,
+    *,
+    machine: str | None = None,
+    again: bool = False,
+    standards: Standards | None = None,
 ) -> Candidate:
     """Fit a session and enter its record as a candidate.
 
@@ -76,6 +84,7 @@ def calibrate(
     default: the packaged one of the instrument's name. The findings never change the fit. A session whose
     data and settings are already recorded returns that record and writes nothing. One whose record was
     discarded is refused with the discard's reason, unless it is to be entered ``again``, under a new id.
+    ``standards``: whose digital certificates of reference standards count.
 
     Raises
     ------
@@ -84,12 +93,15 @@ def calibrate(
     RegistryError
         the ledger is damaged, the session lies in the future, or ``discarded``; nothing is written
     """
-    session = read_session(session_file)
+    session = read_session(session_file, standards=standards)
     check_begun(session.date, "the session's date", f"{session_file}: date")
     definition = machine_of(session.instrument, machine)
     folder = registry.folder / session.instrument
     fit = fit_session(session)
-    existing = _recorded(folder, session, registry.ledger(session.instrument), again=again)
+    before = partial(
+        recorded, folder, inputs=session.inputs_sha256, what="the session", where=session.path, again=again
+    )
+    existing = before(ledger=registry.ledger(session.instrument))
     findings = session_findings(fit)
     if existing is not None:
         readings = readings_of(existing, session.table)
@@ -107,12 +119,12 @@ def calibrate(
 
     def build(ledger: Ledger) -> Change | None:
         # Under the lock: another writer may have recorded this very session meanwhile.
-        twin = _recorded(folder, session, ledger, again=again)
+        twin = before(ledger=ledger)
         if twin is not None:
             records.append(twin)
             return None
         record = _numbered(unnumbered, next_id(folder, session.instrument, ledger), session)
-        check_agrees(record, session.session_bytes, session.table)
+        check_agrees(record, session.session_bytes, session.table, session.dcc_bytes)
         check_reproduces(record, session.table)
         check_inputs(record)
         records.append(record)
@@ -121,7 +133,7 @@ def calibrate(
     # Before the write: a last approved record that fails its gates must stop this, not follow it.
     ledger = registry.ledger(session.instrument)
     history = history_of(registry, unnumbered, ledger)
-    record_id = commit(folder, build)
+    record_id = registry.commit(folder.name, build)
     record = records[0]
     if record_id:
         judged = judge(
@@ -166,18 +178,25 @@ def next_id(folder: Path, instrument: str, ledger: Ledger) -> str:
     return f"{instrument}-r{max(numbers, default=0) + 1}"
 
 
-def _recorded(
-    folder: Path, session: Session, ledger: Ledger, *, again: bool = False
+def recorded(
+    folder: Path, ledger: Ledger, inputs: str, *, what: str, where: Path, again: bool = False
 ) -> CalibrationRecord | None:
+    """Return the record of the same data and settings (``inputs``, their hash); None where there is none.
+
+    Raises
+    ------
+    RegistryError
+        ``discarded``: there was one, and it is not to be entered ``again``; ``what`` and ``where`` name it
+    """
     ended: list[str] = []
     for record_id, entry in ledger.entered().items():
         # What the line tells is only where to look: the record found passes its gates, its inputs too.
-        if entry.inputs not in (None, session.inputs_sha256):
+        if entry.inputs not in (None, inputs):
             continue
         path = folder / f"{record_id}.json"
         try:
             # The gates cost a refit: only the record that claims these inputs goes through them.
-            if from_bytes(read_regular(path), where=path).inputs_sha256 == session.inputs_sha256:
+            if from_bytes(read_regular(path), where=path).inputs_sha256 == inputs:
                 if is_discarded(ledger, record_id):
                     ended.append(record_id)
                     continue
@@ -185,12 +204,13 @@ def _recorded(
         except (ToolkitError, OSError):
             continue
     if ended and not again:
-        raise discarded_before(ledger, ended[-1], "the session", session.path)
+        raise discarded_before(ledger, ended[-1], what, where)
     return None
 
 
 def _contents(session: Session, record: CalibrationRecord) -> dict[str, bytes]:
-    by_role = {"loads": session.data_bytes, "check": session.check_bytes, "session": session.session_bytes}
+    by_role = {"loads": session.data_bytes, "check": session.check_bytes, "session": session.session_bytes,
+               "dcc": session.dcc_bytes}  # fmt: skip
     return {part.file: by_role[part.role] or b"" for part in record.data}
 
 
@@ -230,6 +250,7 @@ def _numbered(record: CalibrationRecord, record_id: str, session: Session) -> Ca
         ("loads", session.data_bytes),
         ("check", session.check_bytes),
         ("session", session.session_bytes),
+        ("dcc", session.dcc_bytes),
     ]
     data = tuple(
         DataFile(role=role, file=f"{record_id}.{role}.{_suffix(role, data)}", sha256=sha256_bytes(data))
@@ -241,7 +262,7 @@ def _numbered(record: CalibrationRecord, record_id: str, session: Session) -> Ca
 
 def _suffix(role: str, data: bytes) -> str:
     # By its content, as the reader goes: the name in the session may be any.
-    return "toml" if role == "session" else "xlsx" if sniff(data).id == "zip" else "csv"
+    return {"session": "toml", "dcc": "xml"}.get(role) or ("xlsx" if sniff(data).id == "zip" else "csv")
 
 
 def _load_fit(session: Session, load: LoadResult) -> LoadFit:

@@ -36,6 +36,14 @@ def moment(text: str) -> datetime:
     return found if found.tzinfo is not None else found.replace(tzinfo=UTC)
 
 
+def day_of(time: str) -> date:
+    """Return the day of an entry's time by this computer's own time zone."""
+    try:
+        return moment(time).astimezone().date()
+    except OverflowError:  # the first or the last day that a date can be
+        return moment(time).date()
+
+
 def begun(day: date, at: datetime | None = None) -> bool:
     """Tell whether a day has begun somewhere on earth at a time (default: now).
 

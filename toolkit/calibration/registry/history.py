@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.record import from_bytes
-from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import GateResult, layout, sign_and_span
 from toolkit.calibration.registry.registry import load_checked
 from toolkit.calibration.registry.response import main_indications, response, same_dimension
 from toolkit.calibration.registry.status import status_of
 from toolkit.errors import ToolkitError
-from toolkit.files import read_regular
+from toolkit.inputs import read_regular
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -45,9 +44,10 @@ NO_HISTORY = History(last=None, returned={})
 def approved_ids(ledger: Ledger, *, but: str = "") -> list[str]:
     """Return the approved records that are not withdrawn, the newest first."""
     ranks = []
+    known_on = ledger.known_on()
     for record_id in ledger.entered():
         entries = ledger.of(record_id)
-        status = status_of(record_id, entries, today())
+        status = status_of(record_id, entries, known_on)
         if record_id != but and status.state == "approved" and status.in_force_from is not None:
             ranks.append((status.in_force_from, max(entry.seq for entry in entries), record_id))
     return [record_id for _, _, record_id in sorted(ranks, reverse=True)]

@@ -24,7 +24,8 @@ from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.session.polarity import PolarityReading, polarity_readings
 from toolkit.calibration.session.statements import scope_of, statements_of
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, parse_toml, read_bytes
+from toolkit.files import check_keys, parse_toml
+from toolkit.inputs import SETTINGS_FILE, read_input
 from toolkit.machine import load_machine, machine_names
 from toolkit.units import si_scale
 
@@ -310,7 +311,7 @@ def read_polarity_file(path: Path, record: CalibrationRecord) -> tuple[PolarityR
     """
     import dataclasses
 
-    raw = parse_toml(read_bytes(path), where=path)
+    raw = parse_toml(read_input(path, SETTINGS_FILE), where=path)
     check_keys(raw, ("schema", "polarity"), where=path)
     readings = polarity_readings(raw.get("polarity", []), dataclasses.replace(scope_of(record), where=path))
     if not readings:

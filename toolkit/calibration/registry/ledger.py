@@ -9,20 +9,20 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
-from toolkit.calibration.registry.clock import moment
-from toolkit.files import read_regular, sha256_bytes
+from toolkit.calibration.registry.clock import day_of, moment, today
+from toolkit.files import sha256_bytes
 
 LEDGER = "ledger.jsonl"
 HEAD = "head.json"
 START = "0" * 64
-EVENTS = ("entered", "approved", "withdrawn", "discarded")
+EVENTS = ("entered", "approved", "withdrawn", "discarded", "issued", "enrolled")
+BRINGING = ("entered", "enrolled")  # events with files of their own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +38,12 @@ class Entry:
     ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``, and a
     ``note`` where the entry is dated back.
     ``discarded``: ``known_on``, ``by``, ``reason``: the end of a candidate that was never approved.
+    ``issued``: ``by``, ``document`` (name and hash of what left the laboratory).
+    ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file); the first one has ``heads``:
+    count and last hash of every ledger until then, whose lines need no signature.
+
+    A signed line has ``action``, ``subject``, ``meaning``, ``extends``, ``people`` and ``signatures``
+    (`toolkit.trust.decisions`).
     """
 
     seq: int
@@ -58,22 +64,44 @@ class Entry:
     recall: str | None = None
     unverifiable: tuple[str, ...] = ()
     evidence: tuple[str, ...] = ()
+    document: Mapping[str, str] | None = None
+    heads: Mapping[str, Mapping[str, Any]] | None = None
+    action: str | None = None
+    subject: Mapping[str, str | None] | None = None
+    meaning: str | None = None
+    extends: str | None = None
+    people: str | None = None
+    signatures: tuple[Mapping[str, str], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ledger:
     """What was read. ``damage`` says what is wrong, None where the chain and the head hold.
 
+    ``hidden`` are the files of a write that was cut off: they belong to no record. ``lines`` are the texts of
+    the entries, ``void`` the numbers of those that decide nothing: their key was stolen.
+
     Without slots: the two look-ups by id are made once and kept.
     """
 
     entries: tuple[Entry, ...]
     damage: str | None
+    hidden: frozenset[str] = frozenset()
+    lines: tuple[bytes, ...] = field(default=(), repr=False, compare=False)
+    void: frozenset[int] = frozenset()
 
     @property
     def head(self) -> str:
         """The last line's hash; zeros where there is none."""
         return self.entries[-1].sha256 if self.entries else START
+
+    def known_on(self, known_at: date | None = None) -> date:
+        """Return the day of knowledge: the one that is asked for, else today.
+
+        What the ledger tells of is known: where this computer's clock was set back, the day of the last
+        entry counts. A withdrawn record would come back into force otherwise.
+        """
+        return known_at or max([today(), *(day_of(entry.time) for entry in self.entries[-1:])])
 
     def disorder(self) -> str | None:
         """Say which entry's time lies before that of the one before it; None where none does."""
@@ -95,14 +123,15 @@ class Ledger:
 
     @cached_property
     def _events(self) -> dict[str, tuple[Entry, ...]]:
-        entries: dict[str, tuple[Entry, ...]] = {}
+        entries: dict[str, list[Entry]] = {}
         for entry in self.entries:
-            entries[entry.id] = (*entries.get(entry.id, ()), entry)
-        return entries
+            if entry.event in BRINGING or entry.seq not in self.void:
+                entries.setdefault(entry.id, []).append(entry)
+        return {record_id: tuple(events) for record_id, events in entries.items()}
 
     @cached_property
     def _entered(self) -> dict[str, Entry]:
-        return {entry.id: entry for entry in self.entries if entry.event == "entered"}
+        return {entry.id: entry for entry in self.entries if entry.event in BRINGING}
 
 
 def next_line(seq: int, prev: str, event: Mapping[str, Any]) -> tuple[bytes, str]:
@@ -115,20 +144,6 @@ def next_line(seq: int, prev: str, event: Mapping[str, Any]) -> tuple[bytes, str
 def head_bytes(count: int, digest: str) -> bytes:
     """Return the content of head.json."""
     return (canonical({"count": count, "sha256": digest}) + "\n").encode()
-
-
-def read_ledger(folder: Path) -> Ledger:
-    """Read an instrument's ledger and check chain and head; damage is told in the result, not raised."""
-    try:
-        lines = read_regular(folder / LEDGER) if (folder / LEDGER).exists() else None
-        head = read_regular(folder / HEAD) if (folder / HEAD).exists() else None
-    except OSError as error:
-        return Ledger(entries=(), damage=f"the ledger cannot be read: {error.strerror}")
-    if lines is None and head is None:
-        return Ledger(entries=(), damage=None)
-    if lines is None:
-        return Ledger(entries=(), damage="ledger.jsonl is missing while head.json exists")
-    return parse_ledger(lines, head)
 
 
 def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:
@@ -153,7 +168,7 @@ def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:
             if head is None
             else f"head.json does not match the ledger's {len(entries)} lines: lines were cut off or changed"
         )
-    return Ledger(entries=tuple(entries), damage=damage)
+    return Ledger(entries=tuple(entries), damage=damage, lines=tuple(parts[: len(entries)]))
 
 
 def _entry(line: bytes, number: int, prev: str) -> Entry:
@@ -175,6 +190,6 @@ def _entry(line: bytes, number: int, prev: str) -> Entry:
     for key in ("known_on", "since"):
         if body.get(key) is not None:
             body[key] = date.fromisoformat(body[key])
-    for key in ("unverifiable", "evidence"):
+    for key in ("unverifiable", "evidence", "signatures"):
         body[key] = tuple(body.get(key, ()))
     return Entry(**{**body, "sha256": stated})

@@ -26,15 +26,14 @@ from pathlib import Path
 
 from toolkit.calibration.records.record import CalibrationRecord, DataFile, sealed
 from toolkit.calibration.registry.agreement import check_transcribed
-from toolkit.calibration.registry.candidate import entering, next_id
+from toolkit.calibration.registry.candidate import entering, next_id, recorded
 from toolkit.calibration.registry.clock import check_begun
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.legacy_file import check_possible, read_legacy
-from toolkit.calibration.registry.registry import Registry, load_checked
-from toolkit.calibration.registry.status import discarded_before, is_discarded
-from toolkit.calibration.registry.store import Change, commit
-from toolkit.errors import ToolkitError
-from toolkit.files import read_bytes, sha256_bytes
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.store import Change
+from toolkit.files import sha256_bytes
+from toolkit.inputs import SETTINGS_FILE, read_input
 
 
 def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tuple[CalibrationRecord, bool]:
@@ -54,7 +53,7 @@ def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tup
 
     from toolkit.version import __version__
 
-    source = read_bytes(path)
+    source = read_input(path, SETTINGS_FILE)
     unnumbered = read_legacy(source, where=path)
     check_possible(unnumbered, where=path)
     check_begun(dt.date.fromisoformat(unnumbered.date), "the source's date", f"{path}: date")
@@ -63,26 +62,16 @@ def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tup
     records: list[CalibrationRecord] = []
 
     def build(ledger: Ledger) -> Change | None:
-        ended: list[str] = []
-        for record_id in ledger.entered():
-            try:
-                twin = load_checked(folder, record_id, ledger)
-            except ToolkitError:
-                continue
-            if twin.inputs_sha256 != unnumbered.inputs_sha256:
-                continue
-            if not is_discarded(ledger, record_id):
-                records.append(twin)
-                return None
-            ended.append(record_id)
-        if ended and not again:
-            raise discarded_before(ledger, ended[-1], "the file", path)
+        twin = recorded(folder, ledger, unnumbered.inputs_sha256, what="the file", where=path, again=again)
+        if twin is not None:
+            records.append(twin)
+            return None
         record = _numbered(unnumbered, next_id(folder, unnumbered.instrument, ledger), source)
         check_transcribed(record, source)
         records.append(record)
         return entering(record, {record.data[0].file: source}, by=record.entered_by)
 
-    written = commit(folder, build)
+    written = registry.commit(folder.name, build)
     return records[0], not written
 
 

@@ -7,25 +7,32 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
-from toolkit.calibration.registry import store
+from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
+from toolkit.calibration.registry.people_log import PeopleLog, read_people
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.refit_many import reproducing
+from toolkit.calibration.registry.signatures import revoked, unproved
 from toolkit.calibration.registry.status import RecordStatus, status_of
+from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.registry.stored import bad_record as _bad
 from toolkit.calibration.registry.stored import parse_loads, reason_of
 from toolkit.calibration.session.table import Table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
-from toolkit.files import read_regular, sha256_bytes
+from toolkit.files import sha256_bytes
+from toolkit.inputs import read_regular
+from toolkit.trust.decisions import Signing
+from toolkit.trust.keys import Signer
 
+_AT_ONCE = 200
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
 
 
@@ -58,30 +65,80 @@ def instrument_of(record_id: str) -> str:
 
 
 class Registry:
-    """The records of every instrument below one folder."""
+    """The records of every instrument below one folder.
 
-    def __init__(self, folder: Path) -> None:
+    ``lock_file``: writers keep each other out by a file, for a file system without locks. ``signers``: the
+    keys that sign what is decided through this object; a laboratory without people needs none.
+    """
+
+    def __init__(self, folder: Path, *, lock_file: bool = False, signers: Sequence[Signer] = ()) -> None:
         self.folder = folder
+        self.lock_file = lock_file
+        self.signers = tuple(signers)
+        self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
 
     def instruments(self) -> tuple[str, ...]:
         """Return the instruments, sorted."""
         if not self.folder.is_dir():
             return ()
-        return tuple(
-            sorted(p.name for p in self.folder.iterdir() if p.is_dir() and not p.name.startswith("."))
-        )
+        folders = (path for path in self.folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+        return tuple(sorted(path.name for path in folders if not settled.is_empty(path)))
 
     def ids(self, instrument: str) -> tuple[str, ...]:
         """Return the ids of an instrument, on disk or in its ledger, oldest first."""
-        folder = self.folder / instrument
-        found = {entry.id for entry in self.ledger(instrument).entries}
-        if folder.is_dir():
-            found |= {path.stem for path in folder.glob("*.json") if path.name != HEAD}
-        return tuple(sorted((i for i in found if ID.match(i)), key=_number))
+        return record_ids(self.folder / instrument, self.ledger(instrument))
 
     def ledger(self, instrument: str) -> Ledger:
-        """Return an instrument's ledger; a write that was cut off is finished first."""
-        return store.read(self.folder / instrument)
+        """Return an instrument's ledger; a write that was cut off is none of it.
+
+        Where people are enrolled, a line that they did not sign as their policy demands is damage.
+
+        Raises
+        ------
+        TrustError
+            ``people-log``
+        """
+        return self._judged(instrument, settled.read(self.folder / instrument), self.people())
+
+    def people(self) -> PeopleLog:
+        """Return the people of the laboratory; nobody where none is enrolled.
+
+        Raises
+        ------
+        TrustError
+            ``people-log``
+        """
+        return read_people(self.folder)
+
+    def commit(self, instrument: str, build: Callable[[Ledger], Change | None]) -> bool:
+        """Make one change to an instrument's folder, signed where people are enrolled (`store.commit`).
+
+        Raises
+        ------
+        RegistryError, OutputError, TrustError
+            nothing is changed, or the message says what state it is in
+        """
+        people = self.people()
+        return commit(
+            self.folder / instrument,
+            build,
+            lock_file=self.lock_file,
+            signing=Signing(history=people.history, signers=self.signers),
+            judged=lambda ledger: self._judged(instrument, ledger, people),
+        )
+
+    def _judged(self, instrument: str, ledger: Ledger, people: PeopleLog) -> Ledger:
+        if ledger.damage is not None:
+            return ledger
+        version = people.history.now
+        key = (instrument, ledger.head, "" if version is None else version.sha256)
+        if key not in self._proved:
+            self._proved[key] = (
+                unproved(ledger, people.history, people.taken_over(instrument)),
+                revoked(ledger, people.history),
+            )
+        damage, void = self._proved[key]
+        return replace(ledger, damage=damage, void=void) if damage or void else ledger
 
     def head(self, instrument: str) -> str:
         """Return the hash of the ledger's last line, to be printed on what leaves the laboratory."""
@@ -89,16 +146,8 @@ class Registry:
 
     def digest(self, instrument: str) -> str:
         """Return a hash of everything that decides about this instrument's records: every file there."""
-        folder = self.folder / instrument
-        store.read(folder)
-        if not folder.is_dir():
-            return sha256_bytes(b"")
-        lines = [
-            f"{path.relative_to(folder).as_posix()} {sha256_bytes(path.read_bytes())}"
-            for path in sorted(folder.rglob("*"))
-            if path.is_file()
-        ]
-        return sha256_bytes("\n".join(lines).encode())
+        files = settled.settled_files(self.folder / instrument)
+        return sha256_bytes("\n".join(f"{name} {sha256_bytes(data)}" for name, data in files).encode())
 
     def load(self, record_id: str) -> CalibrationRecord:
         """Return a record that passes every load-time gate.
@@ -118,10 +167,14 @@ class Registry:
         good: list[CalibrationRecord] = []
         bad: list[Refused] = []
         ledger = self.ledger(instrument)
-        for record_id, loaded in load_many(self.folder / instrument, self.ids(instrument), ledger).items():
-            if isinstance(loaded, CalibrationRecord):
-                good.append(loaded)
-            else:
+        folder = self.folder / instrument
+        ids = record_ids(folder, ledger)
+        # In parts: the reference loads of all records need not fit into the memory at once.
+        for at in range(0, len(ids), _AT_ONCE):
+            for record_id, loaded in load_many(folder, ids[at : at + _AT_ONCE], ledger).items():
+                if isinstance(loaded, CalibrationRecord):
+                    good.append(loaded)
+                    continue
                 bad.append(Refused(id=record_id, rule=loaded.rule or "unreadable", reason=reason_of(loaded)))
         return tuple(good), tuple(bad)
 
@@ -137,7 +190,21 @@ class Registry:
         ledger = self._sound(instrument)
         if record_id not in ledger.entered():
             raise self._unknown(record_id, instrument)
-        return status_of(record_id, ledger.of(record_id), known_at or today())
+        return status_of(record_id, ledger.of(record_id), ledger.known_on(known_at))
+
+    def statuses(self, instrument: str, *, known_at: date | None = None) -> dict[str, RecordStatus]:
+        """Return what the ledger tells of every record, by id: `status` of each, the ledger read once.
+
+        Raises
+        ------
+        RegistryError
+            the ledger is damaged
+        """
+        ledger = self._sound(instrument)
+        known_on = ledger.known_on(known_at)
+        return {
+            record_id: status_of(record_id, ledger.of(record_id), known_on) for record_id in ledger.entered()
+        }
 
     def in_force(self, instrument: str, *, on: date, known_at: date | None = None) -> CalibrationRecord:
         """Return the record in force on a test's day, as known on another day (default: today).
@@ -155,7 +222,7 @@ class Registry:
             the record that applies fails a gate
         """
         ledger = self._sound(instrument)
-        known_on = known_at or today()
+        known_on = ledger.known_on(known_at)
         best = _best(ledger, on, known_on)
         if best is None:
             standings = [
@@ -181,12 +248,13 @@ class Registry:
         RegistryError
             the ledger is damaged
         """
-        return _best(self._sound(instrument), on, known_at or today())
+        ledger = self._sound(instrument)
+        return _best(ledger, on, ledger.known_on(known_at))
 
     def _sound(self, instrument: str) -> Ledger:
         ledger = self.ledger(instrument)
         if ledger.damage is not None:
-            raise store.damaged(self.folder / instrument, ledger.damage)
+            raise settled.damaged(self.folder / instrument, ledger.damage)
         return ledger
 
     def _unknown(self, record_id: str, instrument: str) -> RegistryError:
@@ -198,6 +266,14 @@ class Registry:
             next_step="see 'toolkit calibration list'",
             rule="missing",
         )
+
+
+def record_ids(folder: Path, ledger: Ledger) -> tuple[str, ...]:
+    """Return the ids of records on disk or in the ledger, oldest first."""
+    ids = {entry.id for entry in ledger.entries}
+    if folder.is_dir():
+        ids |= {path.stem for path in folder.glob("*.json") if path.name not in (HEAD, *ledger.hidden)}
+    return tuple(sorted((text for text in ids if ID.match(text)), key=_number))
 
 
 def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRecord:
@@ -270,7 +346,7 @@ def start(folder: Path, record_id: str, ledger: Ledger) -> Started:
             check_transcribed(record, contents["source"])
             return Started(record=record, table=None)
         table = parse_loads(record, contents["loads"], folder)
-        check_agrees(record, contents["session"], table)
+        check_agrees(record, contents["session"], table, contents.get("dcc"))
     except KeyError as error:
         raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
     return Started(record=record, table=table)

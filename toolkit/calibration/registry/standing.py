@@ -129,7 +129,7 @@ def standing(
     RegistryError, RecordError
         no record is in force on that day; the named record or the ledger cannot be used
     """
-    known_on = known_at or today()
+    known_on = registry.ledger(instrument).known_on(known_at)
     if named is None:
         if on is None:
             raise TypeError("a record is chosen by its name or by the test's day")

@@ -1,30 +1,22 @@
 """Writing to the registry: one transaction at a time, whole or not at all.
 
-Order of a write, under an exclusive lock on the instrument's folder:
+Order of a write, by one writer at a time (`lock`):
 
-1. the journal ``.pending.json`` is written beside and renamed into place: from here on the write counts;
-2. the data files and the record, each whole;
-3. the ledger, as old content plus the new line;
-4. ``head.json``;
-5. the journal is removed.
+1. the journal ``.pending.json`` says what is to come: while it is there, every reader sees the state before;
+2. the data files and the record, the ledger with its new line, ``head.json``: each whole, each on the disk;
+3. the journal is renamed away and the folder flushed. That decides, it needs no space, and it can be reversed
+   until it is on the disk.
 
-A crash before the end of step 1 leaves at most a ``.part`` file: the write never happened, and the next
-access removes it. A crash after it leaves the journal: the next access, reading or writing, repeats steps
-2 to 5 from it, which gives the same result however often it is done. What no journal explains (a record
-that is not in the ledger, half a line) is not mended but told by `verify`.
-
-The lock is taken on the folder itself and is released by the system when a process dies.
+What fails before the end of step 3 is undone, and the command says that nothing was changed. Where the
+undoing fails too, or the process is killed, the journal stays: readers go on seeing the state before
+(`settled`), and the next writer undoes the remainder. What no journal explains (a record that is not in the
+ledger, half a line) is not mended but told by `verify`.
 """
 
 from __future__ import annotations
 
-import base64
 import contextlib
-import errno
-import fcntl
-import json
 import os
-import shutil
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,19 +24,17 @@ from typing import Any
 
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.clock import check_after
-from toolkit.calibration.registry.ledger import (
-    HEAD,
-    LEDGER,
-    START,
-    Ledger,
-    head_bytes,
-    next_line,
-    read_ledger,
-)
-from toolkit.errors import OutputError, RegistryError
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, head_bytes, next_line
+from toolkit.calibration.registry.lock import writing
+from toolkit.calibration.registry.settled import JOURNAL, before, content, damaged, is_part, state_of
+from toolkit.calibration.registry.signatures import signed_event
+from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes, sync_folder, write_atomic
+from toolkit.trust.decisions import Signing
 
-JOURNAL = ".pending.json"
+_DECIDED = ".pending.json.part"
+# A folder that another writer removes while this one waits for its lock is made again.
+_ATTEMPTS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,29 +45,35 @@ class Change:
     event: Mapping[str, Any]
 
 
-def commit(folder: Path, build: Callable[[Ledger], Change | None]) -> bool:
+def commit(
+    folder: Path,
+    build: Callable[[Ledger], Change | None],
+    *,
+    lock_file: bool = False,
+    signing: Signing | None = None,
+    judged: Callable[[Ledger], Ledger] = lambda ledger: ledger,
+) -> bool:
     """Make one change to an instrument's folder; ``build`` sees the ledger under the lock.
 
-    Returns whether anything was written (``build`` may answer None).
+    Returns whether anything was written (``build`` may answer None). ``lock_file``: a file keeps other
+    writers out, for a file system without locks. ``signing``: who signs the line;
+    ``judged`` holds the lines before it against the people who signed them.
 
     Raises
     ------
     RegistryError
-        the ledger is damaged, or its last entry is later than this one (``time``); nothing is written
+        the ledger is damaged, or its last entry is later than this one (``time``); the name of another
+        instrument differs by case alone (``instrument-case``); ``no-locks``; ``locked``. Nothing is written
     OutputError
-        the folder cannot be written to
+        the folder cannot be written to: the message says that nothing was changed, or what state it is in
+    TrustError
+        ``not-signed``, ``not-allowed``: the decision takes other keys; nothing is written
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            "the registry folder cannot be made", where=folder, got=error.strerror,
-            expected="a folder with write permission", next_step="choose another folder with --calibrations",
-            rule="not-writable",
-        ) from error  # fmt: skip
-    with _lock(folder, fcntl.LOCK_EX):
-        _recover(folder)
-        ledger = read_ledger(folder)
+    with _locked(folder, lock_file=lock_file):
+        with _writable(folder):
+            _undo(folder)
+        state = state_of(folder)
+        ledger = judged(state.ledger)
         if ledger.damage is not None:
             raise damaged(folder, ledger.damage)
         change = build(ledger)
@@ -85,119 +81,182 @@ def commit(folder: Path, build: Callable[[Ledger], Change | None]) -> bool:
             return False
         last = ledger.entries[-1].time if ledger.entries else None
         check_after(last, change.event["time"], folder / LEDGER)
-        line, digest = next_line(len(ledger.entries) + 1, ledger.head, change.event)
-        before = (folder / LEDGER).read_bytes() if ledger.entries else b""
+        event = change.event if signing is None else signed_event(change.event, ledger, signing)
+        line, digest = next_line(len(ledger.entries) + 1, ledger.head, event)
+        lines = state.lines or b""
         journal = {
-            "files": {name: base64.b64encode(data).decode() for name, data in change.files.items()},
-            "before": sha256_bytes(before),
-            "bytes": len(before),
+            "files": sorted(change.files),
+            "before": sha256_bytes(lines),
+            "bytes": len(lines),
             "line": line.decode(),
-            "count": len(ledger.entries) + 1,
-            "sha256": digest,
         }
-        write_atomic(folder / JOURNAL, canonical(journal))
-        _roll_forward(folder)
+        contents = {
+            JOURNAL: canonical(journal).encode(),
+            **change.files,
+            LEDGER: lines + line,
+            HEAD: head_bytes(len(ledger.entries) + 1, digest),
+        }
+        with _undone(folder):
+            for name, data in contents.items():
+                write_atomic(folder / name, data)
+            (folder / JOURNAL).replace(folder / _DECIDED)
+        try:
+            sync_folder(folder)
+        except OSError as error:
+            raise _reversed(folder, error) from error
+        with contextlib.suppress(OSError):  # the next writer removes it
+            (folder / _DECIDED).unlink()
         return True
 
 
-def read(folder: Path) -> Ledger:
-    """Return an instrument's ledger as it stands between two writes; finishes one that was interrupted."""
-    if not folder.is_dir():
-        return Ledger(entries=(), damage=None)
-    if interrupted(folder):
-        if not os.access(folder, os.W_OK):
-            return Ledger(entries=(), damage="a write was interrupted, and this folder cannot be written to")
-        try:
-            with _lock(folder, fcntl.LOCK_EX):
-                _recover(folder)
-        except RegistryError as error:
-            return Ledger(entries=(), damage=f"{error.what}: {error.got}")
-    with _lock(folder, fcntl.LOCK_SH):
-        return read_ledger(folder)
+@contextlib.contextmanager
+def _locked(folder: Path, *, lock_file: bool) -> Iterator[None]:
+    """Make an instrument's folder and lock it; folders that were made for nothing are removed."""
+    for _ in range(_ATTEMPTS):
+        with contextlib.ExitStack() as stack:
+            try:
+                with _writable(folder, but=FileNotFoundError):
+                    _check_case(folder)
+                    made = _make(folder)
+                    if lock_file:  # which lies in the folder, and is in the way of its removal
+                        stack.callback(_remove_empty, made)
+                    stack.enter_context(writing(folder, lock_file=lock_file))
+                    if not lock_file:
+                        stack.callback(_remove_empty, made)
+                    for path in made:
+                        sync_folder(path.parent)
+            except FileNotFoundError:
+                continue
+            yield
+            return
+    raise _not_written(folder, "it is removed time and again")
 
 
-def copy_files(folder: Path, target: Path) -> None:
-    """Copy the files of an instrument's folder as they stand between two writes, or after a cut-off one."""
-    if not folder.is_dir():
-        return
-    target.mkdir()
-    with _lock(folder, fcntl.LOCK_SH):
-        for path in folder.iterdir():
-            if path.is_file():
-                shutil.copyfile(path, target / path.name)
-
-
-def interrupted(folder: Path) -> bool:
-    """Tell whether a write was cut off, or is going on."""
-    return any(path.name == JOURNAL or _is_part(path.name) for path in folder.iterdir())
-
-
-def damaged(folder: Path, damage: str) -> RegistryError:
-    """Return the error of a damaged ledger."""
-    return RegistryError(
-        f"the ledger of {folder.name} is damaged",
-        where=folder / LEDGER,
-        got=damage,
-        expected="an unbroken chain that ends as head.json says",
-        next_step="restore ledger.jsonl and head.json from a backup; see 'toolkit calibration verify'",
-        rule="ledger",
-    )
-
-
-def _is_part(name: str) -> bool:
-    return name.startswith(".") and name.endswith(".part")
-
-
-def _recover(folder: Path) -> None:
-    for path in list(folder.iterdir()):
-        if _is_part(path.name):
-            path.unlink(missing_ok=True)
-    if (folder / JOURNAL).exists():
-        _roll_forward(folder)
-
-
-def _roll_forward(folder: Path) -> None:
-    path = folder / JOURNAL
-    problem: object = "the ledger is not the one that the write began with"
-    ledger = (folder / LEDGER).read_bytes() if (folder / LEDGER).exists() else b""
+def _make(folder: Path) -> list[Path]:
+    """Make a folder with those above it; return the ones that were not there."""
+    made: list[Path] = []
     try:
-        journal = json.loads(path.read_bytes())
-        files = {name: base64.b64decode(text) for name, text in journal["files"].items()}
-        size, line, count = int(journal["bytes"]), str(journal["line"]).encode(), int(journal["count"])
-        intact = sha256_bytes(ledger[:size]) == journal["before"] and ledger[size:] in (b"", line)
-        head = head_bytes(count, str(journal["sha256"]))
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        problem, intact = error, False
-    if not intact:
+        for path in (*reversed(folder.parents), folder):
+            if not path.is_dir():
+                path.mkdir(exist_ok=True)
+                made.append(path)
+    except OSError:
+        _remove_empty(made)
+        raise
+    return made
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    with contextlib.suppress(OSError):
+        for folder in reversed(folders):
+            folder.rmdir()
+
+
+def _check_case(folder: Path) -> None:
+    names = [path.name for path in folder.parent.iterdir()] if folder.parent.is_dir() else []
+    alike = [name for name in names if name.casefold() == folder.name.casefold()]
+    if alike and folder.name not in alike:
         raise RegistryError(
-            f"an interrupted write to {folder.name} cannot be finished",
-            where=path,
-            got=problem,
-            expected="the journal of one write and the ledger it began with",
-            next_step="restore the folder from a backup",
-            rule="ledger",
+            f"the registry has an instrument whose name differs from {folder.name} by case alone",
+            where=folder.parent,
+            got=folder.name,
+            expected=f"{alike[0]}, or a name that differs by more: some file systems take both for one",
+            next_step=f"write the instrument's name as {alike[0]}, or choose another; nothing was changed",
+            rule="instrument-case",
         )
-    for name, data in files.items():
-        write_atomic(folder / name, data)
-    write_atomic(folder / LEDGER, ledger[:size] + line)
-    write_atomic(folder / HEAD, head)
-    path.unlink()
-    sync_folder(folder)
 
 
 @contextlib.contextmanager
-def _lock(folder: Path, mode: int) -> Iterator[None]:
-    handle = os.open(folder, os.O_RDONLY)
+def _writable(folder: Path, *, but: type[OSError] | tuple[()] = ()) -> Iterator[None]:
+    """Turn a failure before the write into an error that says so, ``but`` one."""
     try:
-        try:
-            fcntl.flock(handle, mode)
-        except OSError as error:
-            # A file system without locks (some network mounts) still serves readers.
-            if mode == fcntl.LOCK_EX or error.errno not in (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS):
-                raise
         yield
-    finally:
-        os.close(handle)
+    except but:
+        raise
+    except OSError as error:
+        raise _not_written(folder, error.strerror or error) from error
+    except OutputError as error:
+        raise _not_written(folder, error.got) from error
 
 
-__all__ = ["JOURNAL", "START", "Change", "commit", "damaged", "interrupted", "read"]
+@contextlib.contextmanager
+def _undone(folder: Path) -> Iterator[None]:
+    """Undo a write that fails or is interrupted, and say so."""
+    try:
+        yield
+    except (OSError, OutputError) as error:
+        reason = error.got if isinstance(error, OutputError) else error.strerror or error
+        raise _not_written(folder, reason, complete=_tried_to_undo(folder)) from error
+    except BaseException:
+        _tried_to_undo(folder)
+        raise
+
+
+def _tried_to_undo(folder: Path) -> bool:
+    try:
+        _undo(folder)
+    except (OSError, ToolkitError):
+        return False
+    return True
+
+
+def _undo(folder: Path) -> None:
+    """Bring back the state before the write of a journal, and remove what a write left behind."""
+    journal = content(folder / JOURNAL)
+    if journal is not None:
+        try:
+            lines, head, files = before(journal, content(folder / LEDGER), content(folder / HEAD))
+        except (ValueError, KeyError, TypeError, AttributeError):
+            return  # `state_of` says what is wrong with it
+        for name in files:
+            (folder / name).unlink(missing_ok=True)
+        if content(folder / HEAD) != head and head is not None:
+            write_atomic(folder / HEAD, head)
+        if lines is not None:
+            with (folder / LEDGER).open("r+b") as stream:
+                stream.truncate(len(lines))
+                os.fsync(stream.fileno())
+        for name in (LEDGER, HEAD) if lines is None else ():
+            (folder / name).unlink(missing_ok=True)
+        # The journal goes last: until then it says what the state is.
+        sync_folder(folder)
+        (folder / JOURNAL).unlink()
+        sync_folder(folder)
+    for path in list(folder.iterdir()):
+        if is_part(path.name):
+            path.unlink(missing_ok=True)
+
+
+def _reversed(folder: Path, error: OSError) -> OutputError:
+    """Take back a decision that the disk did not confirm; return the error that says what state it is in."""
+    reason = error.strerror or error
+    try:
+        (folder / _DECIDED).replace(folder / JOURNAL)
+    except OSError:
+        return OutputError(
+            "the disk does not confirm a change of the registry",
+            where=folder,
+            got=reason,
+            expected="a disk that flushes its folders",
+            next_step="the change stands and 'toolkit calibration list' shows it, but a power cut may undo "
+            "it: mend the disk, and look again",
+            rule="not-writable",
+        )
+    try:
+        # Before anything else is touched: a journal that a power cut takes away would not be missed.
+        sync_folder(folder)
+    except OSError:
+        return _not_written(folder, reason, complete=False)
+    return _not_written(folder, reason, complete=_tried_to_undo(folder))
+
+
+def _not_written(folder: Path, reason: object, *, complete: bool = True) -> OutputError:
+    remainder = "" if complete else "; the next command that writes removes what is left of the attempt"
+    return OutputError(
+        "the registry cannot be written to",
+        where=folder,
+        got=reason,
+        expected="a folder with write permission and free space",
+        next_step=f"free space or mend the disk, then repeat the command; nothing was changed{remainder}",
+        rule="not-writable",
+    )

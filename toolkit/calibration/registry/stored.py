@@ -15,9 +15,10 @@ from toolkit.calibration.session.bridge import Bridge, bridges_of, converted
 from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
-from toolkit.calibration.session.settings import parse_session
+from toolkit.calibration.session.settings import dcc_name, parse_session
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
+from toolkit.inputs import RECORD_FILE, read_input
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def stored_loads(registry: Path, record: CalibrationRecord) -> Table | None:
     if entry is None:
         return None
     folder = registry / record.instrument
-    return parse_loads(record, (folder / entry.file).read_bytes(), folder)
+    return parse_loads(record, read_input(folder / entry.file, RECORD_FILE), folder)
 
 
 def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
@@ -44,7 +45,7 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
     path = registry / record.instrument / entry.file
     loads = [load.load for load in record.loads]
     table = read_table(
-        path.read_bytes(),
+        read_input(path, RECORD_FILE),
         where=path,
         required=[*record.indications, *loads],
         passed=row_columns(loads, _labels(record)),
@@ -139,7 +140,7 @@ def stored_session(registry: Path, record: CalibrationRecord) -> Session:
         ``data``: a legacy import, which has no session
     """
     folder = registry / record.instrument
-    files = {part.role: (folder / part.file).read_bytes() for part in record.data}
+    files = {part.role: read_input(folder / part.file, RECORD_FILE) for part in record.data}
     if "session" not in files or "loads" not in files:
         raise RecordError(
             f"record {record.id} has no reference loads to report on",
@@ -156,7 +157,7 @@ def stored_session(registry: Path, record: CalibrationRecord) -> Session:
     )
     with tempfile.TemporaryDirectory() as place:
         # The session names its files as they were called when it was recorded.
-        for name, role in ((raw["data"], "loads"), (check, "check")):
+        for name, role in ((raw["data"], "loads"), (check, "check"), (dcc_name(raw), "dcc")):
             if role in files:
                 target = Path(place, str(name)).resolve()
                 if not target.is_relative_to(Path(place).resolve()):

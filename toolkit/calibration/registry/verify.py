@@ -17,8 +17,9 @@ from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.clock import begun, moment
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Entry, Ledger
 from toolkit.calibration.registry.registry import ID, load_many
+from toolkit.calibration.registry.settled import is_passing
 from toolkit.errors import ToolkitError
-from toolkit.files import read_regular
+from toolkit.inputs import read_regular
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -77,8 +78,9 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
 def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     rows: list[VerifyRow] = []
     entered = ledger.entered()
-    on_disk = {path.stem for path in folder.glob("*.json") if path.name != HEAD and ID.match(path.stem)}
-    owned = {HEAD, LEDGER}
+    names = (path for path in folder.glob("*.json") if path.name not in (HEAD, *ledger.hidden))
+    on_disk = {path.stem for path in names if ID.match(path.stem)}
+    owned = {HEAD, LEDGER, *ledger.hidden}
     records = {record_id for record_id in {*on_disk, *entered} if ID.match(record_id)}
     ids = sorted(records, key=lambda record: (len(record), record))
     for row, files in _judged(folder, ids, ledger):
@@ -88,7 +90,7 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
         rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"time: {disorder}"))
     if ledger.damage is not None and not rows:
         rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"ledger: {ledger.damage}"))
-    rows += [_stray(name) for name in _files(folder) if name not in owned]
+    rows += [_stray(name) for name in _files(folder) if name not in owned and not is_passing(name)]
     return rows
 
 

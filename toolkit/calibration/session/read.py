@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
@@ -17,6 +17,7 @@ from toolkit.calibration.session.session_file import session_faults
 from toolkit.calibration.session.settings import (
     Settings,
     date_of,
+    dcc_name,
     inputs_hash,
     parse_session,
     settings_of,
@@ -26,8 +27,12 @@ from toolkit.calibration.session.statement_checks import check_columns, check_st
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.declared import Source, refuse
 from toolkit.errors import SessionError
-from toolkit.files import read_bytes, read_regular, sha256_bytes
-from toolkit.recording.archive import MAX_FILE_BYTES
+from toolkit.files import sha256_bytes
+from toolkit.inputs import DATA_FILE, SETTINGS_FILE, TooLargeError, read_input, read_regular, unreadable
+from toolkit.publication import settle
+
+if TYPE_CHECKING:
+    from toolkit.calibration.dcc.standard import Standards
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +62,8 @@ class CellSetting:
 class Session:
     """A calibration session as read. ``settings`` is the canonical JSON of what decides about the fit.
 
-    ``table`` and ``check`` are in the units of the fit; ``data_bytes`` and ``check_bytes`` as recorded.
+    ``table`` and ``check`` are in the units of the fit; ``data_bytes``, ``check_bytes`` and
+    ``dcc_bytes`` as recorded.
     """
 
     path: Path
@@ -79,6 +85,7 @@ class Session:
     session_bytes: bytes
     data_bytes: bytes
     check_bytes: bytes | None
+    dcc_bytes: bytes | None = None
 
     @property
     def indications(self) -> tuple[str, ...]:
@@ -95,10 +102,11 @@ class Session:
         )
 
 
-def read_session(path: Path, *, entered: bool = False) -> Session:
+def read_session(path: Path, *, entered: bool = False, standards: Standards | None = None) -> Session:
     """Read a session and its data files.
 
     ``entered``: it lies beside a record. Sessions of older records may have keys that nobody read.
+    ``standards``: whose digital certificates count, in a session that is entered; default: nobody's.
 
     Raises
     ------
@@ -109,10 +117,21 @@ def read_session(path: Path, *, entered: bool = False) -> Session:
     UnitError
         a unit that is unknown or of another dimension
     """
-    session_bytes = read_bytes(path)
+    settle(path.parent)
+    session_bytes = read_input(path, SETTINGS_FILE)
     raw = parse_session(session_bytes, where=path)
     if not entered:
         refuse(session_faults(raw), Source(where=path, text=session_bytes.decode("utf-8-sig")))
+    dcc_bytes = None
+    if dcc_name(raw) is not None:
+        # Few sessions have one: the others do not wait for cryptography.
+        from toolkit.calibration.dcc.standard import Standards, check_covered, with_standard
+
+        settings_of(raw, where=path)  # its faults first, in the session's own words
+        dcc_bytes = _file(path, dcc_name(raw), "reference.dcc")
+        raw = with_standard(
+            raw, dcc_bytes, where=path, standards=None if entered else standards or Standards()
+        )
     settings = settings_of(raw, where=path)
     loads, indications = settings.loads, settings.indications
     data_bytes = _file(path, raw.get("data"), "data")
@@ -137,6 +156,8 @@ def read_session(path: Path, *, entered: bool = False) -> Session:
     if check_bytes is not None:
         check = _check_table(check_bytes, path.parent / str(check_name), table, bridges, settings, labels)
     reference = raw.get("reference", {})
+    if dcc_bytes is not None:
+        check_covered(reference, (table, check), path)
     return Session(
         path=path,
         instrument=settings.instrument,
@@ -160,6 +181,7 @@ def read_session(path: Path, *, entered: bool = False) -> Session:
         session_bytes=session_bytes,
         data_bytes=data_bytes,
         check_bytes=check_bytes,
+        dcc_bytes=dcc_bytes,
     )
 
 
@@ -225,15 +247,9 @@ def _file(path: Path, name: object, key: str) -> bytes:
                 next_step="copy the file beside the session and name it there; nothing was written",
                 rule="outside",
             )  # fmt: skip
-        if target.exists() and not target.is_file():
-            raise IsADirectoryError(0, "not a regular file")
-        if target.exists() and (size := target.stat().st_size) > MAX_FILE_BYTES:
-            raise SessionError(
-                "a data file is too large",
-                where=target, got=f"{size / 2**20:.0f} MB", expected=f"at most {MAX_FILE_BYTES // 2**20} MB",
-                next_step="name the file of the reference loads; nothing was written", rule="inflation",
-            )  # fmt: skip
-        return read_regular(target)
+        return read_regular(target, DATA_FILE)
+    except TooLargeError as error:
+        raise unreadable(target, DATA_FILE, error) from error
     except (OSError, ValueError, RuntimeError) as error:
         raise SessionError(
             "a data file cannot be read",

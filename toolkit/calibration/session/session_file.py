@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
-from toolkit.declared import Day, Entry, Fault, Format, Keyed, Names, Text, attempt
+from toolkit.declared import AtLeast, AtMost, Day, Entry, Fault, Format, Keyed, Names, Text, attempt
 
 TEXTS = (
     "number laboratory address place country accreditation customer customer_address item method "
@@ -124,7 +124,9 @@ class BetweenRuns:
 class CellEntries:
     """What is stated of a load cell."""
 
-    serial: Annotated[Any, Entry("serial number")] = None
+    serial: Annotated[
+        str | None, Text(numbers="int"), Entry("serial number", expected='a text: serial = "..."')
+    ] = None
     resolution: Any = None
     scale: Any = None
     excitation: Any = None
@@ -151,6 +153,13 @@ class Reference:
     standard: Annotated[
         str | None, Text(numbers="int"), Entry("name or number", expected='a text: standard = "..."')
     ] = None
+    dcc: Annotated[
+        str | None,
+        Entry(
+            "its digital certificate: U, k, range, number, dates are taken from it",
+            expected='the name of a file, such as dcc = "standard.xml"', example="standard.xml",
+        ),
+    ] = None  # fmt: skip
     certificate: Annotated[
         str | None, Text(numbers="int"), Entry("of the standard", expected='a text: certificate = "..."')
     ] = None
@@ -169,12 +178,22 @@ class CheckTable:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Amount:
+    """A number with its unit."""
+
+    value: Annotated[Any, Entry(expected="a number", example=1)]
+    unit: Annotated[Any, Entry(expected="a unit such as 'N'", example="N")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Polarity:
     """A reading that tells the sign of indications: a load put on by hand."""
 
     load: Annotated[Any, Entry(expected='the name of a load, such as load = "FY"', example="FY")]
-    value: Annotated[Any, Entry(expected="the load that was applied: { value, unit }", example=1)]
-    indications: Annotated[Any, Entry(expected="what it made: { NAME = { value, unit } }", example={})]
+    value: Annotated[Amount | Any, Entry(expected="the load that was applied: { value, unit }", example=1)]
+    indications: Annotated[
+        Mapping[str, Amount | Any], Entry(expected="what it made: { NAME = { value, unit } }", example={})
+    ]
     zero: Any = None
     tolerance: Any = None
 
@@ -183,7 +202,13 @@ class Polarity:
 class StandardEntries:
     """What a standard's classification needs."""
 
-    preloads: Annotated[Any, Entry("how often the largest load was applied before the first run")] = None
+    preloads: Annotated[
+        int | None, AtLeast(0), AtMost(99),
+        Entry(
+            "how often the largest load was applied before the first run",
+            expected="a whole number from 0 to 99",
+        ),
+    ] = None  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,11 +238,15 @@ class SessionFile:
             expected='the name of a file, such as data = "loads.csv" or "loads.xlsx"',
         ),
     ]  # fmt: skip
-    phase: Annotated[Any, Entry("as_found or as_left", example="as_left")] = None
-    model: Annotated[Any, Entry("linear, polynomial or balance", example="linear")] = None
-    degree: Annotated[Any, Entry("of a polynomial", example=2)] = None
-    method: Annotated[Any, Entry("ols, wls, gls or odr", example="ols")] = None
-    drop: Annotated[Any, Entry("terms that are left out", example=[])] = None
+    phase: Annotated[Literal["as_found", "as_left"] | None, Entry("of the instrument", example="as_left")] = (
+        None
+    )
+    model: Annotated[Literal["linear", "polynomial", "balance"] | None, Entry("of the loads")] = None
+    degree: Annotated[
+        int | None, AtLeast(1), AtMost(9), Entry("of a polynomial", expected="a whole number from 1 to 9")
+    ] = None
+    method: Annotated[Literal["ols", "wls", "gls", "odr"] | None, Entry("of the fit")] = None
+    drop: Annotated[tuple[str, ...], Entry("terms that are left out", expected="a list of term names")] = ()
     temperature: Annotated[
         Mapping[str, Any] | None,
         Entry("of the room", expected='{ value = 20, unit = "degC" }', example={"value": 20, "unit": "degC"}),

@@ -149,6 +149,13 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
     )
 
 
+def dcc_name(raw: Mapping[str, Any]) -> str | None:
+    """Return the name of the standard's digital certificate, ``[reference] dcc``; None without one."""
+    reference = raw.get("reference", {})
+    name = reference.get("dcc") if isinstance(reference, Mapping) else None
+    return name if isinstance(name, str) else None
+
+
 def preloads_of(raw: Mapping[str, Any], where: object) -> int | None:
     """Return ``[standard] preloads``: how often the largest load was applied before the first run.
 

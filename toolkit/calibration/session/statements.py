@@ -66,6 +66,34 @@ class BetweenRuns:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DigitalSource:
+    """The standard's digital certificate, from which its numbers were taken (`dcc.standard`).
+
+    ``signer`` and ``signer_sha256`` name the certificate of its seal; ``places`` of each load the XPaths of
+    U, of k and of the range in the file.
+    """
+
+    file: str
+    sha256: str
+    signer: str
+    signer_sha256: str
+    laboratory: str
+    accreditation: str | None
+    places: tuple[tuple[str, str, str, str], ...]
+
+    def place(self, load: str) -> str | None:
+        """Return where U and k of a load stand, from the result on; None where they were not taken."""
+        for name, U, k, _ in self.places:
+            if name == load:
+                return f"{_from_result(U)} and {_from_result(k).rpartition('/')[2]}"
+        return None
+
+
+def _from_result(path: str) -> str:
+    return path.partition("dcc:results/")[2] or path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
     """The reference standard. ``shared_group`` as written: which loads share its error (see `gls`)."""
 
@@ -74,6 +102,7 @@ class Reference:
     due: dt.date | None
     shared_group: Any
     uncertainties: tuple[ReferenceUncertainty, ...]
+    digital: DigitalSource | None = None
 
     def u(self, load: str) -> float | None:
         """Return the standard uncertainty of a load in its unit; None where none is stated.
@@ -202,6 +231,7 @@ def parse_statements(
                 _reference(name, one, loads[name], largest[name])
                 for name, one in entry.get("uncertainty", {}).items()
             ),
+            digital=_digital(entry.get("dcc")),
         ),
         cells=tuple(
             _cell(name, text, (columns or indications)[name], cells.get(name, {}), where)
@@ -215,6 +245,21 @@ def parse_statements(
             _between(name, between_run, loads[name])
             for name, between_run in settings.get("between_runs", {}).items()
         ),
+    )
+
+
+def _digital(entry: Any) -> DigitalSource | None:
+    if not isinstance(entry, Mapping):
+        return None
+    places = [(load, taken["xpath"]) for load, taken in entry["taken"].items()]
+    return DigitalSource(
+        file=entry["file"],
+        sha256=entry["sha256"],
+        signer=entry["signer"]["name"],
+        signer_sha256=entry["signer"]["sha256"],
+        laboratory=entry["laboratory"],
+        accreditation=entry["accreditation"],
+        places=tuple((load, path["U"], path["k"], "; ".join(path["range"])) for load, path in places),
     )
 
 

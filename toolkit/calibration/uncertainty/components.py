@@ -120,6 +120,9 @@ def _reference(statements: Statements, load: LoadFit, value: float) -> Component
     else:
         size = f"{100 * stated.relative:.4g} % of the load"
     text = f"certificate: U = {size}, with k = {stated.k:g}"
+    digital = statements.reference.digital
+    if digital is not None and (place := digital.place(load.load)) is not None:
+        text += f"; {digital.file} (sha256 {digital.sha256[:12]}) {place}"
     return _part("reference", text, "B", "normal", stated.u * abs(value) / load.largest, math.inf, "session")
 
 

@@ -13,6 +13,7 @@ from toolkit.calibration.registry.standing import unapproved, withdrawal
 from toolkit.diagnosis.simulators.cells import record_of
 from toolkit.errors import RegistryError
 from toolkit.findings import Finding
+from toolkit.inputs import is_regular
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
@@ -68,7 +69,7 @@ def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | N
         return None
     record = record_of(case, calibrations)
     reasons: tuple[str, ...] = ()
-    if (case.path.parent / name).is_file():
+    if is_regular(case.path.parent / name):
         reasons = ("a file beside the case: no registry says whether it is approved",)
     elif calibrations is not None:
         registry = Registry(calibrations)

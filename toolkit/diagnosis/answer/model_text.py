@@ -13,6 +13,7 @@ from toolkit.diagnosis.simulators.built_in import parameter_names
 from toolkit.diagnosis.simulators.parameter_units import unit_of
 from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.files import sha256_file
+from toolkit.inputs import is_regular
 from toolkit.simulation.model_file import CONTENT, FittedEffect, effect_lines, toml_key, toml_lines
 from toolkit.version import __version__
 
@@ -83,7 +84,7 @@ def _simulation(case: Case, search: Search, folder: Path) -> list[str]:
     beside = case.path.parent / simulation.calibration
     files = {
         "machine": machine if simulation.kind == "machine" and simulation.machine.endswith(".toml") else None,
-        "calibration": beside if simulation.calibration and beside.is_file() else None,
+        "calibration": beside if simulation.calibration and is_regular(beside) else None,
         "tire": simulation.tire,
         "path": simulation.path,
     }

@@ -21,8 +21,9 @@ from toolkit.diagnosis.answer.answer import (
 from toolkit.effects.applied import EffectKey
 from toolkit.effects.facts import Second
 from toolkit.errors import ConfigError
-from toolkit.files import read_bytes
 from toolkit.findings import Finding
+from toolkit.inputs import RESULT_FILE, read_input
+from toolkit.publication import settle
 
 ANSWER = "diagnosis.json"
 _VERDICTS = ("named", "equivalent", "unknown", "nothing", "untestable")
@@ -38,8 +39,9 @@ def read_answer(path: Path) -> tuple[Diagnosis, Path]:
         there is no such file, it is no JSON, or not an answer of a diagnosis
     """
     file = path / ANSWER if path.is_dir() else path
+    settle(file.parent)
     try:
-        payload = json.loads(read_bytes(file))
+        payload = json.loads(read_input(file, RESULT_FILE))
         return _answer(payload), file
     except (
         ValueError,

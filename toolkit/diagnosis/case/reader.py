@@ -13,8 +13,9 @@ from toolkit.diagnosis.case.case_file import CaseFile, ModelCaseFile, Recording
 from toolkit.diagnosis.case.model_file import corrections_of
 from toolkit.diagnosis.case.recordings import read_run
 from toolkit.diagnosis.case.simulation import FORMAT
-from toolkit.errors import ConfigError
-from toolkit.files import parse_toml, read_bytes, read_regular
+from toolkit.files import parse_toml
+from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, is_regular, read_input
+from toolkit.publication import settle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,7 +29,8 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
     ConfigError
         an unknown key, a missing column or unit, a parameter without unit, a file that cannot be read
     """
-    data = read_bytes(path)
+    settle(path.parent)
+    data = read_input(path, SETTINGS_FILE)
     source = Source(where=path, text=data.decode("utf-8-sig", errors="replace"))
     table = parse_toml(data, where=path)
     if model is not None:
@@ -56,7 +58,7 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
     model_path = None if model_file is None else model_file.path
     for file in (simulation.path, simulation.tire, _record_beside(simulation, path), definition, model_path):
         if file is not None:
-            digest.update(_content(file))
+            digest.update(read_input(file, NAMED_FILE))
     return Case(
         path=path,
         title=path.stem if stated.title is None else stated.title,
@@ -85,7 +87,7 @@ def _run(
     predict: bool,
 ) -> Run:
     path = folder / declared["file"]
-    data = _content(path)
+    data = read_input(path, NAMED_FILE)
     digest.update(data)
     return read_run(
         path,
@@ -100,25 +102,10 @@ def _run(
     )
 
 
-def _content(path: Path) -> bytes:
-    """Return a file that the case names, whole."""
-    try:
-        return read_regular(path)
-    except (OSError, ValueError) as error:
-        raise ConfigError(
-            "a file that the case names cannot be read",
-            where=path,
-            got=getattr(error, "strerror", None) or error,
-            expected="a readable regular file; paths are relative to the case file",
-            next_step="correct the path in the case",
-            rule="no-file",
-        ) from error
-
-
 def _record_beside(simulation: Simulation, path: Path) -> Path | None:
     """Return the calibration's file where the case names one, None for a registry's id."""
     named = path.parent / simulation.calibration
-    return named if simulation.calibration and named.is_file() else None
+    return named if simulation.calibration and is_regular(named) else None
 
 
 def _different_files(recording: Recording, path: Path, source: Source) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, layout
 from toolkit.diagnosis.policy import ROWS
-from toolkit.diagnosis.simulators.simulator import Model
+from toolkit.diagnosis.simulators.simulator import Model, TermPattern
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
@@ -146,11 +146,10 @@ class Problem:
         FitError
             the simulation cannot be run, or has no linear response
         """
-        pattern = None if applied.effect.term is None else applied.effect.term.pattern
-        if pattern is None:
+        if applied.effect.term is None or applied.effect.term.pattern is None:
             return []
-        hook = pattern
-        responses = self.pushed(p, active, applied, lambda x: hook(x, starts), _QUARTERS * len(starts))
+        pattern = TermPattern(applied.effect, tuple(starts))
+        responses = self.pushed(p, active, applied, pattern, _QUARTERS * len(starts))
         for column in responses.values():
             if not np.isfinite(column).all():
                 raise FitError(

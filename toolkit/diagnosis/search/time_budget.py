@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any, TypeVar
+
+from toolkit.worker.worker import LateError
 
 T = TypeVar("T")
 
@@ -21,13 +23,16 @@ class BudgetSpentError(Exception):
 
 
 class TimeBudget:
-    """How long a search may take, what it is at, and how long the last simulation took [s]."""
+    """How long a search may take, what it is at, and how long the last simulation took [s].
 
-    def __init__(self, budget_s: float, tell: Callable[[str], None]) -> None:
+    Without an ``alarm`` the calls end by themselves in time: a worker is not waited for any longer.
+    """
+
+    def __init__(self, budget_s: float, tell: Callable[[str], None], *, alarm: bool = True) -> None:
         self.until = time.monotonic() + budget_s
         self.step = "the simulation as declared"
         self.last_s = 0.0
-        self._tell = tell
+        self._tell, self._alarm = tell, alarm
 
     def tell(self, step: str) -> None:
         """Note the step that begins, and tell it on."""
@@ -53,9 +58,9 @@ class TimeBudget:
             if seconds <= 0:
                 raise BudgetSpentError(self.step)
             try:
-                with _alarm(seconds):
+                with _alarm(seconds) if self._alarm else contextlib.nullcontext():
                     return function(*arguments, **keywords)
-            except _AlarmError:
+            except (_AlarmError, LateError):
                 raise BudgetSpentError(self.step) from None
             finally:
                 self.last_s = time.monotonic() - started
@@ -63,7 +68,7 @@ class TimeBudget:
         return call
 
 
-@contextmanager
+@contextlib.contextmanager
 def _alarm(seconds: float) -> Iterator[None]:
     """Raise in this thread after a time; nothing where the system or the thread knows no alarm."""
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):

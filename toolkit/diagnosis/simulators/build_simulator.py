@@ -14,25 +14,30 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.simulators.case_code import CaseCode
+
+    # (case, folder of the registry, worker of its code): None for what is not there
+    Builder = Callable[[Case, Path | None, CaseCode | None], Model]
 
 
-def builder(kind: Kind) -> Callable[[Case, Path | None], Model]:
-    """Return what builds a simulation of a kind: ``build(case, calibrations)`` of the file of that name."""
+def builder(kind: Kind) -> Builder:
+    """Return what builds a simulation of a kind: ``build`` of the file of that name."""
     module = importlib.import_module(f"toolkit.diagnosis.simulators.{kind}")
-    return cast("Callable[[Case, Path | None], Model]", module.build)
+    return cast("Builder", module.build)
 
 
-def model_of(case: Case, calibrations: Path | None) -> Model:
+def model_of(case: Case, calibrations: Path | None, code: CaseCode | None = None) -> Model:
     """Return the simulation of a case, ready to run.
 
     Parameters
     ----------
     calibrations : folder of the registry, None without one
+    code : worker of the case's own code; None runs that in this process
 
     Raises
     ------
     ConfigError
         the simulator, tire file or calibration cannot be used
     """
-    plain = builder(case.simulation.kind)(case, calibrations)
+    plain = builder(case.simulation.kind)(case, calibrations, code)
     return WithEffects(case, plain) if case.effects else plain

@@ -18,7 +18,7 @@ from toolkit.effects.effect import Effect
 from toolkit.effects.forward import undone
 from toolkit.effects.signals import Setting
 from toolkit.errors import ConfigError
-from toolkit.files import read_bytes
+from toolkit.inputs import NAMED_FILE, is_regular, read_input
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -210,8 +210,8 @@ def record_of(case: Case, calibrations: Path | None) -> CalibrationRecord:
     """Return the calibration that a case names: a path beside the case file, or a registry's id."""
     record_id = case.simulation.calibration
     path = case.path.parent / record_id
-    if path.is_file():
-        return from_bytes(read_bytes(path), where=path)
+    if is_regular(path):
+        return from_bytes(read_input(path, NAMED_FILE), where=path)
     if calibrations is None:
         raise ConfigError(
             "the case names a calibration and there is no registry",

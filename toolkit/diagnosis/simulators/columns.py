@@ -205,7 +205,7 @@ class ColumnsModel(AlongMotion):
         return result
 
 
-def build(case: Case, _: Path | None) -> ColumnsModel:
+def build(case: Case, _: Path | None, __: object) -> ColumnsModel:
     """Return the simulation of a case of this kind; ConfigError where an output has no column."""
     return ColumnsModel(case)
 

@@ -315,7 +315,7 @@ def _check_dimension(case: Case, name: str, text: str) -> None:
         )
 
 
-def build(case: Case, calibrations: Path | None) -> MachineModel | AcquisitionModel:
+def build(case: Case, calibrations: Path | None, _: object) -> MachineModel | AcquisitionModel:
     """Return the simulation of a case of this kind: a tire on the machine, or the acquisition alone.
 
     Raises

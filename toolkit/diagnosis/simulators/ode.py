@@ -19,6 +19,7 @@ from toolkit.diagnosis.simulators.equation import Equation, failed
 from toolkit.diagnosis.simulators.forces import Forces
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
 from toolkit.diagnosis.simulators.linear_response import propagated
+from toolkit.diagnosis.simulators.ode_apart import OdeApart, handlers_of
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.case_code import CaseCode
     from toolkit.diagnosis.simulators.simulator import Largest, Pattern
+    from toolkit.worker.serve import Handlers
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 _FINER = 4
@@ -406,8 +409,20 @@ class OdeModel:
         return self._settings[run]
 
 
-def build(case: Case, _: Path | None) -> OdeModel:
+def build(case: Case, _: Path | None, code: CaseCode | None) -> OdeModel | OdeApart:
     """Return the simulation of a case of this kind; ConfigError where its file lacks a function."""
+    if code is None:
+        return _loaded(case)
+    code.begin(handlers, both_need=("scipy.interpolate", "scipy.signal", "scipy.stats"))
+    return OdeApart(case, code)
+
+
+def handlers(case: Case) -> Handlers:
+    """Return what a worker answers of an equation."""
+    return handlers_of(case, _loaded(case))
+
+
+def _loaded(case: Case) -> OdeModel:
     return OdeModel(case, *load_functions(case.file(), "rhs", "outputs", "initial"))
 
 

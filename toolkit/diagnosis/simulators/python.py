@@ -33,6 +33,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.case_code import CaseCode
+    from toolkit.worker.serve import Handlers
+
+    Arrays = dict[str, NDArray[np.float64]]
+    Answer = Callable[[Run, Mapping[str, float], Mapping[str, NDArray[np.float64]]], Arrays]
 
 _KEPT = 300  # simulations that are remembered
 _LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
@@ -40,11 +45,61 @@ _LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no 
 _FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
 
 
-class PythonModel(AlongMotion):
-    """A simulator in Python: ``simulate(inputs, p)`` returns one row for each row of inputs."""
+class UserFunction:
+    """The function of a case's file: what it returns is checked where it runs."""
 
-    def __init__(self, case: Case, function: Callable[..., Any]) -> None:
-        self.case, self._function = case, function
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        (self._function,) = load_functions(case.file(), case.simulation.function)
+
+    def call(
+        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the outputs of a run with some of its inputs changed; FitError where they are none."""
+        import pandas as pd
+
+        columns: dict[str, NDArray[np.float64]] = {}
+        for channel in self.case.channels:
+            if channel.role != "output" and channel.name in run.columns:
+                columns[channel.name] = np.array(changed.get(channel.name, run.columns[channel.name]))
+        inputs = pd.DataFrame(columns)
+        try:
+            with silenced():
+                answer = self._function(inputs, dict(p))
+        except (Exception, SystemExit) as error:
+            raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
+        if not isinstance(answer, pd.DataFrame):
+            raise _failed(self.case, run, f"a {type(answer).__name__}, not a pandas.DataFrame")
+        if len(answer) != run.rows:
+            raise _failed(self.case, run, f"{len(answer)} rows for {run.rows} rows of inputs")
+        result = {}
+        for output in self.case.outputs:
+            if output.name not in answer.columns:
+                raise _failed(
+                    self.case, run, f"no column {output.name!r}; it has {', '.join(map(str, answer.columns))}"
+                )
+            values = _numbers(answer, output.name)
+            if values is None or values.ndim != 1:
+                got = "no numbers" if values is None else "several columns of one name"
+                raise _failed(self.case, run, f"{got} in column {output.name!r}")
+            if not np.isfinite(values).all():
+                raise _failed(
+                    self.case, run, f"no number in column {output.name!r}, row {_first_bad(values)}"
+                )
+            if np.abs(values).max(initial=0.0) > _LARGEST:
+                raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {output.name!r}")
+            result[output.name] = values
+        return result
+
+
+class PythonModel(AlongMotion):
+    """A simulator in Python: ``simulate(inputs, p)`` returns one row for each row of inputs.
+
+    ``answer`` is its function with checked outputs, in this process or in a worker.
+    """
+
+    def __init__(self, case: Case, answer: Answer) -> None:
+        self.case, self._called = case, answer
         self.parameters = case.parameters
         self.outputs = tuple(
             Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
@@ -116,44 +171,6 @@ class PythonModel(AlongMotion):
                 raise _failed(
                     self.case, run, f"other values of {name!r} on a second call with the same inputs"
                 )
-
-    def _called(
-        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
-    ) -> dict[str, NDArray[np.float64]]:
-        import pandas as pd
-
-        columns: dict[str, NDArray[np.float64]] = {}
-        for channel in self.case.channels:
-            if channel.role != "output" and channel.name in run.columns:
-                columns[channel.name] = np.array(changed.get(channel.name, run.columns[channel.name]))
-        inputs = pd.DataFrame(columns)
-        try:
-            with silenced():
-                answer = self._function(inputs, dict(p))
-        except (Exception, SystemExit) as error:
-            raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
-        if not isinstance(answer, pd.DataFrame):
-            raise _failed(self.case, run, f"a {type(answer).__name__}, not a pandas.DataFrame")
-        if len(answer) != run.rows:
-            raise _failed(self.case, run, f"{len(answer)} rows for {run.rows} rows of inputs")
-        result = {}
-        for output in self.outputs:
-            if output.name not in answer.columns:
-                raise _failed(
-                    self.case, run, f"no column {output.name!r}; it has {', '.join(map(str, answer.columns))}"
-                )
-            values = _numbers(answer, output.name)
-            if values is None or values.ndim != 1:
-                got = "no numbers" if values is None else "several columns of one name"
-                raise _failed(self.case, run, f"{got} in column {output.name!r}")
-            if not np.isfinite(values).all():
-                raise _failed(
-                    self.case, run, f"no number in column {output.name!r}, row {_first_bad(values)}"
-                )
-            if np.abs(values).max(initial=0.0) > _LARGEST:
-                raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {output.name!r}")
-            result[output.name] = values
-        return result
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act."""
@@ -235,9 +252,32 @@ class PythonModel(AlongMotion):
         return made
 
 
-def build(case: Case, _: Path | None) -> PythonModel:
+def build(case: Case, _: Path | None, code: CaseCode | None) -> PythonModel:
     """Return the simulation of a case of this kind; ConfigError where its file has no such function."""
-    return PythonModel(case, *load_functions(case.file(), case.simulation.function))
+    if code is None:
+        return PythonModel(case, UserFunction(case).call)
+    apart = code
+    apart.begin(handlers)
+
+    def answer(
+        run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, NDArray[np.float64]]:
+        shapes = {output.name: (run.rows,) for output in case.outputs}
+        outputs = apart.arrays("call", run, p, shapes, dict(changed))
+        for name, values in outputs.items():
+            if not (np.abs(values) <= _LARGEST).all():  # the code may have answered past the check there
+                raise _failed(case, run, f"no number in column {name!r}")
+        return outputs
+
+    return PythonModel(case, answer)
+
+
+def handlers(case: Case) -> Handlers:
+    """Return what a worker answers of a simulator's function."""
+    from toolkit.worker.serve import Numbers
+
+    function, runs = UserFunction(case), (*case.runs, *case.predict)
+    return {"call": lambda run, p, changed: Numbers(function.call(runs[run], p, changed))}
 
 
 def _failed(case: Case, run: Run, got: str) -> FitError:

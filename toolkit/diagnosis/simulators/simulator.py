@@ -23,11 +23,26 @@ if TYPE_CHECKING:
     from toolkit.simulation.case_plan import CaseParameter
 
     Arrays = dict[str, NDArray[np.float64]]
-    # Positions of shape (n,) to force-like terms of shape (n, forces)
+    # Positions of shape (n,) to force-like terms of shape (n, forces): a `TermPattern`
     Pattern = Callable[[NDArray[np.float64]], NDArray[np.float64]]
     Parameters = Mapping[str, float]
     # A channel's name to its largest recorded magnitude over the runs that are judged
     Largest = Callable[[str | None], float]
+
+
+@dataclass(frozen=True, slots=True)
+class TermPattern:
+    """An effect's pattern at several starts: positions (n,) to forces (n, directions x starts)."""
+
+    effect: Effect
+    starts: tuple[Mapping[str, float], ...]
+
+    def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the forces at positions."""
+        term = self.effect.term
+        assert term is not None  # noqa: S101  it was asked of the effect before
+        assert term.pattern is not None  # noqa: S101
+        return term.pattern(x, self.starts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import difflib
-import io
 import os
 import sys
 import types
@@ -17,7 +16,7 @@ from typing import Any, TextIO, cast
 import numpy as np
 
 from toolkit.errors import ConfigError
-from toolkit.files import read_regular
+from toolkit.inputs import CODE_FILE, read_regular
 
 
 def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
@@ -37,7 +36,7 @@ def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
         sys.path.append(folder)
     try:
         with silenced():
-            exec(compile(read_regular(path), str(path), "exec"), space.__dict__)  # noqa: S102
+            exec(compile(read_regular(path, CODE_FILE), str(path), "exec"), space.__dict__)  # noqa: S102
     except (Exception, SystemExit) as error:
         raise ConfigError(
             "the simulator cannot be loaded", where=path, got=f"{type(error).__name__}: {error}",
@@ -63,8 +62,8 @@ def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """Keep what a simulator prints and warns out of our own output."""
-    with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"), warnings.catch_warnings():
+    """Keep what a simulator warns out of our own output; what it prints, `kept_apart` or its worker takes."""
+    with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 

@@ -10,7 +10,7 @@ from toolkit.calibration.registry.approval import discard, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.session.read import read_session
-from toolkit.qualification.gates.bench import Act, Bench, Demonstration, Refusals
+from toolkit.qualification.gates.bench import CHECKER, Act, Bench, Demonstration, Refusals
 from toolkit.qualification.gates.records import rewrite_ledger
 from toolkit.qualification.gates.virtual_hub import FIRST, RIG, SECOND, Session
 
@@ -49,7 +49,7 @@ def _clock_set_back(bench: Bench) -> Act:
 def _withdrawal(reason: str, on: dt.date) -> Callable[[Bench], Act]:
     def prepare(bench: Bench) -> Act:
         def act() -> Refusals:
-            withdraw(bench.registry, _FIRST, on=on, reason=reason)
+            withdraw(bench.registry, _FIRST, on=on, reason=reason, by=CHECKER)
             return ()
 
         return act

@@ -8,7 +8,7 @@ from typing import Any
 
 from toolkit.calibration.registry.approval import discard, withdraw
 from toolkit.calibration.registry.standing import standing
-from toolkit.qualification.gates.bench import Act, Bench, Demonstration, Refusals
+from toolkit.qualification.gates.bench import CHECKER, Act, Bench, Demonstration, Refusals
 from toolkit.qualification.gates.virtual_hub import FIRST, HUB, RIG, Session
 
 _FIRST = f"{RIG}-r1"
@@ -51,7 +51,7 @@ def _refused(bench: Bench) -> str:
 
 
 def _withdrawn(bench: Bench) -> None:
-    withdraw(bench.registry, _FIRST, on=_TEST, reason="a cell was overloaded")
+    withdraw(bench.registry, _FIRST, on=_TEST, reason="a cell was overloaded", by=CHECKER)
 
 
 def _superseded(bench: Bench) -> None:

@@ -44,7 +44,7 @@ class _Segment:
 
     def tag(self, name: str, column: int) -> str:
         values = self.tags.get(name, [])
-        return values[column].strip() if column < len(values) else ""
+        return values[column].strip() if 0 <= column < len(values) else ""
 
 
 def read_lvm(gated: Gated, machine: Machine) -> Vectors:

@@ -10,7 +10,7 @@ import math
 import struct
 import zlib
 
-from toolkit.recording.archive import MAX_TOTAL_BYTES
+from toolkit.inputs import RECORDING_FILE, limit_of
 from toolkit.recording.integrity.refuse import damaged, no_numbers, too_large, truncated, version
 
 _HEADER = 128
@@ -40,7 +40,7 @@ def unpack_mat(data: bytes, where: object) -> bytes:
         version(where, "the MAT-file is of a version that is not read", data[124:128].hex(), "version 5 to 7",
                 "save it with save(name, '-v7')")  # fmt: skip
     parts = [data[:116] + bytes(8) + data[124:_HEADER]]  # no link to MATLAB's own objects
-    place, budget = _HEADER, MAX_TOTAL_BYTES
+    place, budget = _HEADER, limit_of(RECORDING_FILE)
     while place < len(data):
         kind, begin, end, following = _tag(data, place, len(data), order, where)
         if kind == _COMPRESSED:
@@ -64,7 +64,7 @@ def _inflated(packed: bytes, budget: int, where: object) -> bytes:
     except zlib.error as error:
         damaged(where, "an array of the MAT-file is damaged", error, "intact packed data")
     if len(content) > budget:
-        too_large(where, f"more than {budget} bytes from {len(packed)}", MAX_TOTAL_BYTES)
+        too_large(where, f"more than {budget} bytes from {len(packed)}", limit_of(RECORDING_FILE))
     if not engine.eof:
         truncated(
             where, "an array of the MAT-file ends early", f"{len(packed)} bytes", "all of its packed data"

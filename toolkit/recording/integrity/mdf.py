@@ -13,13 +13,15 @@ import zlib
 from dataclasses import dataclass
 
 from toolkit.errors import UnreadableError
-from toolkit.recording.archive import MAX_TOTAL_BYTES
+from toolkit.inputs import RECORDING_FILE, limit_of
 from toolkit.recording.integrity.refuse import damaged, too_large, truncated, version
 
 _FIRST = 64  # where the header block stands
 _HEAD = 24
 _FORMULA = 3
 _VARIABLE = 1  # flag of a channel group whose records have no fixed length
+_FLAGS = 32  # the specification has five of them
+_OF_LENGTH = 4  # bytes
 _FIXED = (0, 2)  # kinds of channels with a place in the record: values, and the master
 _TEXT = b"TX MD"
 # What the first links of a block lead to, in their order (empty: anything). Further links lead back up.
@@ -71,7 +73,7 @@ def walk_mdf(data: bytes, where: object) -> None:
     inflated: dict[int, int] = {}
     for place, block in blocks.items():
         if block.id == b"DZ":
-            inflated[place] = _inflated(data, block, MAX_TOTAL_BYTES - sum(inflated.values()), where)
+            inflated[place] = _inflated(data, block, limit_of(RECORDING_FILE) - sum(inflated.values()), where)
         elif block.id == b"CC" and data[block.body : block.body + 1] == bytes((_FORMULA,)):
             raise UnreadableError(
                 "a channel of the MDF file has a formula for a conversion",
@@ -141,7 +143,7 @@ def _inflated(data: bytes, block: _Block, budget: int, where: object) -> int:
     if begin + size > block.end:
         truncated(where, "a packed block of the MDF file ends early", f"{block.end - begin} bytes", size)
     if claimed > budget:
-        too_large(where, f"{claimed} bytes", MAX_TOTAL_BYTES)
+        too_large(where, f"{claimed} bytes", limit_of(RECORDING_FILE))
     engine = zlib.decompressobj()
     try:
         content = engine.decompress(data[begin : begin + size], claimed + 1)
@@ -164,10 +166,15 @@ def _check_group(
         if len(block.links) < 2 or block.body + 32 > block.end:
             damaged(where, "a channel group of the MDF file is too short", len(block.links), "6 links")
         cycles, flags, size, invalid = struct.unpack_from("<8xQH6xLL", data, block.body)
+        if flags >= _FLAGS or (flags & _VARIABLE and block.links[1]):
+            damaged(where, "a channel group of the MDF file has flags that cannot be", f"{flags:#x}",
+                    "a group of records, or of values of any length without channels")  # fmt: skip
         if flags & _VARIABLE:
-            return  # texts of any length: their channels are refused where they would be columns
-        claimed += cycles * (prefix + size + invalid)
-        _check_channels(data, block.links[1], blocks, size, where)
+            # Each value follows its length; all values' bytes stand where others have those of one record.
+            claimed += cycles * (prefix + _OF_LENGTH) + size + (invalid << 32)
+        else:
+            claimed += cycles * (prefix + size + invalid)
+            _check_channels(data, block.links[1], blocks, size, where)
         place = block.links[0]
     present = _length(group.links[2], blocks, inflated, where)
     if present < claimed:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from toolkit.audit.since_good import DriftedFile, DriftedTest
 from toolkit.calibration.records.use import mark_of
 from toolkit.characteristics.catalogue import summary
-from toolkit.files import atomic_path
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import rows_of, timeline
 from toolkit.report.pages.kit import Column, Table, number, page_parts, table
@@ -64,14 +63,8 @@ class AuditView:
 
 
 def write_page(path: Path, view: AuditView) -> None:
-    """Write the page, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        the folder cannot be written to
-    """
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", errors="replace") as stream:
+    """Write the page; it is long, and never held as a whole."""
+    with path.open("w", encoding="utf-8", errors="replace") as stream:
         stream.writelines(page(view))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
-from toolkit.files import write_atomic
+from toolkit.publication import write_result
 from toolkit.report.figures import COLOURS
 
 if TYPE_CHECKING:
@@ -199,5 +199,5 @@ def write_figure(path: Path, budget: Budget, over_range: Sequence[Budget]) -> Pa
     right.set_title("expanded uncertainty over the range", fontsize=10)
     buffer = io.BytesIO()
     drawing.savefig(buffer, format=path.suffix.lower()[1:], dpi=150)
-    write_atomic(path, buffer.getvalue())
+    write_result(path, buffer.getvalue())
     return path

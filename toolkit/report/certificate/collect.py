@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.control.as_found import as_found, as_found_before
 from toolkit.calibration.records.record import from_bytes
-from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import unverifiable
 from toolkit.calibration.registry.standing import Reason, not_in_force, unapproved
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.errors import ConfigError, RecordError, ToolkitError
+from toolkit.inputs import RECORD_FILE, read_input
 from toolkit.machine import load_machine, machine_names
 from toolkit.report.certificate.findings import gap_findings, gaps_of, result_findings, state_findings
 from toolkit.report.certificate.loads import FoundSession, load_results
@@ -65,8 +65,8 @@ def collect(
     ConfigError
         a statement that cannot be printed; a replacement without a reason, or the reverse
     """
-    day = issued or today()
     record = registry.load(record_id)
+    day = registry.ledger(record.instrument).known_on(issued)
     status = registry.status(record_id, known_at=day)
     reasons = _admit(registry, record, status, day, draft)
     later = registry.status(record_id)
@@ -121,6 +121,7 @@ def collect(
             else (uncertainty.load, 100 * uncertainty.relative, uncertainty.k, "% of the applied load")
             for uncertainty in statements.reference.uncertainties
         ),
+        reference_digital=statements.reference.digital,
         rule=stated.rule,
         interval=stated.interval,
         opinions=stated.get("opinions"),
@@ -251,7 +252,8 @@ def _same_number(registry: Registry, record: CalibrationRecord, stated: Stated) 
         if record_id == record.id or not approved or not path.is_file():
             continue
         try:
-            table = json.loads(from_bytes(path.read_bytes(), where=path).settings).get("certificate", {})
+            earlier = from_bytes(read_input(path, RECORD_FILE), where=path)
+            table = json.loads(earlier.settings).get("certificate", {})
         except ToolkitError:
             continue  # 'verify' names a damaged record; this one is not concerned by it
         if str(table.get("number", "")) == number:

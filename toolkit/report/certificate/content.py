@@ -77,7 +77,20 @@ def traceability(c: Certificate, style: Style | None = None) -> str:
             f" Its uncertainty for {load}: U = {signed(stated, style)} {shown(unit)}, "
             f"k = {signed(f'{k:g}', style)}."
         )
-    return text
+    return text + _digital(c)
+
+
+def _digital(c: Certificate) -> str:
+    source = c.reference_digital
+    if source is None:
+        return ""
+    accredited = f", {source.accreditation}" if source.accreditation else ""
+    places = "; ".join(f"{load}: {source.place(load)}" for load, *_ in source.places)
+    return (
+        f" These numbers are taken from its digital certificate {source.file} by {source.laboratory}"
+        f"{accredited} (SHA-256 {source.sha256}; sealed by {source.signer}, certificate "
+        f"{source.signer_sha256}), at {places}."
+    )
 
 
 def uncertainty(c: Certificate) -> str:

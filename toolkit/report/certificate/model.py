@@ -13,6 +13,7 @@ from typing import Literal
 
 from toolkit.calibration.records.record import DataFile, Indication
 from toolkit.calibration.records.use import CalibrationUse
+from toolkit.calibration.session.statements import DigitalSource
 from toolkit.findings import Finding
 
 # Loads of a certificate that have a picture.
@@ -179,6 +180,7 @@ class Certificate:
     reference: str | None
     reference_certificate: str | None
     reference_uncertainties: tuple[tuple[str, float, float, str], ...]
+    reference_digital: DigitalSource | None
     rule: str | None
     interval: str | None
     opinions: str | None

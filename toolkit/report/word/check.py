@@ -57,13 +57,12 @@ def check_template(
     package = open_package(template)
     parts = stories(package)
     vocabulary = vocabulary_of(scan(parts), vocabularies)
-    return check_stories(package, parts, template, style, vocabulary, fonts=fonts)
+    return check_stories(package, parts, style, vocabulary, fonts=fonts)
 
 
 def check_stories(
     package: object,
     parts: list[Story],
-    template: Template,
     style: Style,
     words: Vocabulary,
     *,
@@ -76,16 +75,6 @@ def check_stories(
         *_tables(sites, words),
         *_broken(parts),
         *surroundings(package, parts, style),
-    ]
-    findings += [
-        LintFinding(
-            rule="attached-template",
-            level="warning",
-            part="word/settings.xml",
-            place="part",
-            message=f"attached template {target} is dropped",
-        )
-        for target in template.dropped
     ]
     if fonts:
         findings += [

@@ -14,6 +14,7 @@ from pathlib import Path
 from lxml import etree
 
 from toolkit.errors import RenderError
+from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.bulk import with_rows, without_rows
 from toolkit.report.word.contents import ContentsEntry, contents_fields
 from toolkit.report.word.filled import Filled
@@ -116,7 +117,7 @@ def pdf_text(pdf: Path) -> str:
         # The text is the same without PDF/A's colour profile, which pdftotext sets up anew for each page:
         # 50 ms a page. The name is blotted out in place, so that every offset stays right.
         plain = Path(folder) / "text.pdf"
-        plain.write_bytes(pdf.read_bytes().replace(b"/OutputIntents", b"/OutputIntent_"))
+        plain.write_bytes(read_input(pdf, PDF_FILE).replace(b"/OutputIntents", b"/OutputIntent_"))
         return poppler(["pdftotext", "-raw", "-enc", "UTF-8", str(plain), "-"])
 
 

@@ -83,7 +83,7 @@ def fill(
     """
     package: Any = open_package(template)
     parts = stories(package)
-    lint = check_stories(package, parts, template, content.style, content.vocabulary, fonts=fonts)
+    lint = check_stories(package, parts, content.style, content.vocabulary, fonts=fonts)
     errors = [one for one in lint if one.level == "error"]
     if errors:
         raise _lint_error(template, errors)

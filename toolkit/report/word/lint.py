@@ -36,7 +36,6 @@ RULES = {
     "contents": "a table of contents or an index is of a kind that is not updated",
     "missing-style": "a style that the style file names is not in the template",
     "font-unavailable": "a font is not installed and will be replaced",
-    "attached-template": "the template is attached to another file, which is dropped",
 }
 
 

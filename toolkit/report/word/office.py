@@ -16,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 
 from toolkit.errors import RenderError
+from toolkit.inputs import PDF_FILE, read_regular
 
 # A guard that outlives its parent: after a kill -9 no LibreOffice runs on, and no folder is left behind.
 
@@ -228,7 +229,13 @@ class Office:
             self._warm = None
 
     def _start(self, arguments: list[str]) -> subprocess.Popen[bytes]:
-        environment = {**os.environ, "SAL_USE_VCLPLUGIN": "svp"}
+        # Who converts a document must not decide its language, decimal sign or paper: LibreOffice would take
+        # them from the locale wherever the document is silent. What it leaves in its folder for temporary
+        # files when it is killed goes with ours.
+        environment = {
+            **os.environ, "SAL_USE_VCLPLUGIN": "svp", "LC_ALL": "C.UTF-8", "TMPDIR": str(self.folder),
+        }  # fmt: skip
+        environment.pop("LANGUAGE", None)
         environment.pop("DISPLAY", None)
         # A HOME that cannot be written to makes LibreOffice hang; a good one holds the user's fonts.
         if not os.access(environment.get("HOME") or "/", os.W_OK):
@@ -315,7 +322,7 @@ def _is_pdf(path: Path) -> bool:
     # One that was cut off in the middle has no end mark.
     if not path.is_file():
         return False
-    data = path.read_bytes()
+    data = read_regular(path, PDF_FILE)
     return data[:5] == b"%PDF-" and b"%%EOF" in data[-1024:]
 
 

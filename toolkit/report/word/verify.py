@@ -8,6 +8,7 @@ import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.contents_pages import pdf_outline, pdf_text, poppler, printed_pages, titles_of
 from toolkit.report.word.filled import Filled, text_elements
 from toolkit.report.word.scan import BROKEN, LITERAL, control_tag
@@ -61,7 +62,7 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     info = poppler(["pdfinfo", str(pdf)])
     found = re.search(r"^Pages:\s+(\d+)", info, re.MULTILINE)
     pages = int(found[1]) if found else 0
-    data = pdf.read_bytes()
+    data = read_input(pdf, PDF_FILE)
     with ThreadPoolExecutor(2) as pool:
         fonts = pool.submit(poppler, ["pdffonts", str(pdf)])
         text = pdf_text(pdf)

@@ -1,0 +1,41 @@
+"""A fixed part of the crash bench: the commands that take no time, at a few of their calls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.crash.bench import Bench, agrees, chosen, passing
+from tests.crash.commands import QUICK, quick_folder
+from tests.faults import Runner
+from toolkit.files import sha256_bytes
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with Runner() as runner:
+        yield Bench(quick_folder, tmp_path_factory.mktemp("crash"), runner)
+
+
+@pytest.mark.parametrize("command", QUICK, ids=lambda command: command.name)
+def test_nothing_is_lost_or_mixed_and_the_next_run_gives_the_same(bench: Bench, command) -> None:
+    count = bench.judge(command, most=4)
+    assert (count.lost, count.mixed) == ([], [])
+    assert count.recovered == count.points >= 9
+
+
+def test_a_bench_that_could_not_see_a_fault_would_prove_nothing() -> None:
+    calls = ["1 create a", "2 write a", "3 write a", "4 fsync a", "5 rename a", "6 rename b", "7 unlink c"]
+    assert chosen(calls, 9) == [1, 2, 4, 5, 6, 7]
+    assert chosen(calls, 2) == [1, 7]
+    manifest = b'{"outputs": [{"name": "a", "sha256": "%s"}]}' % sha256_bytes(b"1").encode()
+    assert agrees(manifest, Path("out"), {"out/a": b"1"})
+    assert not agrees(manifest, Path("out"), {"out/a": b"2"})
+    assert not agrees(manifest, Path("out"), {})
+    assert [passing(name) for name in ("out/a", "out/.toolkit-results/a", "out/.a.x.part")] == [
+        False,
+        True,
+        True,
+    ]

@@ -1,0 +1,104 @@
+"""A key file opens once, outside of the home, with a certificate that holds."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+
+import pytest
+from cryptography.hazmat.primitives.asymmetric import ed25519, rsa
+from cryptography.hazmat.primitives.serialization import Encoding
+
+from tests.trust.seal.seal_factory import DAY, NOW, authority, key
+from toolkit.errors import TrustError
+from toolkit.trust.seal.authority import make_authority, to_pem, to_pkcs12
+from toolkit.trust.seal.key import open_key
+
+
+def _never() -> bytes:
+    raise AssertionError("no passphrase is needed")
+
+
+def _written(folder: Path, data: bytes) -> Path:
+    path = folder / "key"
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize("encrypt", [to_pem, to_pkcs12])
+def test_an_encrypted_key_opens_by_its_passphrase(tmp_path: Path, encrypt: object) -> None:
+    path = _written(tmp_path, encrypt(key(), b"correct horse"))  # type: ignore[operator]
+    opened = open_key(path, ask=lambda: b"correct horse")
+    assert opened.certificate == key().certificate
+    assert opened.chain == (key().certificate,)
+    assert "private" not in repr(opened)
+    for wrong in (b"wrong", b""):
+        with pytest.raises(TrustError) as caught:
+            open_key(path, ask=lambda word=wrong: word)  # type: ignore[misc]
+        assert caught.value.rule == "seal-key"
+        assert "correct horse" not in str(caught.value)
+
+
+def test_a_plain_key_asks_nothing_and_finds_its_chain_in_the_home(tmp_path: Path) -> None:
+    pem = to_pem(key())
+    alone = _written(tmp_path, pem[: pem.index(b"-----BEGIN CERTIFICATE-----")])
+    chain = tmp_path / "laboratory.pem"
+    chain.write_bytes(authority().pem + key().certificate.public_bytes(Encoding.PEM))
+    assert open_key(alone, ask=_never, chain=chain).certificate == key().certificate
+    with pytest.raises(TrustError) as caught:
+        open_key(alone, ask=_never)
+    assert caught.value.rule == "seal-certificate"
+
+
+def test_a_key_in_the_home_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "trust").mkdir()
+    path = _written(tmp_path / "trust", to_pem(key()))
+    link = tmp_path.parent / f"{tmp_path.name}-link"
+    link.symlink_to(path)
+    for place in (path, link):
+        with pytest.raises(TrustError, match="home"):
+            open_key(place, ask=_never, home=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("first", "last"), [(NOW - 20 * DAY, NOW - DAY), (NOW + DAY, NOW + 20 * DAY)], ids=["expired", "early"]
+)
+def test_a_certificate_that_is_not_valid_today_does_not_seal(
+    tmp_path: Path, first: dt.datetime, last: dt.datetime
+) -> None:
+    path = _written(tmp_path, to_pem(authority().issue("Tire laboratory", first=first, last=last)))
+    with pytest.raises(TrustError) as caught:
+        open_key(path, ask=_never)
+    assert caught.value.rule == "seal-certificate"
+
+
+@pytest.mark.parametrize(
+    ("private", "rule"),
+    [
+        (rsa.generate_private_key(public_exponent=65537, key_size=2048), "seal-certificate"),
+        (ed25519.Ed25519PrivateKey.generate(), "seal-key"),
+    ],
+    ids=["rsa-2048", "ed25519"],
+)
+def test_a_weak_key_or_one_of_another_kind_does_not_seal(tmp_path: Path, private: object, rule: str) -> None:
+    path = _written(tmp_path, to_pem(authority().issue("Tire laboratory", private=private)))
+    with pytest.raises(TrustError) as caught:
+        open_key(path, ask=_never)
+    assert caught.value.rule == rule
+
+
+@pytest.mark.parametrize("data", [b"", b"\0" * 40, b"-----BEGIN PRIVATE KEY-----\nAAAA\n"])
+def test_a_file_that_is_no_key_is_refused(tmp_path: Path, data: bytes) -> None:
+    with pytest.raises(TrustError):
+        open_key(_written(tmp_path, data), ask=lambda: b"")
+    with pytest.raises(TrustError):
+        open_key(tmp_path / "missing", ask=_never)
+
+
+def test_another_keys_certificate_does_not_seal(tmp_path: Path) -> None:
+    pem = to_pem(make_authority().issue("Other"))
+    start = pem.index(b"-----BEGIN CERTIFICATE-----")
+    mixed = pem[:start] + key().certificate.public_bytes(Encoding.PEM)
+    with pytest.raises(TrustError) as caught:
+        open_key(_written(tmp_path, mixed), ask=_never)
+    assert caught.value.rule == "seal-certificate"

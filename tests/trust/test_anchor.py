@@ -1,0 +1,80 @@
+"""A document's anchor against today's log: growth holds; rollback, fork and rewriting are each named."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from toolkit.errors import TrustError
+from toolkit.trust.anchor import anchor_of, compare, parse_anchor
+from toolkit.trust.checkpoint import Checkpoint
+from toolkit.trust.merkle import leaf_hash, root_of
+
+LINES = [f'{{"seq":{number}}}' for number in range(1, 14)]
+
+
+def _checkpoint(lines: list[str]) -> Checkpoint:
+    return Checkpoint(
+        origin="m15", size=len(lines), root=root_of([leaf_hash(line.encode()) for line in lines])
+    )
+
+
+@pytest.mark.parametrize("index", range(len(LINES)))
+def test_the_line_of_a_document_is_proved_without_the_log(index: int) -> None:
+    anchor = anchor_of(LINES, index, _checkpoint(LINES))
+    again = parse_anchor(json.loads(json.dumps(anchor.as_dict())))
+    assert again == anchor
+    assert again.proved
+    assert not parse_anchor({**anchor.as_dict(), "line": '{"seq":0}'}).proved
+    assert not parse_anchor({**anchor.as_dict(), "index": (index + 1) % len(LINES)}).proved
+
+
+def test_a_log_that_only_grew_continues() -> None:
+    checkpoint = _checkpoint(LINES[:7])
+    assert compare(LINES, checkpoint).continuity == "continues"
+    assert compare(LINES[:7], checkpoint).continuity == "continues"
+
+
+@pytest.mark.parametrize("size", range(7))
+def test_a_log_that_became_shorter_is_rolled_back(size: int) -> None:
+    assert compare(LINES[:size], _checkpoint(LINES[:7])).continuity == "rolled_back"
+
+
+@pytest.mark.parametrize("changed", range(11))
+def test_a_rewritten_entry_is_a_fork_and_its_place_is_told(changed: int) -> None:
+    checkpoint = _checkpoint(LINES[:11])
+    rewritten = [*LINES[:changed], '{"seq":"rewritten"}', *LINES[changed + 1 :]]
+    for index in range(11):
+        comparison = compare(rewritten, checkpoint, anchor_of(LINES, index, checkpoint))
+        assert comparison.continuity == "forked"
+        if index == changed:
+            assert f"entry {changed + 1} was rewritten" in comparison.why
+            continue
+        words = comparison.why.rpartition(": in ")[2].split()
+        first, last = int(words[0]), int(words[-1])
+        assert first <= changed + 1 <= last, "the range that is named holds the rewritten entry"
+
+
+def test_a_dropped_and_a_moved_entry_are_forks() -> None:
+    checkpoint = _checkpoint(LINES[:9])
+    assert compare([*LINES[:3], *LINES[4:]], checkpoint).continuity == "forked"
+    assert compare([LINES[1], LINES[0], *LINES[2:]], checkpoint).continuity == "forked"
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        {},
+        {"line": 1},
+        {"path": ["x"]},
+        {"path": ["AAAA"]},
+        {"index": "0"},
+        {"checkpoint": "m15\n1\n\n"},
+        {"path": None},
+    ],
+)
+def test_a_damaged_proof_is_refused(entries: dict[str, object]) -> None:
+    sound = anchor_of(LINES, 2, _checkpoint(LINES)).as_dict()
+    with pytest.raises(TrustError):
+        parse_anchor({**sound, **entries} if entries else {})

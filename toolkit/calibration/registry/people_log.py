@@ -1,0 +1,156 @@
+"""The log of people: each version of ``people.toml`` is an entry, signed as the version before demands.
+
+It lies beside the calibrations, ``people/`` in the laboratory's home. ``people.toml`` in the home is what
+people read: the newest version. What is typed into it is no decision, and `verify` says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from toolkit.calibration.registry import settled
+from toolkit.calibration.registry.clock import now
+from toolkit.calibration.registry.ledger import START, Ledger
+from toolkit.calibration.registry.signatures import unproved
+from toolkit.calibration.registry.store import Change, commit
+from toolkit.errors import ToolkitError, TrustError
+from toolkit.files import sha256_bytes, write_atomic
+from toolkit.inputs import read_regular
+from toolkit.trust.decisions import Signing
+from toolkit.trust.keys import Signer
+from toolkit.trust.people import FILE, History, People, Version, parse_people
+
+FOLDER = "people"
+ROOT_HEADS = 2  # people, one of which may be a printed recovery key: a lost key must not end a laboratory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeopleLog:
+    """The people of a laboratory over time.
+
+    ``heads``: count and last hash of each ledger at the time of the first enrolment.
+    """
+
+    history: History
+    heads: Mapping[str, tuple[int, str]]
+
+    def taken_over(self, instrument: str) -> tuple[int, str]:
+        """Return count and last hash of an instrument's lines that need no signature."""
+        return self.heads.get(instrument, (0, START))
+
+
+def place_of(calibrations: Path) -> Path:
+    """Return the folder of the log of people for a registry's folder."""
+    return calibrations.parent / FOLDER
+
+
+def read_people(calibrations: Path) -> PeopleLog:
+    """Return the people of the laboratory of a registry; nobody where none is enrolled.
+
+    Raises
+    ------
+    TrustError
+        ``people-log``: the log is damaged, or one of its entries is no decision of the people before it
+    """
+    folder = place_of(calibrations)
+    if not folder.is_dir():
+        return PeopleLog(history=History(), heads={})
+    ledger = settled.read(folder)
+    if ledger.damage is not None:
+        raise _damaged(folder, ledger.damage)
+    history = _history(folder, ledger)
+    if history.now is None:
+        return PeopleLog(history=History(), heads={})
+    damage = unproved(ledger, history, of_people=True) or _unfounded(ledger, history)
+    if damage is not None:
+        raise _damaged(folder, damage)
+    heads = {
+        name: (int(row["count"]), str(row["sha256"])) for name, row in (ledger.entries[0].heads or {}).items()
+    }
+    return PeopleLog(history=history, heads=heads)
+
+
+def enrol(
+    calibrations: Path, people: People, signers: Sequence[Signer], *, by: str, reason: str,
+    heads: Mapping[str, tuple[int, str]], lock_file: bool = False,
+) -> PeopleLog:  # fmt: skip
+    """Enter a version of the people's file, signed; the first one founds the laboratory's trust.
+
+    Raises
+    ------
+    TrustError
+        ``not-signed``, ``not-allowed``, ``people-log``; nothing is changed
+    OutputError
+        the home cannot be written to
+    """
+    folder = place_of(calibrations)
+    data = people.text().encode()
+    digest, time = sha256_bytes(data), now()
+
+    def build(ledger: Ledger) -> Change:
+        number = len(ledger.entries) + 1
+        event: dict[str, Any] = {
+            "event": "enrolled", "id": f"people-{number}", "time": time, "by": by,
+            "reason": reason, "file": digest,
+        }  # fmt: skip
+        if number == 1:
+            event["heads"] = {name: {"count": count, "sha256": head} for name, (count, head) in heads.items()}
+        return Change(files={f"people-{number}.toml": data}, event=event)
+
+    before = read_people(calibrations).history
+    if before.now is None:
+        before = History((Version(since=time, sha256=digest, people=people),))
+        _check_root(people, signers)
+    commit(folder, build, lock_file=lock_file, signing=Signing(history=before, signers=tuple(signers)))
+    write_atomic(calibrations.parent / FILE, data)
+    return read_people(calibrations)
+
+
+def _check_root(people: People, signers: Sequence[Signer]) -> None:
+    heads = {
+        person.id for signer in signers if (person := people.owner(signer.public)) and "head" in person.roles
+    }
+    if len(heads) < ROOT_HEADS:
+        raise TrustError(
+            "the first enrolment takes two heads, or one and a recovery key", where=FILE,
+            got=f"signed by {', '.join(sorted(heads)) or 'nobody'}",
+            expected=f"{ROOT_HEADS} keys of different heads",
+            next_step="sign with both, --sign KEY --sign KEY, or make a recovery key with --recovery FILE",
+            rule="not-allowed",
+        )  # fmt: skip
+
+
+def _history(folder: Path, ledger: Ledger) -> History:
+    versions = []
+    for entry in ledger.entries:
+        path = folder / f"{entry.id}.toml"
+        try:
+            data = read_regular(path)
+            if entry.event != "enrolled" or sha256_bytes(data) != entry.file:
+                raise _damaged(path, "it is not the file that was entered")
+            versions.append(
+                Version(since=entry.time, sha256=entry.file, people=parse_people(data, where=path))
+            )
+        except (OSError, ToolkitError) as error:
+            raise _damaged(path, getattr(error, "got", None) or error) from error
+    return History(tuple(versions))
+
+
+def _unfounded(ledger: Ledger, history: History) -> str | None:
+    first = history.versions[0].people
+    heads = {
+        row["by"] for row in ledger.entries[0].signatures
+        if (person := first.of(row["by"])) is not None and "head" in person.roles
+    }  # fmt: skip
+    return None if len(heads) >= ROOT_HEADS else "the first enrolment is not signed by two heads"
+
+
+def _damaged(where: Path, damage: object) -> TrustError:
+    return TrustError(
+        "the log of people is damaged", where=where, got=damage,
+        expected="every version of the people's file, signed by those whom the one before allowed",
+        next_step="restore the folder from a backup; see 'toolkit person list'", rule="people-log",
+    )  # fmt: skip

@@ -1,0 +1,105 @@
+"""A ledger's lines as decisions of people: signed where people are enrolled, and judged when read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from toolkit.calibration.records.record import canonical
+from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
+from toolkit.trust.decisions import (
+    ACTIONS,
+    SignedLine,
+    Signing,
+    signatures_of,
+    statement,
+    unsigned,
+    violations,
+)
+from toolkit.trust.merkle import Growing, leaf_hash
+from toolkit.trust.people import History
+
+
+def signed_event(event: Mapping[str, Any], ledger: Ledger, signing: Signing) -> dict[str, Any]:
+    """Return the next event of a ledger with its signatures; as it is where nobody is enrolled.
+
+    Raises
+    ------
+    TrustError
+        ``not-signed``, ``not-allowed``
+    """
+    if signing.history.now is None:
+        return dict(event)
+    record_id = event["id"]
+    signing.check(
+        ACTIONS[event["event"]], event["time"], operator=_operator(ledger, record_id), where=record_id
+    )
+    root = Growing(map(leaf_hash, ledger.lines)).root()
+    said = {**event, **statement(event, _subject(ledger, event), root, signing.history.at(event["time"]))}
+    body = {"seq": len(ledger.entries) + 1, "prev": ledger.head, **said}
+    return {**said, "signatures": signatures_of(signing, canonical(body).encode())}
+
+
+def unproved(
+    ledger: Ledger, history: History, taken_over: tuple[int, str] = (0, START), *, of_people: bool = False
+) -> str | None:
+    """Say which line is no decision of the laboratory's people; None where every line is.
+
+    ``taken_over``: count and last hash of the lines that were there before anybody was enrolled.
+    ``of_people``: it is the log of people itself, in which each line is judged by the version before it.
+    """
+    count, head = taken_over
+    if history.now is None:
+        signed = next((entry.seq for entry in ledger.entries if entry.signatures), None)
+        return None if signed is None else f"line {signed} is signed, and the log of people is missing"
+    if count > len(ledger.entries) or (count and ledger.entries[count - 1].sha256 != head):
+        return f"its first {count} lines are not those that were there when people were enrolled"
+    tree = Growing()
+    for entry, text in zip(ledger.entries, ledger.lines, strict=True):
+        if entry.seq > count:
+            body = json.loads(text)
+            line = SignedLine(
+                seq=entry.seq,
+                body=body,
+                message=canonical(unsigned(body)).encode(),
+                subject=_subject(ledger, body),
+                operator=_operator(ledger, entry.id),
+                root=tree.root(),
+            )
+            reasons = violations(line, history.before(entry.seq) if of_people else history)
+            if reasons:
+                return f"line {entry.seq} ({entry.event} {entry.id}): {'; '.join(reasons)}"
+        tree.add(leaf_hash(text))
+    return None
+
+
+def revoked(ledger: Ledger, history: History) -> frozenset[int]:
+    """Return the lines that rest on a key which was revoked later, from a time before the line on.
+
+    They stay in the ledger and decide nothing: a stolen key cannot put a record in force.
+    """
+    return frozenset(
+        entry.seq
+        for entry in ledger.entries
+        if any(history.revoked(row["key"], entry.time) is not None for row in entry.signatures)
+    )
+
+
+def signers_of(entry: Entry) -> tuple[str, ...]:
+    """Return the people who signed an entry, by id."""
+    return tuple(row["by"] for row in entry.signatures)
+
+
+def _subject(ledger: Ledger, event: Mapping[str, Any]) -> str | None:
+    """Return the hash of what a decision is about: of the record, or of the people's file."""
+    if event["event"] in BRINGING:
+        stated = event.get("record") or event.get("file")
+        return None if stated is None else str(stated)
+    entered = ledger.entered().get(event["id"])
+    return None if entered is None else entered.record
+
+
+def _operator(ledger: Ledger, record_id: str) -> str | None:
+    entered = ledger.entered().get(record_id)
+    return entered.signatures[0]["by"] if entered is not None and entered.signatures else None

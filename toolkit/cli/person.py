@@ -1,0 +1,193 @@
+"""`toolkit person ...` and `toolkit ledger ...`: who decides, and what the ledger was when it was issued."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, LockFile, Quiet, Sign, answer, open_signers
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.trust.people import Role
+
+person = typer.Typer(help="The people of the laboratory, their keys and roles.", no_args_is_help=True)
+ledger = typer.Typer(help="The ledger, as documents and witnesses know it.", no_args_is_help=True)
+
+Why = Annotated[str, typer.Option("--reason", help="Why; the log of people keeps it.")]
+Instrument = Annotated[str, typer.Argument(help="Instrument, such as m15.")]
+
+
+@person.command()
+def key(
+    file: Annotated[Path, typer.Argument(help="New private key; its public half is FILE.pub.")],
+    comment: Annotated[str, typer.Option("--comment", help="Whose it is.")] = "",
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make an Ed25519 key, encrypted by a passphrase; keys that people have already serve as well.
+
+    Example: toolkit person key ~/.ssh/laboratory --comment anna
+    """
+    from toolkit.trust.keys import make_key
+
+    passphrase = typer.prompt("passphrase", hide_input=True, confirmation_prompt=True, err=True)
+    public = make_key(file, passphrase, comment)
+    payload = {"key": str(file), "public": public.line, "fingerprint": public.fingerprint}
+    answer(payload, f"{file}.pub  {public.fingerprint}", as_json=as_json, quiet=quiet)
+    return 0
+
+
+@person.command()
+def enrol(
+    person_id: Annotated[str, typer.Argument(metavar="ID", help="Short name of the person.")],
+    name: Annotated[str, typer.Option("--name", help="As documents print it.")],
+    role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
+    key: Annotated[Path, typer.Option("--key", help="The person's public key, FILE.pub.")],
+    reason: Why = "enrolled",
+    recovery: Annotated[
+        Path | None, typer.Option("--recovery", help="Key that is kept apart: first enrolment by one head.")
+    ] = None,
+    sign: Sign = None,
+    calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Enrol a person, or give one another key; from the first one on decisions are signed.
+
+    Example: toolkit person enrol anna --name "Anna E." --role head --key a.pub --sign a --recovery safe
+    """
+    from toolkit.lab.people import enrol_person, people_answer
+
+    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
+    recovered = open_signers([recovery])[0] if recovery is not None else None
+    roles = cast("list[Role]", role)
+    log = enrol_person(
+        registry, person_id, name=name, roles=roles, key=key, reason=reason, recovery=recovered
+    )
+    answer(*people_answer(log), as_json=as_json, quiet=quiet)
+    return 0
+
+
+@person.command("list")
+def list_people(
+    calibrations: Calibrations = None, home: Home = None, as_json: Json = False, quiet: Quiet = False
+) -> int:
+    """List who is enrolled, with roles and keys.
+
+    Example: toolkit person list
+    """
+    from toolkit.lab.people import people_answer
+
+    answer(*people_answer(_registry(calibrations, home).people()), as_json=as_json, quiet=quiet)
+    return 0
+
+
+@person.command()
+def revoke(
+    person_id: Annotated[str, typer.Argument(metavar="ID", help="Whose key.")],
+    since: Annotated[
+        str, typer.Option("--from", help="First moment it signs nothing, 2026-11-22T10:11:12Z.")
+    ],
+    reason: Why,
+    key: Annotated[str | None, typer.Option("--key", help="Its fingerprint; default: every key.")] = None,
+    sign: Sign = None,
+    calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """End a person's key from a time on; what it signed before holds, what it signed after decides nothing.
+
+    Example: toolkit person revoke anna --from 2026-11-22T00:00:00Z --reason "laptop stolen" --sign ben
+    """
+    from toolkit.lab.people import people_answer, revoke_key
+
+    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
+    log = revoke_key(registry, person_id, fingerprint=key, since=since, reason=reason)
+    answer(*people_answer(log), as_json=as_json, quiet=quiet)
+    return 0
+
+
+@ledger.command()
+def prove(
+    instrument: Instrument,
+    entry: Annotated[int | None, typer.Option("--entry", help="Entry, from 1; default: the last.")] = None,
+    sign: Sign = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+) -> int:
+    """Print an entry with the proof that it is in the ledger of today, for `ledger check` on any later day.
+
+    Example: toolkit ledger prove m15
+    """
+    from toolkit.lab.people import anchor_document, checkpoint_of
+
+    registry = _registry(calibrations, home, sign=sign)
+    typer.echo(anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument)), nl=False)
+    return 0
+
+
+@ledger.command()
+def check(
+    instrument: Instrument,
+    against: Annotated[Path, typer.Option("--against", help="A proof, a checkpoint, or a PDF.")],
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tell whether today's ledger continues the one of an earlier document; exit code 1 where it does not.
+
+    Example: toolkit ledger check m15 --against certificate.pdf
+    """
+    from toolkit.lab.people import check_against
+
+    comparison = check_against(_registry(calibrations, home), instrument, against)
+    payload = {"instrument": instrument, "ledger": comparison.continuity, "why": comparison.why}
+    answer(payload, f"{comparison.continuity}: {comparison.why}", as_json=as_json, quiet=quiet)
+    return 0 if comparison.continuity == "continues" else 1
+
+
+@ledger.command()
+def witness(
+    instrument: Instrument,
+    folder: Annotated[Path, typer.Argument(help="The witness's folder: a share, a stick.")],
+    name: Annotated[str, typer.Option("--name", help="Of the witness.")],
+    key: Annotated[Path, typer.Option("--key", help="The witness's private key.")],
+    sign: Sign = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Let a second place countersign the ledger; it refuses what is no continuation of what it has signed.
+
+    Example: toolkit ledger witness m15 /mnt/north --name north --key north.key
+    """
+    from toolkit.lab.people import witness as countersigned
+
+    registry = _registry(calibrations, home, sign=sign)
+    signer = open_signers([key])[0]
+    checkpoint, before = countersigned(registry, instrument, folder, name=name, signer=signer)
+    payload = {
+        "instrument": instrument,
+        "size": checkpoint.size,
+        "before": before,
+        "checkpoint": checkpoint.text,
+    }
+    answer(payload, checkpoint.text.rstrip("\n"), as_json=as_json, quiet=quiet)
+    return 0
+
+
+def _registry(
+    calibrations: Path | None, home: Path | None, *, lock_file: bool = False, sign: list[Path] | None = None
+) -> Registry:
+    from toolkit.lab.home import open_registry
+
+    return open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))

@@ -1,0 +1,49 @@
+"""`toolkit verify FILE...`: whether documents are what was issued, by whom, and whether they still hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
+
+NAME = "verify"
+
+
+def command(
+    files: Annotated[
+        list[Path], typer.Argument(help="PDF, DCC (.xml), manifest.json, record (.json), or a Word file.")
+    ],
+    trusted: Annotated[
+        list[Path] | None,
+        typer.Option("--trust", help="Trust the certificates of this file too; may be repeated."),
+    ] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tell of each document who issued it, when, over what, and whether it still holds; offline.
+
+    Trusted are the certificates in trust/certificates and trust/laboratory.pem of the home, and those of
+    --trust. Exit code 0: all hold; 1: one is unsigned, of an unknown issuer, or withdrawn since; 2: one was
+    changed after it was sealed, or cannot be read.
+
+    Example: toolkit verify certificate.pdf certificate.xml
+    """
+    from functools import partial
+
+    from toolkit.lab.home import registry_if_any
+    from toolkit.lab.sealing import home_trust
+    from toolkit.lab.verification import registry_ledger, verify_file
+    from toolkit.trust.seal.x509 import with_files
+
+    trust = with_files(home_trust(home), trusted or [])
+    ledger = registry_ledger(partial(registry_if_any, calibrations, home))
+    verdicts = [verify_file(path, trust, ledger=ledger) for path in files]
+    rows = [verdict.as_dict() for verdict in verdicts]
+    payload = {**(rows[0] if len(rows) == 1 else {}), "files": rows}
+    answer(payload, "\n".join(verdict.line for verdict in verdicts), as_json=as_json, quiet=quiet)
+    return max(verdict.code for verdict in verdicts)

@@ -1,0 +1,226 @@
+"""Kind ``ode`` in a worker: whole integrations cross, never a single call of the equation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from toolkit.diagnosis.simulators.channels import channel_places
+from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, TermPattern
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effects
+from toolkit.effects.surroundings import MotionSizes
+from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.case_code import CaseCode
+    from toolkit.diagnosis.simulators.simulator import Largest, Model, Pattern
+    from toolkit.effects.effect import Effect
+    from toolkit.worker.serve import Handlers
+
+    Arrays = dict[str, NDArray[np.float64]]
+    Crossing = tuple[tuple[Any, ...], ...]
+
+_USABLE = "\0usable"  # one for each set that could be simulated; no channel has such a name
+_SIZES = ("force", "speed", "place", "fastest", "farthest", "level")
+
+
+class OdeApart:
+    """The simulation of a case's equation, which is integrated in a worker."""
+
+    def __init__(self, case: Case, code: CaseCode) -> None:
+        self.case, self._code = case, code
+        self.parameters = case.parameters
+        self.outputs = tuple(
+            Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
+        )
+        self._facts: dict[tuple[str, ...], Any] = {}
+        self._prepared: dict[Run, dict[Any, Arrays]] = {}
+        self.capability = Capability(
+            nominal_load_N=None,
+            cells=(),
+            unsure={},
+            findings=(),
+            repeats=None,
+            together=self._together,
+            motion=Moving(
+                integrates=True, sizes=self._sizes, units=self._units, way=self._way, pushed=self._pushed
+            ),
+        )
+
+    def observed(self, run: Run) -> Arrays:
+        """Return what was recorded of every output."""
+        return {
+            output.name: run.columns[output.name] for output in self.outputs if output.name in run.columns
+        }
+
+    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> Arrays:
+        """Return every output of a free simulation over the whole run."""
+        prepared = self._prepared.get(run)
+        if prepared and (outputs := prepared.get(_key(p, active))) is not None:
+            return outputs
+        shapes = {output.name: (run.rows,) for output in self.outputs}
+        return self._code.arrays("simulate", run, p, shapes, _crossing(active))
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return the states and outputs on which an effect could act."""
+        if effect.term is None:
+            outputs = [(output.name, output.unit) for output in self.outputs]
+            drivers = [(driver.name, driver.unit) for driver in self.case.drivers]
+            return channel_places(effect, outputs, drivers, {name for name, _ in drivers})
+        pairs = self._fact("places", effect.name)
+        if not (isinstance(pairs, list) and all(_texts(pair, 2) for pair in pairs)):
+            raise _unfit("places of an effect")
+        return [(channel, source) for channel, source in pairs]
+
+    def _fact(self, *question: str) -> Any:
+        if question not in self._facts:
+            self._facts[question] = self._code.value(*question)
+        return self._facts[question]
+
+    def _together(
+        self, run: Run, points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]]
+    ) -> None:
+        self._prepared[run] = {}
+        sets = [(dict(p), _crossing(active)) for p, active in points]
+        shapes = {output.name: (len(sets), run.rows) for output in self.outputs} | {_USABLE: (len(sets),)}
+        try:
+            answers = self._code.arrays("together", run, {}, shapes, sets)
+        except FitError:  # whatever it is, the same set alone raises it by name
+            return
+        for k in map(int, answers[_USABLE].nonzero()[0]):
+            outputs = {output.name: answers[output.name][k] for output in self.outputs}
+            self._prepared[run][_key(*points[k])] = outputs
+
+    def _sizes(self, channel: str | None, _: Largest) -> MotionSizes:
+        sizes = self._fact("sizes", str(channel))
+        if not (isinstance(sizes, list) and len(sizes) == len(_SIZES) + 1 and _numbers(sizes)):
+            raise _unfit("sizes of a motion")
+        return MotionSizes(**dict(zip(_SIZES, map(float, sizes), strict=False)), has_position=bool(sizes[-1]))
+
+    def _units(self, channel: str | None) -> tuple[str, str, str]:
+        units = self._fact("units", str(channel))
+        if not _texts(units, 3) or None in units:
+            raise _unfit("units of a motion")
+        return units[0], units[1], units[2]
+
+    def _way(self, channel: str | None) -> tuple[float, float]:
+        way = self._fact("way", str(channel))
+        if not (isinstance(way, list) and len(way) == 2 and _numbers(way)):
+            raise _unfit("way of a motion")
+        return float(way[0]), float(way[1])
+
+    def _pushed(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[AppliedEffect],
+        channel: str | None,
+        pattern: Pattern,
+    ) -> Arrays:
+        if run.rows < 2:
+            return {}
+        assert isinstance(pattern, TermPattern)  # noqa: S101  no other crosses
+        import numpy as np
+
+        forces = pattern(np.zeros(1)).shape[1]
+        shapes = {output.name: (run.rows, forces) for output in self.outputs}
+        term = (pattern.effect.name, tuple(dict(start) for start in pattern.starts))
+        return self._code.arrays("pushed", run, p, shapes, _crossing(active), channel, term)
+
+
+def handlers_of(case: Case, model: Model) -> Handlers:
+    """Return what a worker answers of an equation."""
+    from toolkit.worker.serve import Numbers
+
+    runs = (*case.runs, *case.predict)
+    together, moving = model.capability.together, model.capability.motion
+    assert together is not None  # noqa: S101  of every equation
+    assert moving is not None  # noqa: S101
+
+    def sizes(channel: str) -> list[float]:
+        motion = moving.sizes(channel, lambda _: 1.0)
+        return [*(float(getattr(motion, name)) for name in _SIZES), float(motion.has_position)]
+
+    def prepared(run: int, _: Mapping[str, float], sets: Sequence[tuple[dict[str, float], Crossing]]) -> Any:
+        import numpy as np
+
+        points = [(p, _crossed(active)) for p, active in sets]
+        together(runs[run], points)
+        answers = Numbers({output.name: np.zeros((len(sets), runs[run].rows)) for output in model.outputs})
+        answers[_USABLE] = np.zeros(len(sets))
+        for k, (p, active) in enumerate(points):
+            try:
+                outputs = model.simulate(runs[run], p, active)
+            except FitError:
+                continue
+            for output in model.outputs:
+                answers[output.name][k] = outputs[output.name]
+            answers[_USABLE][k] = 1.0
+        return answers
+
+    def pushed(
+        run: int, p: Mapping[str, float], active: Crossing, channel: str | None, term: tuple[str, Any]
+    ) -> Any:
+        pattern = TermPattern(effects()[term[0]], term[1])
+        return Numbers(moving.pushed(runs[run], p, _crossed(active), channel, pattern))
+
+    return {
+        "simulate": lambda run, p, active: Numbers(model.simulate(runs[run], p, _crossed(active))),
+        "together": prepared,
+        "pushed": pushed,
+        "places": lambda name: [list(place) for place in model.places(effects()[name])],
+        "sizes": sizes,
+        "units": lambda channel: list(moving.units(channel)),
+        "way": lambda channel: [float(length) for length in moving.way(channel)],
+    }
+
+
+def _crossing(active: Sequence[AppliedEffect]) -> Crossing:
+    """Return effects as plain values: their functions stay where they are, and have the same names there."""
+    return tuple(
+        (
+            applied.effect.name, applied.channel, applied.source, applied.runs, dict(applied.values),
+            dict(applied.units), applied.condition,
+        )
+        for applied in active
+    )  # fmt: skip
+
+
+def _crossed(active: Crossing) -> list[AppliedEffect]:
+    return [
+        AppliedEffect(
+            effect=effects()[name], channel=channel, source=source, runs=runs, values=values, units=units,
+            condition=condition,
+        )
+        for name, channel, source, runs, values, units, condition in active
+    ]  # fmt: skip
+
+
+def _key(p: Mapping[str, float], active: Sequence[AppliedEffect]) -> tuple[Any, ...]:
+    effects = ((applied.key, tuple(applied.values.items()), applied.condition) for applied in active)
+    return tuple(p.items()), tuple(effects)
+
+
+def _texts(value: object, count: int) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == count
+        and all(text is None or isinstance(text, str) for text in value)
+    )
+
+
+def _numbers(values: Sequence[object]) -> bool:
+    return all(isinstance(value, int | float) for value in values)
+
+
+def _unfit(content: str) -> FitError:
+    return FitError(
+        "the simulation gives no usable output", where="the worker of the equation", got=f"no {content}",
+        expected="what the equation's functions give", rule="simulator",
+        next_step="look at what the equation's file does beside giving rhs, outputs and initial",
+    )  # fmt: skip

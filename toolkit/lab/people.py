@@ -1,0 +1,237 @@
+"""The people of a laboratory: enrol, change, revoke; and the ledger as documents and witnesses know it."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.calibration.registry.clock import now
+from toolkit.calibration.registry.people_log import PeopleLog, enrol
+from toolkit.errors import ToolkitError, TrustError
+from toolkit.files import write_atomic
+from toolkit.inputs import read_regular
+from toolkit.trust.anchor import Comparison, anchor_of, compare, parse_anchor
+from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
+from toolkit.trust.keys import Signer
+from toolkit.trust.merkle import leaf_hash, root_of
+from toolkit.trust.people import Key, People, Person, Role
+from toolkit.trust.ssh import parse_public
+from toolkit.trust.witness import SUFFIX, countersign
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.registry import Registry
+
+RECOVERY = "recovery"
+_HEAD = re.compile(r"\b[0-9a-f]{64}\b")
+
+
+def enrol_person(
+    registry: Registry, person_id: str, *, name: str, roles: Sequence[Role], key: Path, reason: str,
+    recovery: Signer | None = None,
+) -> PeopleLog:  # fmt: skip
+    """Enrol a person, or add a key to one; the first enrolment is signed by two heads.
+
+    ``recovery`` is a second head's key, printed and kept apart, for a laboratory with one head.
+
+    Raises
+    ------
+    TrustError
+        the key is refused, or the signers may not enrol; nothing is changed
+    """
+    log = registry.people()
+    since = now()
+    public = parse_public(_text(key), where=key)
+    people = log.history.now.people.person if log.history.now is not None else ()
+    known = next((person for person in people if person.id == person_id), None)
+    person = Person(
+        id=person_id, name=name, roles=tuple(roles),
+        keys=(*(known.keys if known is not None else ()), Key(key=public.line, since=since)),
+    )  # fmt: skip
+    if log.history.now is not None:
+        changed = log.history.now.people.with_person(person)
+        return _enter(registry, changed, registry.signers, reason)
+    first = [person]
+    signers = list(registry.signers)
+    if recovery is not None:
+        keys = (Key(key=recovery.public.line, since=since),)
+        first.append(Person(id=RECOVERY, name="Recovery key", roles=("head",), keys=keys))
+        signers.append(recovery)
+    return _enter(registry, People(person=tuple(first)), signers, reason)
+
+
+def revoke_key(
+    registry: Registry, person_id: str, *, fingerprint: str | None, since: str, reason: str
+) -> PeopleLog:
+    """End a person's key, or all of them, from a time on; what it signed before holds.
+
+    Raises
+    ------
+    TrustError
+        ``person``: nobody of that id, or no such key; or the signers may not
+    """
+    version = registry.people().history.now
+    person = None if version is None else version.people.of(person_id)
+    if version is None or person is None:
+        raise _nobody(person_id, () if version is None else [p.id for p in version.people.person])
+    chosen = [
+        key for key in person.keys if fingerprint in (None, key.public.fingerprint) and key.until is None
+    ]
+    if not chosen:
+        raise _nobody(fingerprint or person_id, [key.public.fingerprint for key in person.keys])
+    keys = tuple(replace(key, until=max(since, key.since)) if key in chosen else key for key in person.keys)
+    people = version.people.with_person(replace(person, keys=keys))
+    return _enter(registry, people, registry.signers, reason)
+
+
+def people_answer(log: PeopleLog) -> tuple[dict[str, Any], str]:
+    """Return who is enrolled, as a payload and for people."""
+    from toolkit.lab.answers import table
+
+    version = log.history.now
+    if version is None:
+        return {"people": [], "versions": 0}, "nobody is enrolled: decisions are unsigned"
+    keys = [(person, key) for person in version.people.person for key in person.keys]
+    rows = [
+        {
+            "id": person.id, "name": person.name, "roles": list(person.roles), "key": key.public.fingerprint,
+            "from": key.since, "until": key.until,
+        }
+        for person, key in keys
+    ]  # fmt: skip
+    cells = [
+        [person.id, person.name, ", ".join(person.roles), key.public.fingerprint, key.since, key.until or ""]
+        for person, key in keys
+    ]
+    payload = {"people": rows, "versions": len(log.history.versions), "since": version.since}
+    return payload, table(["id", "name", "roles", "key", "from", "until"], cells, align="<<<<<<")
+
+
+def checkpoint_of(registry: Registry, instrument: str) -> Checkpoint:
+    """Return the checkpoint of an instrument's ledger as it stands, signed by the keys at hand."""
+    texts = lines_of(registry, instrument)
+    root = root_of([leaf_hash(text.encode()) for text in texts])
+    checkpoint = Checkpoint(origin=f"toolkit/{instrument}", size=len(texts), root=root)
+    version = registry.people().history.now
+    for signer in registry.signers:
+        person = None if version is None else version.people.owner(signer.public)
+        if person is None:
+            raise TrustError(
+                "a checkpoint is signed by people who are enrolled", where=instrument,
+                got=signer.public.fingerprint, expected="the key of a person: toolkit person list",
+                next_step="enrol the person first", rule="not-allowed",
+            )  # fmt: skip
+        checkpoint = checkpoint.signed(person.id, signer)
+    return checkpoint
+
+
+def anchor_document(registry: Registry, instrument: str, seq: int | None, checkpoint: Checkpoint) -> str:
+    """Return the JSON that a document carries: a line (from 1; default: the last) and its proof."""
+    texts = lines_of(registry, instrument)
+    index = len(texts) - 1 if seq is None else seq - 1
+    return json.dumps({"schema": 1, **anchor_of(texts, index, checkpoint).as_dict()}, indent=2) + "\n"
+
+
+def lines_of(registry: Registry, instrument: str) -> list[str]:
+    """Return the lines of an instrument's ledger.
+
+    Raises
+    ------
+    RegistryError
+        the ledger is damaged
+    """
+    from toolkit.calibration.registry.settled import damaged
+
+    ledger = registry.ledger(instrument)
+    if ledger.damage is not None:
+        raise damaged(registry.folder / instrument, ledger.damage)
+    return [line.decode() for line in ledger.lines]
+
+
+def check_against(registry: Registry, instrument: str, document: Path) -> Comparison:
+    """Hold today's ledger against a document of earlier: a proof, a checkpoint, or a PDF with a hash of it.
+
+    Raises
+    ------
+    TrustError
+        ``anchor``: the document holds nothing of this ledger
+    """
+    # A ledger that is damaged is compared, too: where it broke is what was asked.
+    texts = [line.decode() for line in registry.ledger(instrument).lines]
+    if document.suffix.lower() == ".pdf":
+        return _printed(texts, document)
+    text = _text(document)
+    if text.lstrip().startswith("{"):
+        anchor = parse_anchor(json.loads(text), where=document)
+        if not anchor.proved:
+            return Comparison("forked", "the document's own proof does not hold: it was changed")
+        return compare(texts, anchor.checkpoint, anchor)
+    return compare(texts, parse_checkpoint(text, where=document))
+
+
+def witness(
+    registry: Registry, instrument: str, folder: Path, *, name: str, signer: Signer
+) -> tuple[Checkpoint, int]:
+    """Let a witness countersign an instrument's ledger; return the checkpoint and the size it knew before."""
+    texts = lines_of(registry, instrument)
+    signed = countersign(
+        folder, name, signer, checkpoint_of(registry, instrument), texts, time=int(time.time())
+    )
+    copy = registry.folder.parent / "trust" / "witnessed" / f"{instrument}-{name}{SUFFIX}"
+    write_atomic(copy, signed.checkpoint.text)
+    return signed.checkpoint, signed.before
+
+
+def _printed(texts: Sequence[str], document: Path) -> Comparison:
+    """Look for the hashes of ledger lines that documents print."""
+    try:
+        done = subprocess.run(["pdftotext", str(document), "-"], capture_output=True, check=True, timeout=60)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise _without(document, error) from error
+    heads = [json.loads(text)["sha256"] for text in texts]
+    printed = set(_HEAD.findall(done.stdout.decode(errors="replace")))
+    places = [place for place, head in enumerate(heads, start=1) if head in printed]
+    if not places:
+        raise _without(document, "no hash of a line of this ledger")
+    return Comparison("continues", f"entry {places[-1]}, whose hash the document prints, is in the ledger")
+
+
+def _enter(registry: Registry, people: People, signers: Sequence[Signer], reason: str) -> PeopleLog:
+    heads = {
+        name: (len(registry.ledger(name).entries), registry.head(name)) for name in registry.instruments()
+    }
+    owner = next((person.id for signer in signers if (person := people.owner(signer.public))), "nobody")
+    return enrol(
+        registry.folder, people, signers, by=owner, reason=reason, heads=heads, lock_file=registry.lock_file
+    )
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_regular(path).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise TrustError(
+            "a file cannot be read", where=path, got=getattr(error, "strerror", None) or error,
+            expected="a public key, a checkpoint or a proof", next_step="check the path", rule="no-file",
+        ) from error  # fmt: skip
+
+
+def _nobody(got: str, expected: Sequence[str]) -> ToolkitError:
+    return TrustError(
+        "there is no such person or key", where="people", got=got,
+        expected=", ".join(expected) or "nobody is enrolled",
+        next_step="see 'toolkit person list'; nothing was changed", rule="person",
+    )  # fmt: skip
+
+
+def _without(document: Path, reason: object) -> TrustError:
+    return TrustError(
+        "a document holds nothing of this ledger", where=document, got=reason,
+        expected="a proof (.json), a checkpoint, or a PDF that prints the hash of the ledger",
+        next_step="name the instrument whose record the document used, --instrument", rule="anchor",
+    )  # fmt: skip

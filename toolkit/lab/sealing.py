@@ -1,0 +1,158 @@
+"""The laboratory's seal at the end of an issue: its key, whom it trusts, and the proof in a PDF."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import ConfigError
+from toolkit.files import sha256_file
+from toolkit.inputs import CERTIFICATE_FILE, PDF_FILE, read_input
+from toolkit.lab.home import find_home
+
+if TYPE_CHECKING:
+    from toolkit.calibration.dcc.standard import Standards
+    from toolkit.trust.seal.key import Ask, SealKey
+    from toolkit.trust.seal.x509 import Trust
+
+PROOF = "toolkit.json"
+"""Name of the JSON document in a sealed PDF: its records, its ledger's proof, the files issued with it."""
+
+TRUST, KEY = "trust", "TOOLKIT_SEAL_KEY"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sealing:
+    """The seal of one issue. ``stamps`` is the address of a time-stamp server, None for none."""
+
+    key: SealKey
+    stamps: str | None = None
+
+    def seal_xml(self, data: bytes) -> bytes:
+        """Return a digital calibration certificate with its seal."""
+        from toolkit.trust.seal.xml import seal_xml
+
+        return seal_xml(data, self.key)
+
+    def seal_file(
+        self,
+        pdf: Path,
+        others: Sequence[Path],
+        *,
+        document: str,
+        records: Sequence[dict[str, str]],
+        ledger: Any = None,
+    ) -> None:
+        """Seal a PDF that has not been handed over yet.
+
+        Parameters
+        ----------
+        pdf, others : the file, and those that are handed over with it, by their hashes
+        document : what it is, such as ``certificate CC-1``
+        records : ``id`` and ``sha256`` of each record that it rests on
+        ledger : the ledger's proof, JSON values; None where there is none
+        """
+        from toolkit.recording.marks import GENERATOR
+        from toolkit.trust.seal.pdf import seal_pdf
+
+        proof = {
+            "generator": GENERATOR,
+            "schema": 1,
+            "document": document,
+            "records": list(records),
+            "files": [{"name": file.name, "sha256": sha256_file(file)} for file in others],
+            "ledger": ledger,
+        }
+        text = json.dumps(proof, ensure_ascii=False, indent=1).encode() + b"\n"
+        stamps = None
+        if self.stamps is not None:
+            from pyhanko.sign.timestamps import HTTPTimeStamper
+
+            stamps = HTTPTimeStamper(self.stamps)
+        sealed = seal_pdf(
+            read_input(pdf, PDF_FILE),
+            self.key,
+            reason=f"issued: {document}",
+            attachments={PROOF: text},
+            stamps=stamps,
+        )
+        pdf.write_bytes(sealed)
+
+
+def open_sealing(
+    seal: Path | None, home: Path, *, ask: Ask, stamps: str | None = None, draft: bool = False
+) -> Sealing | None:
+    """Return the seal of an issue: by ``--seal``, else by the environment; None where neither names a key.
+
+    Raises
+    ------
+    TrustError
+        the key cannot be used
+    ConfigError
+        ``usage``: a draft is never sealed, a time stamp never stands alone
+    """
+    from toolkit.trust.seal.key import open_key
+
+    named = seal or (Path(os.environ[KEY]) if os.environ.get(KEY) else None)
+    if named is None and stamps is not None:
+        raise ConfigError(
+            "a time stamp belongs to a seal", where="--time-stamp", got="no key", expected="--seal KEY too",
+            next_step="name the key, or leave out --time-stamp; nothing was made", rule="usage",
+        )  # fmt: skip
+    if named is None or (draft and seal is None):
+        return None
+    if draft:
+        raise ConfigError(
+            "a draft is never sealed", where="--draft, --seal", got="both", expected="one of the two",
+            next_step="approve the record first, or leave out --seal; nothing was made", rule="usage",
+        )  # fmt: skip
+    key = open_key(named, ask=ask, chain=home / TRUST / "laboratory.pem", home=home)
+    return Sealing(key=key, stamps=stamps)
+
+
+def home_trust(home: Path | None) -> Trust:
+    """Return the certificates that a home trusts, its own chain among them; without a home, nobody.
+
+    Raises
+    ------
+    ConfigError
+        ``home`` was given and is none
+    TrustError
+        a file among them holds no certificate
+    """
+    from toolkit.trust.seal.x509 import Trust
+
+    try:
+        return trusted(find_home(home) / TRUST)
+    except ConfigError:
+        if home is not None:
+            raise
+        return Trust()
+
+
+def standards_of(home: Path) -> Standards:
+    """Return whose digital certificates of reference standards a home takes numbers from.
+
+    Raises
+    ------
+    TrustError
+        a file among the trusted certificates holds none
+    """
+    from toolkit.calibration.dcc.standard import Standards
+
+    return Standards(trust=trusted(home / TRUST), schemas=home / TRUST / "schema")
+
+
+def trusted(folder: Path) -> Trust:
+    """Return what the folder ``trust`` of a home trusts: ``certificates/``, and ``laboratory.pem``."""
+    from toolkit.trust.seal.x509 import Trust, read_certificates, read_trust
+
+    enrolled, own = read_trust(folder / "certificates"), folder / "laboratory.pem"
+    if not own.is_file():
+        return enrolled
+    chain = read_certificates(read_input(own, CERTIFICATE_FILE), where=own)
+    return Trust(certificates=(*enrolled.certificates, *chain), revocations=enrolled.revocations)

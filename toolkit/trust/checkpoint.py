@@ -1,0 +1,158 @@
+"""Checkpoints: what a log was at a moment, signed (C2SP tlog-checkpoint), and countersigned by witnesses.
+
+    m15.calibrations.example
+    41
+    5wHqDQwl...=
+
+    — anna yH3v...
+    — witness-north 4gAJ...
+
+The first line is the log's name, then its size and the root of its tree; each line after the blank is a
+signature: the signer's name, then in base64 the four first bytes of the key's hash and the signature
+(C2SP signed-note). A witness signs the time with it (C2SP tlog-cosignature, ``cosignature/v1``).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import hashlib
+import struct
+from dataclasses import dataclass, replace
+
+from toolkit.errors import TrustError
+from toolkit.trust.keys import Signer
+from toolkit.trust.merkle import HASH_BYTES
+from toolkit.trust.ssh import ED25519, BadSignatureError, PublicKey, check_raw
+
+_NOTE, _COSIGNATURE = b"\x01", b"\x04"
+_ID = 4  # bytes of a key's hash before the signature
+_SIGNATURE = 64  # bytes of an Ed25519 signature
+_DASH = "— "
+
+
+@dataclass(frozen=True, slots=True)
+class NoteSignature:
+    """One signature line: whose, the key's hash, and the bytes (of a witness with the time before them)."""
+
+    name: str
+    key_id: bytes
+    value: bytes
+
+    @property
+    def line(self) -> str:
+        """The line as it stands in a checkpoint."""
+        return f"{_DASH}{self.name} {base64.b64encode(self.key_id + self.value).decode()}\n"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checkpoint:
+    """Size and root of a log, by its name; ``signatures`` are held against keys by `signed_by`."""
+
+    origin: str
+    size: int
+    root: bytes
+    signatures: tuple[NoteSignature, ...] = ()
+
+    @property
+    def body(self) -> str:
+        """What is signed: name, size and root, a line each."""
+        return f"{self.origin}\n{self.size}\n{base64.b64encode(self.root).decode()}\n"
+
+    @property
+    def text(self) -> str:
+        """The checkpoint as a file has it."""
+        return self.body + "\n" + "".join(signature.line for signature in self.signatures)
+
+    def signed(self, name: str, signer: Signer) -> Checkpoint:
+        """Return the checkpoint with one more signature, of the log's own people."""
+        value = _raw(signer, self.body.encode())
+        signature = NoteSignature(name, key_id(name, signer.public, _NOTE), value)
+        return replace(self, signatures=(*self.signatures, signature))
+
+    def cosigned(self, name: str, signer: Signer, time: int) -> Checkpoint:
+        """Return the checkpoint with a witness's signature at a time (POSIX seconds)."""
+        value = struct.pack(">Q", time) + _raw(signer, _witnessed(self.body, time))
+        signature = NoteSignature(name, key_id(name, signer.public, _COSIGNATURE), value)
+        return replace(self, signatures=(*self.signatures, signature))
+
+    def signed_by(self, name: str, key: PublicKey) -> bool:
+        """Tell whether a key's owner signed this checkpoint under that name."""
+        return any(
+            _holds(key, signature.value, self.body.encode())
+            for signature in self._of(name, key_id(name, key, _NOTE))
+        )
+
+    def witnessed_at(self, name: str, key: PublicKey) -> int | None:
+        """Return the time (POSIX seconds) at which a witness signed; None where it did not."""
+        for signature in self._of(name, key_id(name, key, _COSIGNATURE)):
+            (time,) = struct.unpack(">Q", signature.value[:8])
+            if _holds(key, signature.value[8:], _witnessed(self.body, time)):
+                return int(time)
+        return None
+
+    def _of(self, name: str, key: bytes) -> list[NoteSignature]:
+        return [line for line in self.signatures if line.name == name and line.key_id == key]
+
+
+def parse_checkpoint(text: str, *, where: object = None) -> Checkpoint:
+    """Read a checkpoint.
+
+    Raises
+    ------
+    TrustError
+        ``checkpoint``: it is none
+    """
+    try:
+        body, signatures = text.split("\n\n", 1)
+        origin, size, root = body.split("\n")
+        value = base64.b64decode(root, validate=True)
+        lines = tuple(_signature(line) for line in signatures.splitlines())
+        whole = bool(origin) and size.isdecimal() and str(int(size)) == size and len(value) == HASH_BYTES
+        whole = whole and (not signatures or signatures.endswith("\n"))
+    except (ValueError, binascii.Error) as error:
+        raise _unreadable(text, where) from error
+    if not whole:
+        raise _unreadable(text, where)
+    return Checkpoint(origin=origin, size=int(size), root=value, signatures=lines)
+
+
+def _unreadable(text: str, where: object) -> TrustError:
+    return TrustError(
+        "a checkpoint cannot be read", where=where, got=text[:80],
+        expected="the log's name, its size and its root, a line each; a blank line; signatures",
+        next_step="take it again from the document, or from the witness", rule="checkpoint",
+    )  # fmt: skip
+
+
+def key_id(name: str, key: PublicKey, kind: bytes) -> bytes:
+    """Return the four bytes by which a signature line names its key (C2SP signed-note)."""
+    return hashlib.sha256(name.encode() + b"\n" + kind + key.raw).digest()[:_ID]
+
+
+def _signature(line: str) -> NoteSignature:
+    if not line.startswith(_DASH):
+        raise ValueError(line)
+    name, _, value = line.removeprefix(_DASH).partition(" ")
+    data = base64.b64decode(value, validate=True)
+    if not name or len(data) <= _ID:
+        raise ValueError(line)
+    return NoteSignature(name, data[:_ID], data[_ID:])
+
+
+def _witnessed(body: str, time: int) -> bytes:
+    return f"cosignature/v1\ntime {time}\n{body}".encode()
+
+
+def _raw(signer: Signer, data: bytes) -> bytes:
+    """Return the 64 bytes of an Ed25519 signature; the key's kind was asked for by `PublicKey.raw`."""
+    return signer.sign(data)[-_SIGNATURE:] if signer.public.raw else b""
+
+
+def _holds(key: PublicKey, value: bytes, data: bytes) -> bool:
+    signature = b"".join(struct.pack(">I", len(part)) + part for part in (ED25519.encode(), value))
+    try:
+        check_raw(key, signature, data)
+    except BadSignatureError:
+        return False
+    return True

@@ -1,0 +1,5 @@
+"""Seals of documents: PAdES in a PDF, XAdES in a digital calibration certificate.
+
+`x509` has keys, trusted certificates and the judgement of a signer; `pdf` and `xml` seal bytes and check
+them; `attachments` puts a proof into a PDF, `qr` on paper; `authority` makes certificates to try it with.
+"""

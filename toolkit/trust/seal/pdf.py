@@ -1,0 +1,263 @@
+"""PAdES: a PDF is sealed as a whole, and whoever changes or adds one byte breaks the seal.
+
+Sealing adds one revision: the attachments, the mark of PDF/A-3 where the file was PDF/A-2, the signature
+(ETSI EN 319 142-1, B-B, with a time stamp B-T). A sealed file has one signature, which covers all of it.
+Later revisions are never looked into: a file that has any is not the one that was sealed.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import io
+import logging
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+
+from toolkit.errors import TrustError
+from toolkit.trust.seal.attachments import attach, attachments_of
+from toolkit.trust.seal.check import Forged, SealCheck, Sealed, judged
+from toolkit.trust.seal.cms import demand_plain
+from toolkit.trust.seal.x509 import HASHES, Trust, load_certificate
+
+if TYPE_CHECKING:
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.sign.timestamps import TimeStamper
+
+    from toolkit.trust.seal.key import SealKey
+
+FIELD = "Seal"
+_RANGE = re.compile(rb"/ByteRange")
+_HEX = re.compile(rb"<(?:[0-9a-f]+|[0-9A-F]+)>")
+
+
+def seal_pdf(
+    data: bytes,
+    key: SealKey,
+    *,
+    reason: str,
+    attachments: Mapping[str, bytes] | None = None,
+    stamps: TimeStamper | None = None,
+) -> bytes:
+    """Return a PDF with its seal, an invisible signature that allows no change.
+
+    Parameters
+    ----------
+    reason : what the seal means, as readers show it
+    attachments : files that go into the PDF as associated data, by name; JSON by their ending
+    stamps : an RFC 3161 client of pyHanko; a server that does not answer is an error
+
+    Raises
+    ------
+    TrustError
+        ``seal``: no PDF that can be sealed, or one that has a seal already
+    """
+    from pyhanko.pdf_utils.misc import PdfError
+    from pyhanko.sign import PdfSignatureMetadata, PdfSigner
+    from pyhanko.sign.fields import MDPPerm, SigSeedSubFilter
+    from pyhanko.sign.general import SigningError
+    from pyhanko.sign.timestamps.common_utils import TimestampRequestError
+
+    try:
+        writer = _writer(data)
+        if writer.prev.embedded_signatures:
+            raise _unsealable("the PDF has a seal already", "a signature in the file", "a PDF without one")
+        attach(writer, attachments or {})
+        metadata = PdfSignatureMetadata(
+            field_name=FIELD, md_algorithm="sha256", subfilter=SigSeedSubFilter.PADES, certify=True,
+            docmdp_permissions=MDPPerm.NO_CHANGES, reason=reason, name=key.name,
+        )  # fmt: skip
+        sealed = io.BytesIO()
+        PdfSigner(metadata, _signer(key), timestamper=stamps).sign_pdf(writer, output=sealed)
+    except TimestampRequestError as error:
+        raise _unsealable(
+            "the time-stamp server gave no stamp", str(error), "an RFC 3161 response"
+        ) from error
+    except (PdfError, SigningError, OSError, ValueError) as error:
+        raise _unsealable("the PDF cannot be sealed", str(error), "a PDF that LibreOffice wrote") from error
+    return sealed.getvalue()
+
+
+def check_pdf(data: bytes, trust: Trust, *, now: dt.datetime | None = None) -> SealCheck:
+    """Return whether the seal of a PDF holds; nothing of the file is used but what the signature covers.
+
+    Raises
+    ------
+    TrustError
+        ``unreadable-document``: no PDF
+    """
+    if not data.startswith(b"%PDF-"):
+        raise TrustError(
+            "the file is no PDF", where="first bytes", got=repr(data[:8]), expected="%PDF-",
+            next_step="name the file as it was issued", rule="unreadable-document",
+        )  # fmt: skip
+    # What a library warns of in a damaged file is told by the check's own answer.
+    logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
+    try:
+        sealed = _signature(data, trust)
+    except Forged as error:
+        return SealCheck(signature="invalid", why=str(error))
+    if sealed is None:
+        return SealCheck(signature="unsigned", why="the PDF has no seal")
+    return judged(sealed, trust, now=now)
+
+
+def _signature(data: bytes, trust: Trust) -> Sealed | None:
+    from pyhanko.pdf_utils.misc import PdfError
+    from pyhanko.sign.general import UnacceptableSignerError
+    from pyhanko.sign.validation.errors import SignatureValidationError
+
+    try:
+        return _read(data, trust)
+    except Forged:
+        raise
+    except (PdfError, SignatureValidationError, UnacceptableSignerError) as error:
+        raise Forged(f"the file or its signature is damaged: {' '.join(str(error).split())[:200]}") from error
+    except Exception as error:
+        # Hostile bytes: what cannot be checked does not hold.
+        raise Forged(f"the file or its signature cannot be read: {type(error).__name__}") from error
+
+
+def _read(data: bytes, trust: Trust) -> Sealed | None:
+    from pyhanko.pdf_utils.reader import PdfFileReader
+    from pyhanko.sign.validation import validate_pdf_signature
+
+    reader = PdfFileReader(io.BytesIO(data), strict=True)
+    if reader.encrypted:
+        raise Forged("the PDF is encrypted")
+    signatures = reader.embedded_signatures
+    if not signatures:
+        if _RANGE.search(data):
+            raise Forged("a signature that no field refers to: the file was changed after it was sealed")
+        return None
+    if len(signatures) > 1:
+        raise Forged(f"{len(signatures)} signatures: only the last covers the file, and it is not the seal")
+    embedded = signatures[0]
+    demand_plain(_message(data, embedded))
+    if embedded.md_algorithm not in HASHES:
+        raise Forged(f"weak algorithm: the digest is {embedded.md_algorithm.upper()}")
+    status = validate_pdf_signature(
+        embedded, _only(embedded.signer_cert), _stamp_context(trust), skip_diff=True
+    )
+    if not status.intact:
+        raise Forged("the file was changed after it was sealed: its digest differs")
+    if not status.valid:
+        raise Forged("the signature was not made by the key of its certificate")
+    at, stamped = _time(embedded, status)
+    return Sealed(
+        signer=_certificate(embedded.signer_cert),
+        others=tuple(_certificate(c) for c in embedded.other_embedded_certs),
+        at=at,
+        stamped=stamped,
+        attachments=attachments_of(reader),
+    )
+
+
+def _message(data: bytes, embedded: Any) -> bytes:
+    """Return the signature's own bytes; everything else in the file must be what it covers."""
+    first, length, second, rest = (int(n) for n in embedded.byte_range)
+    if first != 0 or length <= 0 or second <= length or second + rest != len(data):
+        raise Forged(
+            f"the signature covers {length + rest} of {len(data)} bytes: something was added after it"
+        )
+    if len(_RANGE.findall(data)) != 1:
+        raise Forged("the file speaks of more than one signature")
+    contents = data[length:second]
+    if not _HEX.fullmatch(contents):
+        raise Forged("more than the signature itself lies outside of what it covers")
+    raw = bytes.fromhex(contents[1:-1].decode())
+    size = _der_length(raw)
+    if raw[size:].strip(b"\0") or raw != bytes(embedded.pkcs7_content):
+        raise Forged("bytes beside the signature were changed")
+    return raw[:size]
+
+
+def _der_length(raw: bytes) -> int:
+    if len(raw) < 2 or raw[0] != 0x30:
+        raise Forged("the signature is no CMS message")
+    if raw[1] < 0x80:
+        return 2 + raw[1]
+    count = raw[1] & 0x7F
+    size = int.from_bytes(raw[2 : 2 + count])
+    if not 1 <= count <= 4 or size < 0x80 or raw[2] == 0:
+        raise Forged("the signature is not in DER")
+    return 2 + count + size
+
+
+def _time(embedded: Any, status: Any) -> tuple[dt.datetime, bool]:
+    stamp = status.timestamp_validity
+    if stamp is not None:
+        if not (stamp.intact and stamp.valid):
+            raise Forged("the time stamp is not of this signature")
+        if stamp.trusted:
+            return stamp.timestamp, True
+    at = embedded.self_reported_timestamp
+    if at is None or at.tzinfo is None:
+        raise Forged("the signature states no time")
+    return at, False
+
+
+def _only(certificate: Any) -> Any:
+    """Return a context that trusts the signer itself: what is asked here is the signature, not the path."""
+    from pyhanko_certvalidator import ValidationContext
+
+    return ValidationContext(trust_roots=[certificate], allow_fetching=False, revocation_mode="soft-fail")
+
+
+def _stamp_context(trust: Trust) -> Any:
+    from asn1crypto import x509 as asn1
+    from pyhanko_certvalidator import ValidationContext
+
+    roots = [asn1.Certificate.load(c.public_bytes(Encoding.DER)) for c in trust.certificates]
+    return ValidationContext(trust_roots=roots, allow_fetching=False, revocation_mode="soft-fail")
+
+
+def _writer(data: bytes) -> IncrementalPdfFileWriter:
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+
+    class Writer(IncrementalPdfFileWriter):
+        """Stays PDF 1.7, which PDF/A-2 and 3 are made of."""
+
+        def ensure_output_version(self, version: tuple[int, int]) -> None:
+            super().ensure_output_version(min(version, (1, 7)))  # type: ignore[no-untyped-call]
+
+        def _update_meta(self) -> None:
+            """Leave the metadata alone: pyHanko would write its own, without the mark of PDF/A."""
+
+        def register_extension(self, ext: Any) -> None:
+            if ext.base_version == "/1.7":
+                super().register_extension(ext)
+
+    return Writer(io.BytesIO(data))
+
+
+def _signer(key: SealKey) -> Any:
+    from asn1crypto import keys
+    from asn1crypto import x509 as asn1
+    from pyhanko.sign.signers import SimpleSigner
+    from pyhanko_certvalidator.registry import SimpleCertificateStore
+
+    chain = [asn1.Certificate.load(c.public_bytes(Encoding.DER)) for c in key.chain]
+    private = key.private.private_bytes(Encoding.DER, PrivateFormat.PKCS8, NoEncryption())
+    store = SimpleCertificateStore()
+    store.register_multiple(chain[1:])
+    return SimpleSigner(
+        signing_cert=chain[0],
+        signing_key=keys.PrivateKeyInfo.load(private),
+        cert_registry=store,
+        embed_roots=False,
+    )
+
+
+def _certificate(part: Any) -> x509.Certificate:
+    return load_certificate(part.dump())
+
+
+def _unsealable(what: str, got: str, expected: str) -> TrustError:
+    return TrustError(
+        what, where="PDF", got=" ".join(got.split())[:200], expected=expected,
+        next_step="nothing was sealed; issue the document again", rule="seal",
+    )  # fmt: skip
