@@ -1,6 +1,6 @@
 """A report with 30 figures and 20 tables, made as a whole process: `python -m tests.benchmarks.full_report`.
 
-A figure or table stands once in a body, and a test has eleven and thirteen: the others are copies under
+REPORT_FIGURES=300 in the environment makes it as long. A figure or table stands once in a body, and a test has eleven and thirteen: the others are copies under
 names of their own, in a vocabulary made for the purpose.
 """
 
@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import os
 import sys
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-FIGURES, TABLES = 30, 20
+FIGURES, TABLES = int(os.environ.get("REPORT_FIGURES", "30")), 20
 TEMPLATES = Path(__file__).resolve().parents[2] / "report_templates"
 
 
