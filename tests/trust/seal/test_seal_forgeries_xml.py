@@ -37,7 +37,8 @@ C14N11 = "http://www.w3.org/2006/12/xml-c14n11"
 
 def _checked(data: bytes, trusted: Trust | None = None) -> SealCheck:
     try:
-        return check_xml(data, trusted or trust(), now=NOW + dt.timedelta(minutes=10))
+        # signxml stamps the hour of the day itself: a run of many minutes is past the factory's NOW
+        return check_xml(data, trusted or trust(), now=dt.datetime.now(dt.UTC) + dt.timedelta(minutes=10))
     except TrustError as error:
         return SealCheck(signature="invalid", why=str(error))
 
