@@ -67,6 +67,16 @@ def test_a_file_whose_worker_was_killed_by_somebody_else_is_read_by_the_next(tmp
     assert dict(run_isolated(once, [name], workers=1)) == {name: name.upper()}
 
 
+def test_workers_start_under_a_limit_of_memory_that_is_lower_than_theirs():
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))\n"
+        "from tests.audit.worker_jobs import make\nfrom toolkit.audit.workers import run_isolated\n"
+        "if __name__ == '__main__': print(dict(run_isolated(make, ['a', 'b'], workers=1)))"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert ended.stdout.strip() == "{'a': 'A', 'b': 'B'}", ended.stderr
+
+
 def test_nothing_to_do_starts_nothing():
     assert list(run_isolated(make, [], workers=2)) == []
 

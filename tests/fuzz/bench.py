@@ -188,7 +188,9 @@ def run_target(
     while number < numbers.stop and time.monotonic() < until:
         ours, theirs = context.Pipe()
         process = context.Process(
-            target=_serve, args=(name, seed, range(number, numbers.stop), until, theirs), daemon=True
+            # No daemon: an audit has workers of its own.
+            target=_serve,
+            args=(name, seed, range(number, numbers.stop), until, theirs),
         )
         process.start()
         theirs.close()

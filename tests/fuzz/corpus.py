@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from tests.calibration.dcc.dcc_factory import plain_dcc
 from tests.diagnosis.cases import HEAD, SIMULATOR, TWO, carriage, write_case
+from tests.house.pages import formats
 from tests.recording import format_factory
 from tests.recording.workbook_factory import workbook
+from tests.trust.seal.seal_factory import authority, key, sealed_pdf
+from toolkit.declared import read, starter, table_of
+from toolkit.declared.declaration import form_of
+from toolkit.declared.describe import _forms, _sections
+from toolkit.declared.kinds import AnyKind
+from toolkit.declared.lists import KeyedKind, ListKind
+from toolkit.trust.seal.xml import seal_xml
 
 ROOT = Path(__file__).resolve().parents[2]
 VIRTUAL = ROOT / "toolkit" / "examples" / "virtual"
@@ -143,6 +153,122 @@ def _answer() -> Mapping[str, bytes]:
     return {"diagnosis.json": json.dumps(answer).encode()}
 
 
+@cache
+def _model() -> Mapping[str, bytes]:
+    """A case on a model file: the carriage with a drag that an answer added to it."""
+    files = _case()
+    head, rest = files["CASE.toml"].decode().split("[simulation]")
+    parameters = rest[rest.index("\n[") :]
+    model = MODEL.format(case=_sha(files["CASE.toml"]), run=_sha(files["r0.csv"]), code=_sha(files["sim.py"]))
+    again = f'{head}[simulation]\nmodel = "model.toml"\n{parameters}'
+    return files | {"model.toml": model.encode(), "AGAIN.toml": again.encode()}
+
+
+def _sha(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+MODEL = """schema = 1
+content = "augmented simulation"
+title = "A carriage"
+code_version = "0.1.0"
+axes = "machine"
+time = "t"
+nominal_load_N = 4000.0
+
+[answer]
+verdict = "named"
+remaining = "nothing"
+complete = true
+case = "CASE.toml"
+case_sha256 = "{case}"
+recordings = {{ "r0.csv" = "{run}" }}
+
+[simulation]
+kind = "python"
+path = "sim.py"
+function = "simulate"
+
+[simulation.sha256]
+path = "{code}"
+
+[simulation.parameters.mass]
+value = 94.0
+unit = "kg"
+standard_error = 4.6
+bounds = [80.0, 110.0]
+
+[simulation.parameters.c]
+value = 210.0
+unit = "N*s/m"
+standard_error = 40.0
+
+[channels]
+t = {{ unit = "s", role = "time" }}
+v = {{ unit = "m/s", role = "input" }}
+a = {{ unit = "m/s^2", role = "input" }}
+F = {{ unit = "N", role = "output" }}
+
+[[effect]]
+name = "quadratic_drag"
+stage = "dynamics"
+statement = "Drag is missing: a force with the square of the velocity."
+equation = "m a = ... - drag * v|v|"
+channel = "F"
+
+[effect.parameters.drag]
+value = 800.0
+unit = "N/(m/s)^2"
+standard_error = 20.0
+"""
+
+
+@cache
+def _audited() -> Mapping[str, bytes]:
+    """A folder of recordings that was audited, with what the next run goes on from."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        for name, data in {**REGISTRY, "archive/run.csv": _recordings()["run.csv"]}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_bytes(data)
+        where = ("--calibrations", root / "calibrations", "--out", root / "out")
+        _run("audit", root / "archive", *where, "--workers", 1)
+        return _folder_of(root)
+
+
+@cache
+def _watched() -> Mapping[str, bytes]:
+    """An inbox that was watched: its one test is set aside, as it has no recording."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        files = {**REGISTRY, "inbox/a/test.toml": _test()["test.toml"]}
+        for name, data in files.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_bytes(data)
+        _run("watch", root / "inbox", *WATCH, "--calibrations", root / "calibrations", "--out", root / "out")
+        return _folder_of(root)
+
+
+WATCH = ("--once", "--interval", "0.05", "--settle", "0", "--patience", "0")
+
+
+@cache
+def _sealed() -> Mapping[str, bytes]:
+    """What a laboratory issued and what its standard came with, and whom the home trusts."""
+    manifest = {
+        "schema": 1,
+        "outputs": [{"name": "sealed.pdf", "sha256": _sha(sealed_pdf())}],
+        "records": [{"id": "m15-r2", "sha256": "0" * 64}],
+    }
+    return {
+        "sealed.pdf": sealed_pdf(),
+        "standard.xml": seal_xml(plain_dcc(), key()),
+        "manifest.json": json.dumps(manifest).encode(),
+        "trust/certificates/root.pem": authority().pem,
+        **REGISTRY,
+    }
+
+
 def _file(path: Path, name: str = "", **beside: bytes) -> Callable[[], Mapping[str, bytes]]:
     return lambda: {
         name or path.name: path.read_bytes(),
@@ -166,10 +292,41 @@ def _read_case(folder: Path) -> object:
     return read_case(folder / "CASE.toml")
 
 
+def _read_again(folder: Path) -> object:
+    from toolkit.diagnosis.case.reader import read_case
+
+    return read_case(folder / "AGAIN.toml")
+
+
 def _read_reports(folder: Path) -> object:
     from toolkit.audit.linked import read_reports
 
     return read_reports(folder / "reports.csv")
+
+
+def _read_declared(cls: type) -> Callable[[Path], object]:
+    return lambda folder: read(cls, folder / "file.toml")
+
+
+def _names_of_tables(cls: type) -> Iterator[str]:
+    """The entries below which a file has names of its own, or anything."""
+    for _, table in _sections(table_of(cls), "", set()):
+        for field in table.fields:
+            kinds = (kind.item if isinstance(kind, ListKind) else kind for kind in _forms(field.kind))
+            if any(isinstance(kind, KeyedKind | AnyKind) for kind in kinds):
+                yield field.key
+
+
+def _declared(cls: type) -> Target:
+    """The file of a declaration: its starter, read as the declaration reads it."""
+    return Target(
+        name=f"file {form_of(cls).title}",
+        kind="tree",
+        file="file.toml",
+        files=_text("file.toml", starter(cls)),
+        command=_read_declared(cls),
+        free=tuple(_names_of_tables(cls)),
+    )
 
 
 def _read_answer(folder: Path) -> object:
@@ -368,6 +525,60 @@ TARGETS = (
         files=_text("reports.csv", REPORTS),
         command=_read_reports,
     ),
+    Target(
+        name="model",
+        kind="tree",
+        file="model.toml",
+        files=_model,
+        command=("simulate", "model.toml", "--inputs", "r0.csv", "--out", "out"),
+        free=("parameters", "channels", "recordings", "sha256", "numerics"),
+    ),
+    Target(
+        name="model-case",
+        kind="tree",
+        file="AGAIN.toml",
+        files=_model,
+        command=_read_again,
+        free=("parameters", "channels", "run"),
+    ),
+    *(
+        Target(
+            name=name,
+            kind="text",
+            file=f"out/{name}.jsonl",
+            files=_audited,
+            command=("audit", "archive", "--calibrations", "calibrations", "--out", "out", "--workers", "1"),
+        )
+        for name in ("results", "sums")
+    ),
+    Target(
+        name="watch-state",
+        kind="tree",
+        file="out/watch.json",
+        files=_watched,
+        command=("watch", "inbox", *WATCH, "--calibrations", "calibrations", "--out", "out"),
+        free=("",),
+    ),
+    *(
+        Target(
+            name=name,
+            kind=kind,
+            file=name,
+            files=_sealed,
+            sealed=True,
+            command=("verify", name, "--home", "."),
+        )
+        for name, kind in (("sealed.pdf", "binary"), ("standard.xml", "text"))
+    ),
+    Target(
+        name="manifest.json",
+        kind="tree",
+        file="manifest.json",
+        files=_sealed,
+        command=("verify", "manifest.json", "--home", "."),
+        free=("",),
+    ),
+    *map(_declared, formats()),
     *(_recording(name, "text") for name in ("run.csv", "semicolon.csv", "run.lvm", "german.lvm")),
     *(_recording(name, "binary") for name in ("run.tdms", "run.mat", "table.mat", "run.mf4", "packed.mf4")),
     _recording("run.xlsx", "zip"),

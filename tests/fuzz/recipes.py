@@ -20,4 +20,6 @@ RECIPES = (
     ("test", '[["set", ["tare", "values", "E5"], "far"]]'),
     # The same in a recording.
     ("run.csv", '[["word", 3, 0, "1.7e308"]]'),
+    # A state of a watch with a list where a text stands.
+    ("watch-state", '[["set", ["tests", "a", "rule"], "numbers"]]'),
 )

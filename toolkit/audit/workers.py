@@ -216,8 +216,10 @@ def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> Non
     import resource
     import signal
 
+    from toolkit.worker.posix import lower_limit
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends its workers
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    lower_limit(resource.RLIMIT_AS, MEMORY_BYTES)
     work = make()
     # What is there now stays, and a file leaves hardly any cycles that would have to be looked for.
     gc.freeze()

@@ -10,11 +10,12 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
+from toolkit.declared import Entry, plain, read_text
 from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import RESULT_FILE, read_regular
@@ -64,6 +65,35 @@ class Round:
     made: tuple[MadeReport, ...]
     waiting: tuple[Waiting, ...]
     set_aside: tuple[Aside, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """What became of a test, as the state keeps it: of which content, by which toolkit and settings."""
+
+    state: Literal["made", "set-aside"]
+    content: str
+    rule: str | None = None
+    reason: str | None = None
+    version: str | None = None
+    registry: str | None = None
+    settings: str | None = None
+    report: str | None = None
+    content_sha256: str | None = None
+    units: tuple[str, ...] = ()
+
+    def aside(self, test: str) -> Aside:
+        """Return the test as one that stands aside."""
+        return Aside(test=test, rule=self.rule or "error", reason=self.reason or "")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WatchState:
+    """``watch.json``: every test of a watched folder that was judged."""
+
+    generator: Literal["toolkit"]
+    schema: Literal[1]
+    tests: Annotated[Mapping[str, Judged], Entry("by their folder below the watched one")]
 
 
 class Watcher:
@@ -140,10 +170,10 @@ class Watcher:
             except OSError as error:
                 waiting.append(Waiting(test=name, reason=f"a file cannot be read yet: {error.strerror}"))
                 continue
-            before_that = self.state.get(name, {})
-            if before_that.get("content") == content and not self._refused_otherwise(before_that):
-                if before_that.get("state") == SET_ASIDE:
-                    aside.append(_stands_aside(name, before_that))
+            earlier = self.state.get(name)
+            if earlier is not None and earlier.content == content and not self._refused_otherwise(earlier):
+                if earlier.state == SET_ASIDE:
+                    aside.append(earlier.aside(name))
                 continue
             waited = self.waited.get(name)
             if waited is not None and waited[0] == content and age < self.patience_s:
@@ -218,13 +248,13 @@ class Watcher:
                 delivered.append(report)
                 self.unwritten.pop(self._note(name), None)
                 self._note(name).unlink(missing_ok=True)
-                self.state[name] = {
-                    "state": "made",
-                    "content": contents[report.test],
-                    "report": str(report.outcome.pdf),
-                    "content_sha256": report.outcome.content_sha256,
-                    "units": list(report.outcome.units),
-                }
+                self.state[name] = Judged(
+                    state="made",
+                    content=contents[report.test],
+                    report=str(report.outcome.pdf),
+                    content_sha256=report.outcome.content_sha256,
+                    units=tuple(report.outcome.units),
+                )
         self._save()
         return delivered
 
@@ -265,44 +295,39 @@ class Watcher:
             file_name = f"{file_name[:40]}-{sha256_bytes(name.encode())[:16]}"
         return self.out / SET_ASIDE / f"{file_name}.txt"
 
-    def _refused_otherwise(self, entry: dict[str, Any]) -> bool:
+    def _refused_otherwise(self, entry: Judged) -> bool:
         """Tell whether a test was refused by another toolkit or under other settings.
 
         Nothing may be wrong with it then. A state of before versions were noted is an older toolkit's.
         """
-        if entry.get("state") != SET_ASIDE:
+        if entry.state != SET_ASIDE:
             return False
-        if entry.get("rule") in _NOT_IN_FORCE and entry.get("registry") != self.heads:
+        if entry.rule in _NOT_IN_FORCE and entry.registry != self.heads:
             return True
-        return entry.get("version") != self.version or entry.get("settings", self.settings) != self.settings
+        return entry.version != self.version or entry.settings not in (None, self.settings)
 
     def _set_aside(self, fault: Aside, content: str, *, by: str | None = None) -> None:
         from toolkit.recording.marks import OWN_OUTPUT
 
-        self.state[fault.test] = {
-            "state": SET_ASIDE,
-            "content": content,
-            "rule": fault.rule,
-            "reason": fault.reason,
-            "version": self.version,
-            **({"registry": self.heads} if fault.rule in _NOT_IN_FORCE else {}),
-            **({} if by is None else {"settings": by}),
-        }
+        self.state[fault.test] = Judged(
+            state="set-aside",
+            content=content,
+            rule=fault.rule,
+            reason=fault.reason,
+            version=self.version,
+            registry=self.heads if fault.rule in _NOT_IN_FORCE else None,
+            settings=by,
+        )
         self._write(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")
         self.unsaved = True
 
-    def _load(self) -> dict[str, dict[str, Any]]:
+    def _load(self) -> dict[str, Judged]:
         path = self.out / STATE
         if not path.is_file():
             return {}
         try:
-            state = json.loads(read_regular(path, RESULT_FILE))
-            tests = state["tests"]
-            if state["generator"] != "toolkit" or not all(
-                isinstance(entry, dict) for entry in tests.values()
-            ):
-                raise ValueError("not a state of toolkit watch")  # noqa: TRY301  one message for every fault
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            return dict(read_text(WatchState, read_regular(path, RESULT_FILE), where=path).tests)
+        except (OSError, ToolkitError) as error:
             raise OutputError(
                 "the state of the watch cannot be read",
                 where=path,
@@ -311,12 +336,11 @@ class Watcher:
                 next_step="delete it: every test is reported anew, the same reports replace the old ones",
                 rule="original",
             ) from error
-        return dict(tests)
 
     def _save(self) -> None:
         self.unsaved = False
-        document = {"generator": "toolkit", "schema": 1, "tests": dict(sorted(self.state.items()))}
-        self._write(self.out / STATE, json.dumps(document, ensure_ascii=False, indent=2) + "\n")
+        state = WatchState(generator="toolkit", schema=1, tests=dict(sorted(self.state.items())))
+        self._write(self.out / STATE, json.dumps(plain(state), ensure_ascii=False, indent=2) + "\n")
 
     def _write(self, path: Path, text: str) -> None:
         """Write a file of the watch's own; on a full disk it is written at a later look, and said to wait."""
@@ -327,10 +351,6 @@ class Watcher:
             write_result(path, text)
         except OutputError as error:
             self.unwritten[path] = (text, str(error))
-
-
-def _stands_aside(name: str, entry: dict[str, Any]) -> Aside:
-    return Aside(test=name, rule=str(entry.get("rule", "error")), reason=str(entry.get("reason", "")))
 
 
 def _content(test: Path, listing: Listing) -> str:

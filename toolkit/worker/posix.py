@@ -148,6 +148,13 @@ def _guard(limits: Limits, ends: list[int], scratch: str) -> None:
     _say(ends[2], {"status": ended, "reason": reason})
 
 
+def lower_limit(kind: int, limit: int) -> None:
+    """Set a limit of this process for good, unless it has a lower one already."""
+    hard = resource.getrlimit(kind)[1]
+    least = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+    resource.setrlimit(kind, (least, least))
+
+
 def _be_worker(limits: Limits, ends: list[int], wall: Callable[[], None] | None) -> NoReturn:
     from toolkit.worker.serve import serve
 
@@ -162,9 +169,7 @@ def _be_worker(limits: Limits, ends: list[int], wall: Callable[[], None] | None)
             (resource.RLIMIT_CORE, 0),
             (resource.RLIMIT_NPROC, _threads_of_user() + _UNSEEN * limits.processes),
         ):
-            hard = resource.getrlimit(kind)[1]
-            least = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-            resource.setrlimit(kind, (least, least))
+            lower_limit(kind, limit)
         serve(ends[0], wall)
     finally:
         os._exit(1)
