@@ -1,4 +1,4 @@
-"""Reports in numbers: many figures and tables (`full_report`), ten in one command against ten, and peak memory."""
+"""Reports in numbers: many figures (`full_report`), ten in one command against ten, and peak memory."""
 
 from __future__ import annotations
 

@@ -166,13 +166,13 @@ def test_the_worker_ends_with_the_tool(tmp_path, sent):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     waits = f"open({str(tmp_path / 'begun')!r}, 'w').close(); time.sleep(600)\n    "
     case = write_case(tmp_path, simulator=START + waits + GOOD)
-    command = [sys.executable, "-c", "from toolkit.cli.main import run; run()", "diagnose", case]
+    # A shell's background job ignores the interrupt, and so does every process that it starts.
+    hears = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    command = [sys.executable, "-c", f"{hears}; from toolkit.cli.main import run; run()", "diagnose", case]
     with subprocess.Popen(
         [*command, "--out", tmp_path / "answer"],
         env={**os.environ, mark: "1"},
         stderr=subprocess.PIPE,
-        # A shell's background job ignores the interrupt, and so does every process that it starts.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as process:
         while not (tmp_path / "begun").exists() and process.poll() is None:
             time.sleep(0.02)
