@@ -1,6 +1,6 @@
 """A report with 30 figures and 20 tables, made as a whole process: `python -m tests.benchmarks.full_report`.
 
-REPORT_FIGURES=300 in the environment makes it as long. A figure or table stands once in a body, and a test has
+REPORT_FIGURES=300 in the environment makes it as long. A figure or table stands once in a body; a test has
 eleven and thirteen: the others are copies under names of their own, in a vocabulary made for the purpose.
 """
 
