@@ -20,7 +20,7 @@ from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.registry.people_log import PeopleLog, read_people
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.refit_many import reproducing
-from toolkit.calibration.registry.signatures import revoked, unproved
+from toolkit.calibration.registry.signatures import revoked, signature_line, unproved
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.registry.stored import bad_record as _bad
@@ -143,6 +143,23 @@ class Registry:
     def head(self, instrument: str) -> str:
         """Return the hash of the ledger's last line, to be printed on what leaves the laboratory."""
         return self.ledger(instrument).head
+
+    def signature(self, record_id: str) -> str:
+        """Return who signed the decisions that a record rests on, ``unsigned`` where somebody did not.
+
+        Raises
+        ------
+        RegistryError
+            the ledger is damaged
+        """
+        return self.signatures(instrument_of(record_id), record_id)[record_id]
+
+    def signatures(self, instrument: str, *records: str) -> dict[str, str]:
+        """Return the signatures of some records, default all, by id: the ledger read once."""
+        ledger, history = self._sound(instrument), self.people().history
+        return {
+            record_id: signature_line(ledger, history, record_id) for record_id in records or ledger.entered()
+        }
 
     def digest(self, instrument: str) -> str:
         """Return a hash of everything that decides about this instrument's records: every file there."""
