@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tests.calibration.registry.test_signatures import RECORD, _found, _registry, _withdraw, home
+from tests.calibration.calibration_factory import hub_data
+from tests.calibration.registry.test_signatures import (
+    KEYS,
+    RECORD,
+    _found,
+    _people,
+    _registry,
+    _withdraw,
+    home,
+)
+from toolkit.calibration.control.calibrate import rehearse
 from toolkit.calibration.registry import store
+from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.issuing import issue, issuer
+from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError, RegistryError, TrustError
 
@@ -68,6 +83,35 @@ def test_a_document_that_does_not_know_the_last_decision_is_not_issued(home: Pat
     assert _registry(home).head("m15-virtual") == before
 
 
+def test_an_issue_changes_nothing_that_an_audit_rests_on_and_a_lost_key_does(home: Path) -> None:
+    _found(home)
+    before = _registry(home).digest("m15-virtual")
+    _issue(_registry(home, "anna"))
+    assert _registry(home).digest("m15-virtual") == before
+    people = _people()
+    enrol(home / "calibrations", people, [KEYS["ben"]], by="ben", reason="again", heads={})
+    assert _registry(home).digest("m15-virtual") == before
+    anna = people.person[0]
+    lost = replace(anna, keys=(replace(anna.keys[0], until="2026-01-01T00:00:00Z"),))
+    enrol(home / "calibrations", people.with_person(lost), [KEYS["ben"]], by="ben", reason="lost", heads={})
+    changed = _registry(home).digest("m15-virtual")
+    assert changed != before
+    _withdraw(home, "ben")
+    assert _registry(home).digest("m15-virtual") != changed
+
+
+def test_a_session_can_be_tried_where_lines_are_signed(
+    tmp_path: Path, make_session: Callable[..., Path]
+) -> None:
+    (tmp_path / "calibrations").mkdir()
+    _found(tmp_path)
+    calibrate(make_session(), _registry(tmp_path, "carl"))
+    before = _registry(tmp_path).digest("hub")
+    tried = rehearse(make_session(hub_data(40, 5), name="second", date="2026-02-05"), _registry(tmp_path))
+    assert tried.record.id == "hub-r2"
+    assert _registry(tmp_path).digest("hub") == before
+
+
 @pytest.mark.parametrize("failing", range(1, 5))
 def test_a_failure_between_signature_and_entry_leaves_neither(
     home: Path, failing: int, monkeypatch: pytest.MonkeyPatch
@@ -91,3 +135,15 @@ def test_a_failure_between_signature_and_entry_leaves_neither(
         assert _registry(home).ledger("m15-virtual") == before
     else:
         assert _issue(_registry(home, "anna")) == len(calls) == 3
+
+
+def test_proving_a_record_costs_less_than_five_milliseconds(home: Path) -> None:
+    """Two decisions a record; the processor's time, so that a busy machine changes nothing."""
+    _found(home)
+    decided = _registry(home).ledger("m15-virtual").decided
+    for _ in range(20):
+        issue(_registry(home, "anna"), RECORD, DOCUMENT, decided=decided)
+    started = time.process_time()
+    for _ in range(5):
+        assert _registry(home).ledger("m15-virtual").damage is None
+    assert 2 * (time.process_time() - started) / (5 * 20) < 0.005

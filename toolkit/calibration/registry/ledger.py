@@ -155,6 +155,12 @@ def head_bytes(count: int, digest: str) -> bytes:
     return (canonical({"count": count, "sha256": digest}) + "\n").encode()
 
 
+def decisions(lines: bytes) -> bytes:
+    """Return a ledger's lines without those of issued documents, what is unreadable among them."""
+    # Of canonical JSON, in which a quotation mark within a text is escaped.
+    return b"\n".join(line for line in lines.split(b"\n") if b'"event":"issued"' not in line)
+
+
 def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:
     """Parse a ledger's bytes; entries end before the first damaged line."""
     entries: list[Entry] = []

@@ -16,8 +16,8 @@ from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.registry.clock import today
-from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
-from toolkit.calibration.registry.people_log import PeopleLog, read_people
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, decisions
+from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, read_people
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.refit_many import reproducing
 from toolkit.calibration.registry.signatures import revoked, signature_line, unproved
@@ -31,6 +31,7 @@ from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
 from toolkit.trust.decisions import Signing
 from toolkit.trust.keys import Signer
+from toolkit.trust.people import History
 
 _AT_ONCE = 200
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
@@ -69,12 +70,22 @@ class Registry:
 
     ``lock_file``: writers keep each other out by a file, for a file system without locks. ``signers``: the
     keys that sign what is decided through this object; a laboratory without people needs none.
+    ``rehearses``: this is a copy of that registry, to be thrown away: its lines are judged there, and nobody
+    signs what is tried here.
     """
 
-    def __init__(self, folder: Path, *, lock_file: bool = False, signers: Sequence[Signer] = ()) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        lock_file: bool = False,
+        signers: Sequence[Signer] = (),
+        rehearses: Registry | None = None,
+    ) -> None:
         self.folder = folder
         self.lock_file = lock_file
         self.signers = tuple(signers)
+        self.rehearses = rehearses
         self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
 
     def instruments(self) -> tuple[str, ...]:
@@ -108,7 +119,7 @@ class Registry:
         TrustError
             ``people-log``
         """
-        return read_people(self.folder)
+        return read_people(self.folder) if self.rehearses is None else PeopleLog(history=History(), heads={})
 
     def commit(self, instrument: str, build: Callable[[Ledger], Change | None]) -> bool:
         """Make one change to an instrument's folder, signed where people are enrolled (`store.commit`).
@@ -130,6 +141,9 @@ class Registry:
     def _judged(self, instrument: str, ledger: Ledger, people: PeopleLog) -> Ledger:
         if ledger.damage is not None:
             return ledger
+        if self.rehearses is not None:
+            judged = self.rehearses.ledger(instrument)
+            return replace(ledger, damage=judged.damage, void=judged.void)
         version = people.history.now
         key = (instrument, ledger.head, "" if version is None else version.sha256)
         if key not in self._proved:
@@ -162,9 +176,16 @@ class Registry:
         }
 
     def digest(self, instrument: str) -> str:
-        """Return a hash of everything that decides about this instrument's records: every file there."""
-        files = settled.settled_files(self.folder / instrument)
-        return sha256_bytes("\n".join(f"{name} {sha256_bytes(data)}" for name, data in files).encode())
+        """Return a hash of everything that decides about this instrument's records: files, decisions, people.
+
+        Of the ledger it takes what was decided: that a document was issued changes no record.
+        """
+        people = self.people().history.now
+        parts = [] if people is None else [f"{FOLDER} {people.sha256}"]
+        for name, data in settled.settled_files(self.folder / instrument):
+            if name != HEAD:
+                parts.append(f"{name} {sha256_bytes(decisions(data) if name == LEDGER else data)}")
+        return sha256_bytes("\n".join(parts).encode())
 
     def load(self, record_id: str) -> CalibrationRecord:
         """Return a record that passes every load-time gate.
