@@ -138,6 +138,9 @@ DATA_FILE = Form(
     next_step="correct its name in the session; nothing was written",
 )
 PDF_FILE = Form(title="the PDF", limit=512 * MIB, reason="a report of a thousand figures has half of it")
+DCC_FILE = Form(
+    title="the digital certificate", limit=32 * MIB, reason="a certificate of many loads has 1 MB"
+)
 CERTIFICATE_FILE = Form(
     title="a key or certificate",
     limit=4 * MIB,

@@ -24,14 +24,22 @@ office_needed = pytest.mark.skipif(
 
 
 @pytest.fixture
-def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
+def calibrations(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The records of the checkout, in a home of their own: a certificate is an entry of its ledger."""
+    home = tmp_path_factory.mktemp("home")
+    shutil.copytree(CHECKOUT / "calibrations", home / "calibrations")
+    return home / "calibrations"
+
+
+@pytest.fixture
+def run(tmp_path: Path, calibrations: Path, capsys: pytest.CaptureFixture[str]) -> Run:
     root = typer.Typer()
     root.command("certificate")(calibration_results.certificate)
     root.command("other")(lambda: 0)
 
     def call(*words: object) -> tuple[int, dict[str, Any]]:
         arguments = ["certificate", *map(str, words), "--out", str(tmp_path / "out"), "--json"]
-        arguments += ["--calibrations", str(CHECKOUT / "calibrations")]
+        arguments += ["--calibrations", str(calibrations)]
         try:
             code = root(args=arguments, standalone_mode=False)
         except ToolkitError as error:

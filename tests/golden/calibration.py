@@ -146,12 +146,17 @@ def certificates(place: Workplace) -> Any:
     room = place.room("budget")
     _entered(room, SESSIONS["budget"], "hub-r1")
     return {
-        FITTED: _certificate(place, FITTED, template, CALIBRATIONS),
+        FITTED: _certificate(place, FITTED, template, _own(folder)),
         "hub-r1": _certificate(place, "hub-r1", template, room.folder / "calibrations"),
         "m15-r2": place.packaged(
             "calibration", "certificate", "m15-r2", "--template", template, "--out", "none"
         ),
     }
+
+
+def _own(folder: Path) -> Path:
+    """Return the packaged records in a folder of their own: a certificate is an entry of its ledger."""
+    return Path(shutil.copytree(CALIBRATIONS, folder / "calibrations"))
 
 
 def _certificate(place: Workplace, record: str, template: Path, registry: Path) -> dict[str, Any]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from toolkit.errors import TrustError
-from toolkit.trust.anchor import anchor_of, compare, parse_anchor
+from toolkit.trust.anchor import MOST_BYTES, Anchor, anchor_of, compare, parse_anchor, parse_compact
 from toolkit.trust.checkpoint import Checkpoint
+from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import leaf_hash, root_of
+from toolkit.trust.ssh import public_of, sign_with
 
 LINES = [f'{{"seq":{number}}}' for number in range(1, 14)]
 
@@ -78,3 +81,43 @@ def test_a_damaged_proof_is_refused(entries: dict[str, object]) -> None:
     sound = anchor_of(LINES, 2, _checkpoint(LINES)).as_dict()
     with pytest.raises(TrustError):
         parse_anchor({**sound, **entries} if entries else {})
+
+
+@pytest.mark.parametrize("index", range(len(LINES)))
+def test_what_a_telephone_reads_is_the_same_proof_without_the_line(index: int) -> None:
+    anchor = anchor_of(LINES, index, _checkpoint(LINES))
+    again = parse_compact(anchor.compact.decode())
+    assert again.proved
+    assert (again.leaf, again.path, again.line) == (leaf_hash(LINES[index].encode()), anchor.path, None)
+    assert compare(LINES, again.checkpoint, again).continuity == "continues"
+    rewritten = [*LINES[:index], "{}", *LINES[index + 1 :]]
+    assert f"entry {index + 1} was rewritten" in compare(rewritten, again.checkpoint, again).why
+
+
+def test_the_proof_of_a_ledger_of_a_million_entries_signed_by_three_people_fits() -> None:
+    checkpoint = Checkpoint(origin="toolkit/m15-virtual", size=2**20, root=bytes(32))
+    for name in ("anna", "a-person-of-long-name", "ben"):
+        private = Ed25519PrivateKey.generate()
+        signer = Signer(public_of(private), lambda data, private=private: sign_with(private, data))
+        checkpoint = checkpoint.signed(name, signer)
+    anchor = Anchor(leaf=bytes(32), index=2**20 - 1, path=(bytes(32),) * 20, checkpoint=checkpoint)
+    assert len(anchor.compact) <= MOST_BYTES == 2048
+    with pytest.raises(TrustError) as caught:
+        _ = Anchor(leaf=bytes(32), index=0, path=(bytes(32),) * 40, checkpoint=checkpoint).compact
+    assert caught.value.rule == "proof-size"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("toolkit-proof@v1", "toolkit-proof@v2"),
+        ("v1 3", "v1 -3"),
+        ("v1 3", "v1"),
+        ("=\n", "\n"),
+        ("m15\n", ""),
+    ],
+)
+def test_a_damaged_text_of_a_code_is_refused(old: str, new: str) -> None:
+    text = anchor_of(LINES, 3, _checkpoint(LINES)).compact.decode()
+    with pytest.raises(TrustError):
+        parse_compact(text.replace(old, new, 1))

@@ -155,7 +155,11 @@ def import_record(
     )
     record, existing = import_legacy(file, registry, again=again)
     path = registry.folder / record.instrument / f"{record.id}.json"
-    payload = {**record_row(record, registry.status(record.id)), "existing": existing, "path": str(path)}
+    payload = {
+        **record_row(record, registry.status(record.id), registry.signature(record.id)),
+        "existing": existing,
+        "path": str(path),
+    }
     text = (
         f"{record.id}  unverified legacy import" + ("  (already entered)" if existing else "") + f"\n"
         f"sha256 {record.sha256}\nnext: toolkit calibration approve {record.id} --in-force-from DATE "

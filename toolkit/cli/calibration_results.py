@@ -15,13 +15,16 @@ from toolkit.cli.console import (
     Id,
     Json,
     KnownAt,
+    LockFile,
     Quiet,
     Seal,
+    Sign,
     TimeStamp,
     answer,
     ask_passphrase,
     day,
     exit_code,
+    open_signers,
     progress,
 )
 
@@ -95,6 +98,8 @@ def certificate(
     draft: Annotated[
         bool, typer.Option("--draft", help="Allow a record that is not approved: every page says DRAFT.")
     ] = False,
+    sign: Sign = None,
+    lock_file: LockFile = False,
     seal: Seal = None,
     time_stamp: TimeStamp = None,
     known_at: KnownAt = None,
@@ -106,10 +111,11 @@ def certificate(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Make the calibration certificate of a record: Word, verified PDF, and with --dcc the XML.
+    """Issue the calibration certificate of a record: Word, verified PDF, and with --dcc the XML.
 
-    A legacy import, a candidate and a withdrawn record have none. What nobody stated is a visible gap
-    (exit 1). --known-at is the day of issue, and of what was known.
+    It is an entry of the ledger, signed where people are enrolled; a draft is none. A legacy import, a
+    candidate and a withdrawn record have none. What nobody stated is a visible gap (exit 1). --known-at is
+    the day of issue, and of what was known.
 
     Example: toolkit calibration certificate m15-r3 --out certificates --dcc
     """
@@ -120,7 +126,7 @@ def certificate(
 
     started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", home))
-    registry = open_registry(calibrations, home)
+    registry = open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))
     sealing = open_sealing(seal, registry.folder.parent, ask=ask_passphrase, stamps=time_stamp, draft=draft)
     with progress(None, "certificate", show=not (json or quiet)) as step:
         issued, delivered = deliver_certificate(

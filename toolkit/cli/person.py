@@ -135,8 +135,15 @@ def prove(
 
 @ledger.command()
 def check(
-    instrument: Instrument,
-    against: Annotated[Path, typer.Option("--against", help="A proof, a checkpoint, or a PDF.")],
+    against: Annotated[
+        Path,
+        typer.Option(
+            "--against", help="A document as it was issued, a proof, a QR code's text, a checkpoint."
+        ),
+    ],
+    instrument: Annotated[
+        str | None, typer.Argument(help="Instrument; default: the one that the document's proof names.")
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
     as_json: Json = False,
@@ -144,12 +151,12 @@ def check(
 ) -> int:
     """Tell whether today's ledger continues the one of an earlier document; exit code 1 where it does not.
 
-    Example: toolkit ledger check m15 --against certificate.pdf
+    Example: toolkit ledger check --against certificate.pdf
     """
     from toolkit.lab.people import check_against
 
-    comparison = check_against(_registry(calibrations, home), instrument, against)
-    payload = {"instrument": instrument, "ledger": comparison.continuity, "why": comparison.why}
+    named, comparison = check_against(_registry(calibrations, home), instrument, against)
+    payload = {"instrument": named, "ledger": comparison.continuity, "why": comparison.why}
     answer(payload, f"{comparison.continuity}: {comparison.why}", as_json=as_json, quiet=quiet)
     return 0 if comparison.continuity == "continues" else 1
 

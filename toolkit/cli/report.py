@@ -16,14 +16,17 @@ from toolkit.cli.console import (
     Home,
     Json,
     KnownAt,
+    LockFile,
     ProtocolFile,
     Quiet,
     Reader,
     Seal,
+    Sign,
     TimeStamp,
     answer,
     ask_passphrase,
     day,
+    open_signers,
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
@@ -93,6 +96,14 @@ def command(
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     draft: Draft = False,
+    issue: Annotated[
+        bool,
+        typer.Option(
+            "--issue", help="Enter the report in the ledger; its PDF carries the proof. With --seal always."
+        ),
+    ] = False,
+    sign: Sign = None,
+    lock_file: LockFile = False,
     seal: Seal = None,
     time_stamp: TimeStamp = None,
     protocol: ProtocolFile = None,
@@ -112,7 +123,7 @@ def command(
 
     Delivers report.docx, report.pdf and manifest.json, or nothing where the PDF does not show every value
     and figure. Several tests are converted in one call of LibreOffice; one that is refused does not stop
-    the others.
+    the others. With --issue it is an entry of the ledger, signed where people are enrolled.
 
     Example: toolkit report tests/2019-06-04 --template report_templates/org.docx --out reports/89
     """
@@ -123,13 +134,17 @@ def command(
 
     chosen = choose_reader(reader)
     started = time.perf_counter()
-    sealing = None
-    if seal is not None or time_stamp is not None or os.environ.get("TOOLKIT_SEAL_KEY"):
-        from toolkit.lab.home import calibrations_folder
+    issuing = None
+    if issue or sign or seal is not None or time_stamp is not None or os.environ.get("TOOLKIT_SEAL_KEY"):
+        from toolkit.lab.home import open_registry
+        from toolkit.lab.issuing import open_issuing
         from toolkit.lab.sealing import open_sealing
 
-        place = calibrations_folder(calibrations, home).parent
-        sealing = open_sealing(seal, place, ask=ask_passphrase, stamps=time_stamp, draft=draft)
+        registry = open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))
+        sealing = open_sealing(
+            seal, registry.folder.parent, ask=ask_passphrase, stamps=time_stamp, draft=draft
+        )
+        issuing = open_issuing(registry, sealing, asked=issue, draft=draft)
     # LibreOffice and matplotlib take a second to start: beside all that is imported and read here.
     with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
         from toolkit.lab.answers import unit_choice
@@ -167,7 +182,7 @@ def command(
             diagnosis=answer_and_file,
             allow_missing=allow_missing,
             keep=keep,
-            sealing=sealing,
+            issuing=issuing,
         )
         delivered = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
     payload = reports_payload(delivered) | {"timing": {"seconds": time.perf_counter() - started}}

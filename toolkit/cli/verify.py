@@ -14,7 +14,8 @@ NAME = "verify"
 
 def command(
     files: Annotated[
-        list[Path], typer.Argument(help="PDF, DCC (.xml), manifest.json, record (.json), or a Word file.")
+        list[Path],
+        typer.Argument(help="PDF, DCC (.xml), manifest.json, Word file, record (.json), ledger, proof."),
     ],
     trusted: Annotated[
         list[Path] | None,
@@ -36,8 +37,9 @@ def command(
     from functools import partial
 
     from toolkit.lab.home import registry_if_any
+    from toolkit.lab.proofs import registry_ledger
     from toolkit.lab.sealing import home_trust
-    from toolkit.lab.verification import registry_ledger, verify_file
+    from toolkit.lab.verification import verify_file
     from toolkit.trust.seal.x509 import with_files
 
     trust = with_files(home_trust(home), trusted or [])

@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from toolkit.calibration.records.use import signature_of
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -91,6 +92,11 @@ def mark_words(*uses: CalibrationUse) -> str:
     return "".join(f"  {word}" for word in words)
 
 
+def signature_words(*uses: CalibrationUse) -> str:
+    """Return the line of signatures of an answer for people."""
+    return f"signature: {signature_of(uses)}"
+
+
 def estimate_keys(estimate: Estimate) -> dict[str, Any]:
     """Return an estimate under the keys of the answers, with its expanded uncertainty."""
     U, k = estimate.expanded()
@@ -111,6 +117,8 @@ def delivered_keys(delivered: Delivered) -> dict[str, Any]:
         "pdf": delivered.pdf,
         "pages": delivered.pages,
         "verified": True,
+        "signature": delivered.signature,
+        "ledger": delivered.ledger,
         "checks": [check.as_dict() for check in delivered.checks],
         "template_sha256": delivered.template_sha256,
         "content_sha256": delivered.content_sha256,

@@ -181,4 +181,9 @@ def _uses(answer: AuditAnswer, registry: Registry) -> tuple[CalibrationUse, ...]
 
     ids = {file["in_force"] for file in answer.made.files.plain() if file["repair"] is not None}
     records = [registry.load(record_id) for record_id in sorted(ids)]
-    return tuple(CalibrationUse(id=r.id, sha256=r.sha256, unverified=not r.verified) for r in records)
+    return tuple(
+        CalibrationUse(
+            id=r.id, sha256=r.sha256, unverified=not r.verified, signature=registry.signature(r.id)
+        )
+        for r in records
+    )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from toolkit.lab.answers import delivered_keys, file_name, finding_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from datetime import date
     from pathlib import Path
 
@@ -34,13 +33,16 @@ def deliver_certificate(
     keep: bool,
     step: Callable[[str], None],
 ) -> tuple[Certificate, Delivered]:
-    """Fill the template with a record's certificate and deliver it, with ``dcc`` the XML beside it.
+    """Issue a record's certificate, with ``dcc`` the XML beside it.
+
+    What is no certificate, a draft, is made and not issued.
 
     Raises
     ------
     ToolkitError
-        the record has no certificate; the document is not delivered
+        the record has no certificate; who signs may not issue one; the document is not delivered
     """
+    from toolkit.lab.issuing import Issuing
     from toolkit.report.certificate.collect import collect
     from toolkit.report.certificate.content import build_content
     from toolkit.report.certificate.dcc import build_dcc
@@ -53,24 +55,24 @@ def deliver_certificate(
         registry, record_id, style, issued=issued, draft=draft, replaces=replaces, amendment=amendment
     )
     xml = build_dcc(certificate) if dcc else None
-    if xml is not None and sealing is not None:
-        xml = sealing.seal_xml(xml)
+    content, issue = build_content(certificate, style), None
+    if not certificate.draft:
+        issuing = Issuing(registry=registry, sealing=sealing)
+        content = issuing.content(content)
+        issue = issuing.issue(
+            content, document=f"certificate {certificate.id}", decided=certificate.ledger_head
+        )
     delivered = deliver(
         opened,
-        build_content(certificate, style),
+        content,
         out,
         name=file_name(certificate.id, otherwise="certificate"),
         companions=None if xml is None else {".xml": xml},
-        seal=None if sealing is None else partial(_seal, sealing, certificate),
+        issue=issue,
         keep=keep,
         step=step,
     )
     return certificate, delivered
-
-
-def _seal(sealing: Sealing, certificate: Certificate, pdf: Path, others: Sequence[Path]) -> None:
-    record = {"id": certificate.record, "sha256": certificate.record_sha256}
-    sealing.seal_file(pdf, others, document=f"certificate {certificate.id}", records=[record])
 
 
 def certificate_payload(
@@ -123,7 +125,8 @@ def certificate_text(certificate: Certificate, delivered: Delivered, sealing: Se
         f"certificate {certificate.id} of {certificate.record}{marks}",
         *(f"{path}" for path in (delivered.pdf, delivered.docx, *delivered.companions)),
         f"{delivered.pages} pages, {len(delivered.filled.manifest)} values verified",
-        f"sealed by {sealing.key.name}" if sealing else "unsigned: no --seal",
+        f"signature: {delivered.signature}",
+        f"sealed by {sealing.key.name}" if sealing else "not sealed: no --seal",
         *(f"  warning {warning}" for warning in delivered.warnings),
         *finding_lines(certificate.findings),
     ]

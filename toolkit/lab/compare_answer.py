@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, table
+from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, signature_words, table
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
@@ -139,7 +139,7 @@ def comparison_text(
     simulated = "  SIMULATED" if any(entry.simulated for entry in comparison.entries) else ""
     marks = simulated + mark_words(*comparison.uses)
     parts = [f"comparison of {comparison.mode}, reference {comparison.reference.label}{marks}"]
-    parts += [_conditions(comparison), conclusion(comparison)]
+    parts += [signature_words(*comparison.uses), _conditions(comparison), conclusion(comparison)]
     for part in PARTS:
         rows, which = shown_rows(comparison, part)
         if any(difference.part == part for difference in comparison.differences):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.estimate import plus_minus
-from toolkit.lab.answers import draft_keys, findings_text, mark_words, table
+from toolkit.lab.answers import draft_keys, findings_text, mark_words, signature_words, table
 from toolkit.tires.table_fit import slope_sign
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def fit_text(fitted: Fitted, findings: Sequence[Finding]) -> str:
     """Return what a person reads: single loads, models over all loads, the comparison, findings."""
     parts = []
     if fitted.use:
-        parts.append(f"calibration {fitted.use.id}{mark_words(fitted.use)}")
+        parts.append(f"calibration {fitted.use.id}{mark_words(fitted.use)}\n{signature_words(fitted.use)}")
     rows = list(zip(fitted.curves, fitted.rotations, strict=True))
     for channel, head in (("FY", "C_FY [N/deg]"), ("MZ", "C_MZ [N·m/deg]")):
         if lines := [_line(fit, turn) for fit, turn in rows if fit.channel == channel]:

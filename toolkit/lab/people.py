@@ -15,8 +15,9 @@ from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.people_log import PeopleLog, enrol
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import write_atomic
-from toolkit.inputs import read_regular
-from toolkit.trust.anchor import Comparison, anchor_of, compare, parse_anchor
+from toolkit.inputs import PDF_FILE, read_regular
+from toolkit.lab.proofs import ORIGIN, anchor_in, raw_lines
+from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
 from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import leaf_hash, root_of
@@ -116,7 +117,7 @@ def checkpoint_of(registry: Registry, instrument: str) -> Checkpoint:
     """Return the checkpoint of an instrument's ledger as it stands, signed by the keys at hand."""
     texts = lines_of(registry, instrument)
     root = root_of([leaf_hash(text.encode()) for text in texts])
-    checkpoint = Checkpoint(origin=f"toolkit/{instrument}", size=len(texts), root=root)
+    checkpoint = Checkpoint(origin=f"{ORIGIN}{instrument}", size=len(texts), root=root)
     version = registry.people().history.now
     for signer in registry.signers:
         person = None if version is None else version.people.owner(signer.public)
@@ -153,25 +154,34 @@ def lines_of(registry: Registry, instrument: str) -> list[str]:
     return [line.decode() for line in ledger.lines]
 
 
-def check_against(registry: Registry, instrument: str, document: Path) -> Comparison:
-    """Hold today's ledger against a document of earlier: a proof, a checkpoint, or a PDF with a hash of it.
+def check_against(registry: Registry, instrument: str | None, document: Path) -> tuple[str, Comparison]:
+    """Hold today's ledger against a document of earlier; return its instrument and how it stands.
+
+    The document is a PDF, a digital certificate or a manifest as it was issued, a proof, the text of a QR
+    code, a checkpoint, or a PDF that prints a hash of the ledger; ``instrument`` is asked of the last alone.
 
     Raises
     ------
     TrustError
         ``anchor``: the document holds nothing of this ledger
     """
+    data = _content(document)
+    anchor = anchor_in(data, where=document)
+    if anchor is None and data.startswith(b"%PDF-"):
+        if instrument is None:
+            raise _without(document, "no proof")
+        return instrument, _printed(raw_lines(registry, instrument), document)
+    if anchor is not None:
+        checkpoint = anchor.checkpoint
+    else:
+        checkpoint = parse_checkpoint(data.decode(errors="replace"), where=document)
+    named = checkpoint.origin.removeprefix(ORIGIN)
+    if named != (instrument or named) or named not in registry.instruments():
+        raise _without(document, f"a proof of the ledger {checkpoint.origin}")
+    if anchor is not None and not anchor.proved:
+        return named, Comparison("forked", "the document's own proof does not hold: it was changed")
     # A ledger that is damaged is compared, too: where it broke is what was asked.
-    texts = [line.decode() for line in registry.ledger(instrument).lines]
-    if document.suffix.lower() == ".pdf":
-        return _printed(texts, document)
-    text = _text(document)
-    if text.lstrip().startswith("{"):
-        anchor = parse_anchor(json.loads(text), where=document)
-        if not anchor.proved:
-            return Comparison("forked", "the document's own proof does not hold: it was changed")
-        return compare(texts, anchor.checkpoint, anchor)
-    return compare(texts, parse_checkpoint(text, where=document))
+    return named, compare(raw_lines(registry, named), checkpoint, anchor)
 
 
 def witness(
@@ -193,12 +203,19 @@ def _printed(texts: Sequence[str], document: Path) -> Comparison:
         done = subprocess.run(["pdftotext", str(document), "-"], capture_output=True, check=True, timeout=60)
     except (OSError, subprocess.SubprocessError) as error:
         raise _without(document, error) from error
-    heads = [json.loads(text)["sha256"] for text in texts]
     printed = set(_HEAD.findall(done.stdout.decode(errors="replace")))
-    places = [place for place, head in enumerate(heads, start=1) if head in printed]
+    places = [place for place, text in enumerate(texts, start=1) if _head(text) in printed]
     if not places:
         raise _without(document, "no hash of a line of this ledger")
     return Comparison("continues", f"entry {places[-1]}, whose hash the document prints, is in the ledger")
+
+
+def _head(text: str) -> str | None:
+    """Return the hash that a ledger's line states; None of a line that is none any more."""
+    try:
+        return str(json.loads(text)["sha256"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
 
 
 def _enter(registry: Registry, people: People, signers: Sequence[Signer], reason: str) -> PeopleLog:
@@ -212,12 +229,17 @@ def _enter(registry: Registry, people: People, signers: Sequence[Signer], reason
 
 
 def _text(path: Path) -> str:
+    return _content(path).decode(errors="replace")
+
+
+def _content(path: Path) -> bytes:
     try:
-        return read_regular(path).decode()
-    except (OSError, UnicodeDecodeError) as error:
+        return read_regular(path, PDF_FILE)
+    except OSError as error:
         raise TrustError(
             "a file cannot be read", where=path, got=getattr(error, "strerror", None) or error,
-            expected="a public key, a checkpoint or a proof", next_step="check the path", rule="no-file",
+            expected="a public key, a checkpoint, a proof, or a document as it was issued",
+            next_step="check the path", rule="no-file",
         ) from error  # fmt: skip
 
 
@@ -232,6 +254,7 @@ def _nobody(got: str, expected: Sequence[str]) -> ToolkitError:
 def _without(document: Path, reason: object) -> TrustError:
     return TrustError(
         "a document holds nothing of this ledger", where=document, got=reason,
-        expected="a proof (.json), a checkpoint, or a PDF that prints the hash of the ledger",
-        next_step="name the instrument whose record the document used, --instrument", rule="anchor",
+        expected="an issued document, a proof, a checkpoint, or a PDF that prints a hash of the ledger",
+        next_step="name the instrument whose record the document used: toolkit ledger check INSTRUMENT",
+        rule="anchor",
     )  # fmt: skip

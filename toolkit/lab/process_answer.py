@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 from toolkit.channels import CHANNELS
 from toolkit.characteristics.characteristic import BOTH
 from toolkit.estimate import plus_minus
-from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, table
+from toolkit.lab.answers import (
+    draft_keys,
+    estimate_keys,
+    finding_lines,
+    mark_words,
+    signature_words,
+    table,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -120,6 +127,7 @@ def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:
         f"{reduced.info.name}: {used} conditions of {len({c.file for c in reduced.conditions})} files{mark}",
         f"calibration {reduced.calibration.id} ({reduced.calibration.sha256[:12]}...)"
         + mark_words(reduced.calibration),
+        signature_words(reduced.calibration),
         *(["IMPOSSIBLE VALUES: no tire has them, see the findings"] if reduced.impossible else []),
         f"averaging: {reduced.averaging}",
         f"tare: {reduced.tare.source}",

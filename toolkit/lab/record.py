@@ -316,7 +316,12 @@ class Records(Face, Sequence[Record]):
 
         from toolkit.lab.registry_answer import record_row
 
-        return pd.DataFrame([record_row(record.result, record.status) for record in self.items])
+        return pd.DataFrame(
+            [
+                record_row(record.result, record.status, record.registry.signature(record.id))
+                for record in self.items
+            ]
+        )
 
     def _facts(self) -> Facts:
         return {record.id: f"{record.id} {record.status.state}" for record in self.items}

@@ -6,6 +6,7 @@ import dataclasses
 import datetime as dt
 from typing import TYPE_CHECKING, Any
 
+from toolkit.calibration.records.use import UNSIGNED
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import table
 
@@ -32,7 +33,8 @@ def listed(
         good, refused = registry.usable(name)
         bad += len(refused) + (ledger.damage is not None)
         statuses = registry.statuses(name, known_at=known_at) if good else {}
-        all_rows = [record_row(record, statuses[record.id]) for record in good]
+        signatures = registry.signatures(name) if good else {}
+        all_rows = [record_row(record, statuses[record.id], signatures[record.id]) for record in good]
         shown = [row for row in all_rows if everything or row["status"] != "discarded"]
         hidden += len(all_rows) - len(shown)
         rows += shown
@@ -41,13 +43,15 @@ def listed(
             for record in refused
         ]
     lines = table(
-        ["id", "state", "in force from", "void from", "verified", "sha256", "note"],
+        ["id", "state", "in force from", "void from", "verified", "signed", "sha256", "note"],
         [
             [r["id"], r["status"], r.get("in_force_from") or "", r.get("void_from") or "",
-             "yes" if r.get("verified") else "no", r.get("sha256", "")[:12], r.get("reason") or ""]
+             "yes" if r.get("verified") else "no",
+             UNSIGNED if r.get("signature", UNSIGNED) == UNSIGNED else "yes",
+             r.get("sha256", "")[:12], r.get("reason") or ""]
             for r in rows
         ],
-        align="<" * 7,
+        align="<" * 8,
     )  # fmt: skip
     hidden_line = [f"discarded and not shown: {hidden} (--all)"] if hidden else []
     heads_text = [f"head of {n}: {h['sha256']}" for n, h in heads.items()]
@@ -58,7 +62,7 @@ def listed(
 def shown(registry: Registry, record_id: str, *, known_at: dt.date | None) -> tuple[dict[str, Any], str]:
     """Return a record with its state, cells, loads and files, as JSON and as text."""
     record = registry.load(record_id)
-    row = record_row(record, registry.status(record_id, known_at=known_at))
+    row = record_row(record, registry.status(record_id, known_at=known_at), registry.signature(record_id))
     lines = [f"{key:<14}{_plainly(value)}" for key, value in row.items() if value not in (None, "", [])]
     content, content_lines = _described(record, registry.folder)
     head = registry.head(record.instrument)
@@ -145,7 +149,7 @@ def void_day(status: RecordStatus) -> str | None:
     return status.void_from.isoformat()
 
 
-def record_row(record: CalibrationRecord, status: RecordStatus) -> dict[str, Any]:
+def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) -> dict[str, Any]:
     """Return a record and what its ledger tells of it, as one row of the list."""
     return {
         "id": record.id,
@@ -163,6 +167,7 @@ def record_row(record: CalibrationRecord, status: RecordStatus) -> dict[str, Any
         "reason": status.reason,
         "unverifiable": list(status.unverifiable),
         "recall": status.recall,
+        "signature": signature,
     }
 
 

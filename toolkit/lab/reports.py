@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from toolkit.errors import ToolkitError
+    from toolkit.lab.issuing import Issuing
     from toolkit.lab.resolve import Resolved
-    from toolkit.lab.sealing import Sealing
-    from toolkit.report.content import ReportContent
     from toolkit.report.deliver import Delivered, Job
     from toolkit.report.diagnosis.answer import Told
     from toolkit.report.drawer import Drawer
@@ -37,7 +35,7 @@ class Options:
     """What all reports of one call have in common.
 
     ``None`` in ``details``: those of each ``test.toml``; in ``units``: those of the style file.
-    ``diagnosis`` is the answer that the report tells, with its file; ``sealing`` seals each PDF.
+    ``diagnosis`` is the answer that the report tells, with its file; ``issuing`` issues each report.
     """
 
     template: Template
@@ -51,7 +49,7 @@ class Options:
     diagnosis: tuple[Told, Path] | None = None
     allow_missing: bool = False
     keep: bool = False
-    sealing: Sealing | None = None
+    issuing: Issuing | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,6 +159,7 @@ def _compared(test: Path, resolved: Resolved, models: tuple[str, ...]) -> tuple[
 def _job(
     test: Path, resolved: Resolved, folder: Path, options: Options, comparison: Comparison | None
 ) -> Job:
+    from toolkit.calibration.registry.registry import instrument_of
     from toolkit.lab.handover import details_of, provenance, writers
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
@@ -178,19 +177,19 @@ def _job(
         comparison=comparison,
         diagnosis=options.diagnosis[0] if options.diagnosis else None,
     )
+    issue = None
+    if options.issuing is not None:
+        decided = options.issuing.registry.ledger(instrument_of(content.calibrations[0].id)).decided
+        content = options.issuing.content(content)
+        issue = options.issuing.issue(content, document=f"report {content.identity}", decided=decided)
     return Job(
-        seal=None if options.sealing is None else partial(_seal, options.sealing, content),
+        issue=issue,
         template=options.template,
         content=content,
         out=folder,
         extras=writers(resolved, test, xlsx=options.xlsx, tydex=options.tydex, tir=options.tir),
         provenance=provenance(resolved, test, diagnosis=options.diagnosis and options.diagnosis[1]),
     )
-
-
-def _seal(sealing: Sealing, content: ReportContent, pdf: Path, others: Sequence[Path]) -> None:
-    records = [{"id": use.id, "sha256": use.sha256} for use in content.calibrations]
-    sealing.seal_file(pdf, others, document=f"report {content.identity}", records=records)
 
 
 def attention(report: MadeReport) -> bool:
@@ -248,6 +247,7 @@ def report_text(report: MadeReport) -> str:
         f"{delivered.pages} pages, {len(delivered.filled.figures)} figures, "
         f"{len(delivered.filled.manifest)} values verified{marks}",
         f"calibration {use.id} ({use.sha256[:12]}...)",
+        f"signature: {delivered.signature}",
         f"content {delivered.content_sha256[:12]}...",
         *(f"  warning {warning}" for warning in delivered.warnings),
         *finding_lines(resolved.findings),

@@ -1,26 +1,20 @@
-"""The laboratory's seal at the end of an issue: its key, whom it trusts, and the proof in a PDF."""
+"""The laboratory's seal at the end of an issue: its key, and whom it trusts."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
-from toolkit.files import sha256_file
-from toolkit.inputs import CERTIFICATE_FILE, PDF_FILE, read_input
+from toolkit.inputs import CERTIFICATE_FILE, read_input
 from toolkit.lab.home import find_home
 
 if TYPE_CHECKING:
     from toolkit.calibration.dcc.standard import Standards
     from toolkit.trust.seal.key import Ask, SealKey
     from toolkit.trust.seal.x509 import Trust
-
-PROOF = "toolkit.json"
-"""Name of the JSON document in a sealed PDF: its records, its ledger's proof, the files issued with it."""
 
 TRUST, KEY = "trust", "TOOLKIT_SEAL_KEY"
 
@@ -38,49 +32,16 @@ class Sealing:
 
         return seal_xml(data, self.key)
 
-    def seal_file(
-        self,
-        pdf: Path,
-        others: Sequence[Path],
-        *,
-        document: str,
-        records: Sequence[dict[str, str]],
-        ledger: Any = None,
-    ) -> None:
-        """Seal a PDF that has not been handed over yet.
-
-        Parameters
-        ----------
-        pdf, others : the file, and those that are handed over with it, by their hashes
-        document : what it is, such as ``certificate CC-1``
-        records : ``id`` and ``sha256`` of each record that it rests on
-        ledger : the ledger's proof, JSON values; None where there is none
-        """
-        from toolkit.recording.marks import GENERATOR
+    def seal_pdf(self, data: bytes, document: str) -> bytes:
+        """Return a PDF with its seal; ``document`` is what it is, such as ``certificate CC-1``."""
         from toolkit.trust.seal.pdf import seal_pdf
 
-        proof = {
-            "generator": GENERATOR,
-            "schema": 1,
-            "document": document,
-            "records": list(records),
-            "files": [{"name": file.name, "sha256": sha256_file(file)} for file in others],
-            "ledger": ledger,
-        }
-        text = json.dumps(proof, ensure_ascii=False, indent=1).encode() + b"\n"
         stamps = None
         if self.stamps is not None:
             from pyhanko.sign.timestamps import HTTPTimeStamper
 
             stamps = HTTPTimeStamper(self.stamps)
-        sealed = seal_pdf(
-            read_input(pdf, PDF_FILE),
-            self.key,
-            reason=f"issued: {document}",
-            attachments={PROOF: text},
-            stamps=stamps,
-        )
-        pdf.write_bytes(sealed)
+        return seal_pdf(data, self.key, reason=f"issued: {document}", stamps=stamps)
 
 
 def open_sealing(

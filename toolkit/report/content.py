@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from toolkit.calibration.records.use import CalibrationUse, mark_of
+from toolkit.calibration.records.use import UNSIGNED, CalibrationUse, mark_of, signature_of
 from toolkit.estimate import round_to_uncertainty
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -18,6 +18,7 @@ Cell = str | float | None
 
 
 IMPOSSIBLE = "IMPOSSIBLE VALUES"
+SIGNATURE = "signature"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +103,8 @@ class Plot:
 class ReportContent:
     """A report's content. ``marks`` must stand in the document whatever the template says.
 
-    What stands on every page, and the word in every figure, follows from ``calibrations``.
+    What stands on every page, and the word in every figure, follows from ``calibrations``. ``symbol``: the
+    document is issued, and its PDF carries the ledger's proof on the last page.
     """
 
     values: dict[str, Value]
@@ -118,6 +120,17 @@ class ReportContent:
     marks: tuple[tuple[str, str], ...] = ()
     style: Style = field(default_factory=Style)
     vocabulary: Vocabulary
+    symbol: bool = False
+
+    @property
+    def signature(self) -> str:
+        """Who signed the decisions that the document rests on, and who issued it; or ``unsigned``."""
+        return str(self.values[SIGNATURE].value)
+
+    def issued_by(self, issuer: str | None) -> ReportContent:
+        """Return the content of a document that is issued, by somebody who signs or, None, unsigned."""
+        text = signature_text(self.calibrations, issuer)
+        return replace(self, values=self.values | {SIGNATURE: Value(kind="text", value=text)}, symbol=True)
 
     @property
     def page_mark(self) -> str | None:
@@ -149,6 +162,18 @@ class ReportContent:
         if family == "table":
             return member in self.tables and bool(self.tables[member].rows)
         return name in self.values and not self.values[name].missing
+
+
+def signature_text(calibrations: Sequence[CalibrationUse], issuer: str | None = None) -> str:
+    """Return a document's line of signatures; ``issuer`` signs the document itself.
+
+    >>> signature_text(())
+    'unsigned'
+    """
+    records = signature_of(calibrations)
+    if issuer is not None:
+        return f"{'record unsigned' if records == UNSIGNED else records}; document issued by {issuer}"
+    return records if records == UNSIGNED else f"{records}; document {UNSIGNED}"
 
 
 # The organisation's words. What people wrote, names, notes and findings, is never touched: only the terms

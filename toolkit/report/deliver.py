@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 Step = Callable[[str], None]
 Writer = Callable[[Path], object]
-Seal = Callable[[Path, Sequence[Path]], None]
+Issue = Callable[[Path, Sequence[Path], int, str], Mapping[str, Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,8 @@ class Job:
     out, name : output folder, made where it does not exist, and the name of the two files in it
     companions : files that are handed over with the two, suffix to content (``.xml``)
     extras : further files by name, each with a function that writes it to the path it is given
-    seal : seals the PDF in place, told which files are handed over with it; None for no seal
+    issue : issues the PDF in place, given the files that are handed over with it, its pages and the hash of
+        what it says, and returns the ledger's proof; None for a document that is not issued
     provenance : what the manifest of the hand-over names besides the outputs; None for no manifest
     stage : staging folder of a publication in ``out`` that the caller ends; None: one of its own
     """
@@ -59,7 +60,7 @@ class Job:
     companions: Mapping[str, bytes] = field(default_factory=dict)
     extras: Mapping[str, Writer] = field(default_factory=dict)
     provenance: Mapping[str, Any] | None = None
-    seal: Seal | None = None
+    issue: Issue | None = None
     stage: Path | None = None
 
     def names(self) -> list[str]:
@@ -72,7 +73,8 @@ class Job:
 class Delivered:
     """A delivered report; ``content_sha256`` is the same for the same inputs, whatever the day or the run.
 
-    ``units`` are those of forces and of moments as they are printed.
+    ``units`` are those of forces and of moments as they are printed. ``signature`` is its line of signatures,
+    ``ledger`` the proof of its entry; None where it was not issued.
     """
 
     docx: Path
@@ -86,6 +88,8 @@ class Delivered:
     template_sha256: str
     content_sha256: str
     units: tuple[str, str]
+    signature: str
+    ledger: Mapping[str, Any] | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -110,7 +114,7 @@ def deliver(
     allow_missing: bool = False,
     keep: bool = False,
     companions: Mapping[str, bytes] | None = None,
-    seal: Seal | None = None,
+    issue: Issue | None = None,
     stage: Path | None = None,
     step: Step = lambda _text: None,
 ) -> Delivered:
@@ -122,7 +126,7 @@ def deliver(
         nothing is left in the output folder then
     """
     job = Job(
-        template=template, content=content, out=out, name=name, companions=companions or {}, seal=seal,
+        template=template, content=content, out=out, name=name, companions=companions or {}, issue=issue,
         stage=stage,
     )  # fmt: skip
     reports = deliver_all(
@@ -273,14 +277,14 @@ class _Run:
         _demand(self.checks)
         for suffix, data in job.companions.items():
             self._file(suffix).write_bytes(data)
-        if job.seal is not None:
-            beside = [self._stage() / name for name in job.names() if name != MANIFEST]
-            job.seal(pdf, [file for file in beside if file != pdf])
-        digest = content_hash(self.filled, job.template)
-        names = job.names()
+        digest, names = content_hash(self.filled, job.template), job.names()
+        ledger: Mapping[str, Any] | None = None
+        if job.issue is not None:
+            beside = [self._stage() / name for name in names if name != MANIFEST]
+            ledger = job.issue(pdf, [file for file in beside if file != pdf], pages, digest)
         if job.provenance is not None:
             outputs = [self._stage() / name for name in names if name != MANIFEST]
-            text = manifest_json(job.provenance, job.content, job.template, digest, outputs)
+            text = manifest_json(job.provenance, job.content, job.template, digest, outputs, ledger)
             (self._stage() / MANIFEST).write_text(text, encoding="utf-8")
         self.publication.close()
         targets = [job.out / name for name in names]
@@ -297,6 +301,8 @@ class _Run:
             template_sha256=job.template.sha256,
             content_sha256=digest,
             units=(job.content.style.force, job.content.style.moment),
+            signature=job.content.signature,
+            ledger=ledger,
         )
 
     def result(self) -> Delivered | ToolkitError:

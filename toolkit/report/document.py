@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar, cast
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.estimate import Estimate, has_interval
 from toolkit.findings import Finding
-from toolkit.report.content import Cell, Plot, ReportContent, Table, Value
+from toolkit.report.content import SIGNATURE, Cell, Plot, ReportContent, Table, Value, signature_text
 from toolkit.report.style import Style
 from toolkit.report.vocabulary import Column, Entry, TableEntry, Vocabulary, columns_of
 
@@ -29,6 +29,13 @@ Other = TypeVar("Other")
 Row = Sequence[Cell] | Mapping[str, Cell]
 Rows = Iterable[Row]
 Number = float | Estimate | None
+
+_SIGNED = Entry(
+    path=SIGNATURE,
+    kind="text",
+    description="who signed the record's decisions and issued the document, or 'unsigned'; at the end of the "
+    "document where a template has no place for it",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,6 +250,7 @@ class Document(Generic[Source]):
             name=self.name,
             values=(
                 *(declared.entry for declared in self._all(DeclaredValue)),
+                _SIGNED,
                 *(open_values.entries if open_values else ()),
             ),
             figures={
@@ -290,6 +298,7 @@ class Document(Generic[Source]):
             or Value(kind=cast("Any", declared.entry.kind), value=None)
             for declared in self._all(DeclaredValue)
         }
+        values[SIGNATURE] = Value(kind="text", value=signature_text(calibrations))
         for declared in self._all(OpenValues):
             values |= cast("Mapping[str, Value]", declared.build(source, style))
         for name in self.vocabulary.figures:

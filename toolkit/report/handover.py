@@ -44,10 +44,12 @@ def manifest_json(
     template: Template,
     digest: str,
     outputs: Sequence[Path],
+    ledger: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the manifest: inputs, calibration, software and outputs, each with its SHA-256.
 
-    ``provenance`` holds what the caller knows: the inputs and the software.
+    ``provenance`` holds what the caller knows: the inputs and the software; ``ledger`` is the proof of a
+    document that was issued.
     """
     manifest = {
         "generator": GENERATOR,
@@ -58,11 +60,13 @@ def manifest_json(
         "template": {"name": template.path.name, "sha256": template.sha256},
         "draft": bool(content.draft_reasons),
         "draft_reasons": list(content.draft_reasons),
+        "signature": content.signature,
         "calibrations": [calibration.as_dict() for calibration in content.calibrations],
         **provenance,
         "outputs": [
             {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}
             for output in outputs
         ],
+        "ledger": ledger,
     }
     return json.dumps(manifest, ensure_ascii=False, indent=2) + "\n"

@@ -8,6 +8,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from toolkit.calibration.records.use import UNSIGNED
 from toolkit.characteristics.model import answer_lists
 from toolkit.estimate import Estimate
 from toolkit.reduction.model import Condition
@@ -79,6 +80,8 @@ def content_hash(result: TestResult) -> str:
     for name in ("draft_reasons", "since"):  # and one of a record in force has the hash of before too
         if not content["reduced"]["calibration"][name]:
             del content["reduced"]["calibration"][name]
+    if result.reduced.calibration.signature == UNSIGNED:  # nor do unsigned decisions change it
+        del content["reduced"]["calibration"]["signature"]
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, cast, get_type_hints
 
+from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
 from toolkit.channels import Rotation
 from toolkit.characteristics.catalogue import by_name
 from toolkit.characteristics.groups import Direction, DirectionFit, group
@@ -20,7 +21,7 @@ from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.recording.model import TestInfo
 from toolkit.recording.safe_open import check_workbook
-from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
+from toolkit.reduction.model import Condition, ReducedTest, Tare
 from toolkit.testfile.layout import (
     CONDITION_FIELDS,
     KIND,
@@ -121,6 +122,7 @@ def _result(sheets: dict[str, list[Cells]], items: Cells) -> TestResult:
             unverified=bool(items["calibration.unverified"]),
             draft_reasons=_numbered(items, "calibration.draft_reason"),
             since=_numbered(items, "calibration.since"),
+            signature=str(items.get("calibration.signature", UNSIGNED)),
         ),
         conditions=tuple(_condition(row) for row in sheets["reduced"]),
         tare=Tare(

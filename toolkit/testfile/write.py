@@ -133,7 +133,7 @@ def _provenance(result: TestResult, digest: str) -> Rows:
     use = reduced.calibration
     if use.mark is not None:
         yield (str(use.word or "MARK"), use.mark)
-    for name in ("id", "sha256", "unverified", "draft"):
+    for name in ("id", "sha256", "unverified", "draft", "signature"):
         yield (f"calibration.{name}", getattr(use, name))
     for name, texts in (("draft_reason", use.draft_reasons), ("since", use.since)):
         yield from ((f"calibration.{name}.{number}", text) for number, text in enumerate(texts, start=1))

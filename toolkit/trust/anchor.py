@@ -1,4 +1,8 @@
-"""Whether today's log continues what was issued: documents and witnesses hold checkpoints of it."""
+"""Whether today's log continues what was issued: documents and witnesses hold checkpoints of it.
+
+A document holds its anchor whole, as JSON, and in a compact form that fits into a QR code: a line with its
+kind and the place of the entry, the hash of the entry, its way to the root, and the checkpoint.
+"""
 
 from __future__ import annotations
 
@@ -14,38 +18,68 @@ from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
 from toolkit.trust.merkle import HASH_BYTES, included, inclusion_proof, leaf_hash, root_of
 
 Continuity = Literal["continues", "rolled_back", "forked"]
+COMPACT = "toolkit-proof@v1"
+MOST_BYTES = 2048
+"""Of a compact form."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Anchor:
-    """What a document carries: a line of the log, its place (from 0), and the proof of it in a checkpoint."""
+    """What a document carries: a line of the log, its place (from 0), and the proof of it in a checkpoint.
 
-    line: str
+    ``leaf`` is the line's hash; the compact form holds that alone, and ``line`` is None then.
+    """
+
+    leaf: bytes
     index: int
     path: tuple[bytes, ...]
     checkpoint: Checkpoint
+    line: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON form; hashes are base64, as a checkpoint has them."""
         return {
             "line": self.line,
             "index": self.index,
-            "path": [base64.b64encode(step).decode() for step in self.path],
+            "path": [_text(step) for step in self.path],
             "checkpoint": self.checkpoint.text,
         }
 
     @property
     def proved(self) -> bool:
         """Tell whether the line is in the tree of the checkpoint, at its place."""
-        leaf = leaf_hash(self.line.encode())
-        return included(leaf, self.index, self.checkpoint.size, self.path, self.checkpoint.root)
+        return included(self.leaf, self.index, self.checkpoint.size, self.path, self.checkpoint.root)
+
+    @property
+    def compact(self) -> bytes:
+        """The form of a QR code.
+
+        Raises
+        ------
+        TrustError
+            ``proof-size``: more than `MOST_BYTES`, by very many signatures
+        """
+        words = [
+            f"{COMPACT} {self.index}",
+            _text(self.leaf),
+            _text(b"".join(self.path)),
+            self.checkpoint.text,
+        ]
+        data = "\n".join(words).encode()
+        if len(data) > MOST_BYTES:
+            raise TrustError(
+                "the proof does not fit into a QR code", where=self.checkpoint.origin,
+                got=f"{len(data)} bytes", expected=f"at most {MOST_BYTES}",
+                next_step="sign with fewer keys; nothing was issued", rule="proof-size",
+            )  # fmt: skip
+        return data
 
 
 def anchor_of(lines: Sequence[str], index: int, checkpoint: Checkpoint) -> Anchor:
     """Return the anchor of a log's line (from 0; without its line feed) in a checkpoint of the log."""
     leaves = [leaf_hash(line.encode()) for line in lines[: checkpoint.size]]
     path = tuple(inclusion_proof(leaves, index))
-    return Anchor(line=lines[index], index=index, path=path, checkpoint=checkpoint)
+    return Anchor(leaf=leaves[index], index=index, path=path, checkpoint=checkpoint, line=lines[index])
 
 
 def parse_anchor(entries: Mapping[str, Any], *, where: object = None) -> Anchor:
@@ -63,12 +97,43 @@ def parse_anchor(entries: Mapping[str, Any], *, where: object = None) -> Anchor:
     except (KeyError, TypeError, ValueError, binascii.Error):
         sound = False
     if not sound or any(len(step) != HASH_BYTES for step in path):
-        raise TrustError(
-            "the proof in a document cannot be read", where=where, got=json.dumps(entries, default=str)[:80],
-            expected="line, index, path and checkpoint, as the document was issued",
-            next_step="take the document as it was issued", rule="anchor",
-        )  # fmt: skip
-    return Anchor(line=line, index=index, path=path, checkpoint=parse_checkpoint(text, where=where))
+        raise _unreadable(json.dumps(entries, default=str), where)
+    checkpoint = parse_checkpoint(text, where=where)
+    return Anchor(leaf=leaf_hash(line.encode()), index=index, path=path, checkpoint=checkpoint, line=line)
+
+
+def parse_compact(text: str, *, where: object = None) -> Anchor:
+    """Read what a QR code says.
+
+    Raises
+    ------
+    TrustError
+        ``anchor``: it is none; ``checkpoint``
+    """
+    try:
+        head, leaf_text, path_text, checkpoint = text.split("\n", 3)
+        kind, number = head.split(" ")
+        leaf, way = (base64.b64decode(part, validate=True) for part in (leaf_text, path_text))
+    except (ValueError, binascii.Error) as error:
+        raise _unreadable(text, where) from error
+    if kind != COMPACT or not number.isdecimal() or len(leaf) != HASH_BYTES or len(way) % HASH_BYTES:
+        raise _unreadable(text, where)
+    path = tuple(way[at : at + HASH_BYTES] for at in range(0, len(way), HASH_BYTES))
+    return Anchor(
+        leaf=leaf, index=int(number), path=path, checkpoint=parse_checkpoint(checkpoint, where=where)
+    )
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def _unreadable(got: str, where: object) -> TrustError:
+    return TrustError(
+        "the proof in a document cannot be read", where=where, got=got[:80],
+        expected="line, index, path and checkpoint, as the document was issued",
+        next_step="take the document as it was issued", rule="anchor",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +160,7 @@ def compare(lines: Sequence[str], checkpoint: Checkpoint, anchor: Anchor | None 
         return Comparison(
             "continues", f"its first {checkpoint.size} entries are those that were issued; {later} more"
         )
-    if anchor is not None and leaf_hash(anchor.line.encode()) != leaves[anchor.index]:
+    if anchor is not None and anchor.leaf != leaves[anchor.index]:
         return Comparison("forked", f"entry {anchor.index + 1} was rewritten: the document has another")
     place = "" if anchor is None else _changed(leaves, anchor)
     return Comparison("forked", f"among the first {checkpoint.size} entries some were rewritten{place}")

@@ -14,10 +14,14 @@ import pytest
 import rfc8785
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from toolkit.calibration.registry.approval import withdraw
+from toolkit.calibration.records.use import signature_of
+from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.ledger import START, head_bytes, next_line
 from toolkit.calibration.registry.people_log import enrol, place_of
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.standing import standing
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.lab.home import packaged_home
 from toolkit.trust.keys import Signer
@@ -269,3 +273,44 @@ def test_what_a_lost_key_signed_after_its_loss_decides_nothing_and_before_it_hol
         if until == time:
             assert registry.status(RECORD).state == state
             return
+
+
+def _named(registry: Registry) -> str:
+    return registry.signature(RECORD)
+
+
+def test_a_record_that_was_there_before_people_is_unsigned_whoever_withdraws_it(home: Path) -> None:
+    assert _named(_registry(home)) == "unsigned"
+    _found(home)
+    assert _named(_withdraw(home, "anna")) == "unsigned"
+    assert set(_registry(home).signatures("m15").values()) == {"unsigned"}
+
+
+def test_the_people_who_signed_a_record_are_named(tmp_path: Path, make_session: Callable[..., Path]) -> None:
+    (tmp_path / "calibrations").mkdir()
+    _found(tmp_path)
+    calibrate(make_session(), _registry(tmp_path, "carl"))
+    today = now()[:10]
+    entered = f"entered by Carl on {today}"
+    assert _registry(tmp_path).signature("hub-r1") == entered
+    dora = _registry(tmp_path, "dora")
+    assert approve(dora, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="Dora").done
+    signed = f"{entered}, approved by Dora on {today}"
+    use = standing(_registry(tmp_path), "hub", on=date(2026, 2, 3)).use(draft=False)
+    assert use.signature == use.as_dict()["signature"] == signed
+    assert signature_of([use]) == f"hub-r1: {signed}"
+    assert signature_of([use, replace(use, id="hub-r2", signature="unsigned")]) == "unsigned"
+    # A key that turns out to have been lost before: what it signed is nobody's.
+    person = _people().person[2]
+    lost = replace(
+        person, keys=(replace(person.keys[0], until=SINCE), Key(key=_signer().public.line, since=SINCE))
+    )
+    enrol(
+        tmp_path / "calibrations",
+        _people().with_person(lost),
+        [KEYS["anna"]],
+        by="anna",
+        reason="x",
+        heads={},
+    )
+    assert _registry(tmp_path).signature("hub-r1") == "unsigned"

@@ -137,7 +137,8 @@ def test_the_tags_are_those_of_the_diagnosis_own_document() -> None:
     assert all(own.value(path) == entry for path, entry in values.items())
     # What only the case and the search have is in the diagnosis' own document alone.
     assert {entry.path for entry in own.values} - set(values) == {
-        f"diagnosis.{name}" for name in ("calibrations", "model", "issued", "software")
+        "signature",
+        *(f"diagnosis.{name}" for name in ("calibrations", "model", "issued", "software")),
     }
     shared = set(own.tables) - {"recorded"}
     assert all(report.tables[name] == own.tables[name] for name in shared)

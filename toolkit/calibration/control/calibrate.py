@@ -38,7 +38,7 @@ def rehearsal(registry: Registry, instrument: str) -> Iterator[Registry]:
         copy = Path(place)
         settled.copy_files(registry.folder / instrument, copy / instrument)
         try:
-            yield Registry(copy)
+            yield Registry(copy, rehearses=registry)
         except ToolkitError as error:
             parts = {
                 key: text.replace(place, str(registry.folder)) if text else text

@@ -17,6 +17,7 @@ DRAFT = "DRAFT"
 DRAFT_MARK = f"{DRAFT}, NOT APPROVED"
 UNVERIFIED = "UNVERIFIED CALIBRATION"
 SINCE = "KNOWN SINCE"
+UNSIGNED = "unsigned"
 _LONGEST = 130  # characters of a part of the mark that stands on every page
 
 
@@ -26,7 +27,8 @@ class CalibrationUse:
 
     ``unverified``: it is a legacy import. ``draft_reasons``: why it may not make a number that is issued;
     empty for a record in force. ``since``: what became known of it after the day that the result is
-    judged by.
+    judged by. ``signature``: who signed the decisions that the record rests on, or ``unsigned``
+    (`registry.signatures.signature_line`).
     """
 
     id: str
@@ -34,6 +36,7 @@ class CalibrationUse:
     unverified: bool
     draft_reasons: tuple[str, ...] = ()
     since: tuple[str, ...] = ()
+    signature: str = UNSIGNED
 
     @property
     def draft(self) -> bool:
@@ -62,7 +65,12 @@ class CalibrationUse:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the use under the keys of the answers and manifests."""
-        content = {"id": self.id, "sha256": self.sha256, "unverified": self.unverified}
+        content = {
+            "id": self.id,
+            "sha256": self.sha256,
+            "unverified": self.unverified,
+            "signature": self.signature,
+        }
         return content | ({"draft": True} if self.draft else {})
 
 
@@ -83,6 +91,14 @@ def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
                 text += f": {'; '.join(getattr(chosen[0], why))}"
             marks.append(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}...")
     return " - ".join(marks) or None
+
+
+def signature_of(uses: Sequence[CalibrationUse]) -> str:
+    """Return who signed what a result rests on; one unsigned record makes it unsigned."""
+    lines = dict.fromkeys((use.id, use.signature) for use in uses)
+    if not lines or any(signature == UNSIGNED for _, signature in lines):
+        return UNSIGNED
+    return "; ".join(f"{record}: {signature}" for record, signature in lines)
 
 
 def not_asked(record: CalibrationRecord) -> CalibrationUse:

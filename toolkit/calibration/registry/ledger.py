@@ -38,7 +38,8 @@ class Entry:
     ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``, and a
     ``note`` where the entry is dated back.
     ``discarded``: ``known_on``, ``by``, ``reason``: the end of a candidate that was never approved.
-    ``issued``: ``by``, ``document`` (name and hash of what left the laboratory).
+    ``issued``: ``by``, ``document``: what left the laboratory, its ``name``, the hash ``content`` of what it
+    says, and the hashes of its files (`registry.issuing`).
     ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file); the first one has ``heads``:
     count and last hash of every ledger until then, whose lines need no signature.
 
@@ -95,6 +96,14 @@ class Ledger:
         """The last line's hash; zeros where there is none."""
         return self.entries[-1].sha256 if self.entries else START
 
+    @property
+    def decided(self) -> str:
+        """The hash of the last line that decides about a record, as documents print it.
+
+        That a document was issued changes nothing in what the next one says.
+        """
+        return next((entry.sha256 for entry in reversed(self.entries) if entry.event != "issued"), START)
+
     def known_on(self, known_at: date | None = None) -> date:
         """Return the day of knowledge: the one that is asked for, else today.
 
@@ -144,6 +153,12 @@ def next_line(seq: int, prev: str, event: Mapping[str, Any]) -> tuple[bytes, str
 def head_bytes(count: int, digest: str) -> bytes:
     """Return the content of head.json."""
     return (canonical({"count": count, "sha256": digest}) + "\n").encode()
+
+
+def decisions(lines: bytes) -> bytes:
+    """Return a ledger's lines without those of issued documents, what is unreadable among them."""
+    # Of canonical JSON, in which a quotation mark within a text is escaped.
+    return b"\n".join(line for line in lines.split(b"\n") if b'"event":"issued"' not in line)
 
 
 def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:

@@ -16,11 +16,11 @@ from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.registry.clock import today
-from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
-from toolkit.calibration.registry.people_log import PeopleLog, read_people
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, decisions
+from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, read_people
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.refit_many import reproducing
-from toolkit.calibration.registry.signatures import revoked, unproved
+from toolkit.calibration.registry.signatures import revoked, signature_line, unproved
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.registry.stored import bad_record as _bad
@@ -31,6 +31,7 @@ from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
 from toolkit.trust.decisions import Signing
 from toolkit.trust.keys import Signer
+from toolkit.trust.people import History
 
 _AT_ONCE = 200
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
@@ -69,12 +70,22 @@ class Registry:
 
     ``lock_file``: writers keep each other out by a file, for a file system without locks. ``signers``: the
     keys that sign what is decided through this object; a laboratory without people needs none.
+    ``rehearses``: this is a copy of that registry, to be thrown away: its lines are judged there, and nobody
+    signs what is tried here.
     """
 
-    def __init__(self, folder: Path, *, lock_file: bool = False, signers: Sequence[Signer] = ()) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        lock_file: bool = False,
+        signers: Sequence[Signer] = (),
+        rehearses: Registry | None = None,
+    ) -> None:
         self.folder = folder
         self.lock_file = lock_file
         self.signers = tuple(signers)
+        self.rehearses = rehearses
         self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
 
     def instruments(self) -> tuple[str, ...]:
@@ -108,7 +119,7 @@ class Registry:
         TrustError
             ``people-log``
         """
-        return read_people(self.folder)
+        return read_people(self.folder) if self.rehearses is None else PeopleLog(history=History(), heads={})
 
     def commit(self, instrument: str, build: Callable[[Ledger], Change | None]) -> bool:
         """Make one change to an instrument's folder, signed where people are enrolled (`store.commit`).
@@ -130,6 +141,9 @@ class Registry:
     def _judged(self, instrument: str, ledger: Ledger, people: PeopleLog) -> Ledger:
         if ledger.damage is not None:
             return ledger
+        if self.rehearses is not None:
+            judged = self.rehearses.ledger(instrument)
+            return replace(ledger, damage=judged.damage, void=judged.void)
         version = people.history.now
         key = (instrument, ledger.head, "" if version is None else version.sha256)
         if key not in self._proved:
@@ -144,10 +158,34 @@ class Registry:
         """Return the hash of the ledger's last line, to be printed on what leaves the laboratory."""
         return self.ledger(instrument).head
 
+    def signature(self, record_id: str) -> str:
+        """Return who signed the decisions that a record rests on, ``unsigned`` where somebody did not.
+
+        Raises
+        ------
+        RegistryError
+            the ledger is damaged
+        """
+        return self.signatures(instrument_of(record_id), record_id)[record_id]
+
+    def signatures(self, instrument: str, *records: str) -> dict[str, str]:
+        """Return the signatures of some records, default all, by id: the ledger read once."""
+        ledger, history = self._sound(instrument), self.people().history
+        return {
+            record_id: signature_line(ledger, history, record_id) for record_id in records or ledger.entered()
+        }
+
     def digest(self, instrument: str) -> str:
-        """Return a hash of everything that decides about this instrument's records: every file there."""
-        files = settled.settled_files(self.folder / instrument)
-        return sha256_bytes("\n".join(f"{name} {sha256_bytes(data)}" for name, data in files).encode())
+        """Return a hash of everything that decides about this instrument's records: files, decisions, people.
+
+        Of the ledger it takes what was decided: that a document was issued changes no record.
+        """
+        people = self.people().history.now
+        parts = [] if people is None else [f"{FOLDER} {people.sha256}"]
+        for name, data in settled.settled_files(self.folder / instrument):
+            if name != HEAD:
+                parts.append(f"{name} {sha256_bytes(decisions(data) if name == LEDGER else data)}")
+        return sha256_bytes("\n".join(parts).encode())
 
     def load(self, record_id: str) -> CalibrationRecord:
         """Return a record that passes every load-time gate.

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
+from toolkit.calibration.records.use import UNSIGNED
+from toolkit.calibration.registry.clock import day_of
 from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
 from toolkit.trust.decisions import (
     ACTIONS,
@@ -83,6 +85,31 @@ def revoked(ledger: Ledger, history: History) -> frozenset[int]:
         entry.seq
         for entry in ledger.entries
         if any(history.revoked(row["key"], entry.time) is not None for row in entry.signatures)
+    )
+
+
+def signature_line(ledger: Ledger, history: History, record_id: str) -> str:
+    """Return who signed the decisions that a record rests on: the one place that says *unsigned*.
+
+    A record is unsigned where nobody signed that it was entered, or one of its approvals.
+    """
+    rows = []
+    for entry in ledger.of(record_id):
+        if entry.event not in ("entered", "approved"):
+            continue
+        if not entry.signatures or entry.seq in ledger.void:
+            return UNSIGNED
+        rows.append(f"{entry.event} by {names_of(entry, history)} on {day_of(entry.time).isoformat()}")
+    return ", ".join(rows) or UNSIGNED
+
+
+def names_of(entry: Entry, history: History) -> str:
+    """Return the names of the people who signed an entry, as their file of that time has them."""
+    version = history.at(entry.time, entry.people)
+    people = [None if version is None else version.people.of(person) for person in signers_of(entry)]
+    return " and ".join(
+        person if known is None else known.name
+        for person, known in zip(signers_of(entry), people, strict=True)
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from datetime import date
 from typing import TYPE_CHECKING
 
-from toolkit.calibration.records.use import CalibrationUse
+from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.judgement import judge_stored, machine_of
@@ -54,6 +54,7 @@ class Standing:
     reasons: tuple[Reason, ...]
     since: tuple[str, ...] = ()
     discarded: bool = False
+    signature: str = UNSIGNED
 
     def use(self, *, draft: bool, where: object = None) -> CalibrationUse:
         """Return what goes with every result of the record; ``where`` names the test in an error.
@@ -79,6 +80,7 @@ class Standing:
             unverified=not self.record.verified,
             draft_reasons=tuple(reason.text for reason in self.reasons),
             since=self.since,
+            signature=self.signature,
         )
 
 
@@ -147,6 +149,7 @@ def standing(
         reasons=reasons,
         since=tuple(reason.text for reason in later if reason.text not in texts),
         discarded=registry.status(record.id, known_at=known_on).state == "discarded",
+        signature=registry.signature(record.id),
     )
 
 

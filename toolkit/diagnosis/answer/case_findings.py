@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.records.use import CalibrationUse
+from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import unapproved, withdrawal
 from toolkit.diagnosis.simulators.cells import record_of
@@ -69,18 +69,23 @@ def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | N
         return None
     record = record_of(case, calibrations)
     reasons: tuple[str, ...] = ()
+    signature = UNSIGNED
     if is_regular(case.path.parent / name):
         reasons = ("a file beside the case: no registry says whether it is approved",)
     elif calibrations is not None:
         registry = Registry(calibrations)
         try:
-            status = registry.status(record.id)
+            status, signature = registry.status(record.id), registry.signature(record.id)
             states = withdrawal(status) or unapproved(registry, record, status)
             reasons = tuple(state.text for state in states)
         except RegistryError as error:
             reasons = (f"not approved: {error.what}",)
     return CalibrationUse(
-        id=record.id, sha256=record.sha256, unverified=not record.verified, draft_reasons=reasons
+        id=record.id,
+        sha256=record.sha256,
+        unverified=not record.verified,
+        draft_reasons=reasons,
+        signature=signature,
     )
 
 

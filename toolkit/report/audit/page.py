@@ -15,6 +15,7 @@ from toolkit.calibration.records.use import mark_of
 from toolkit.characteristics.catalogue import summary
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import rows_of, timeline
+from toolkit.report.content import signature_text
 from toolkit.report.pages.kit import Column, Table, number, page_parts, table
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def page(view: AuditView) -> Iterator[str]:
         Path(__file__).parent,
         keywords=OWN_OUTPUT,
         mark=mark_of(view.uses),
+        signature=signature_text(view.uses),
         audit=view.made,
         timelines=((versions.instrument, timeline(versions)) for versions in view.timelines),
         file_columns=_FILES,

@@ -230,7 +230,11 @@ VALUES = (
     _text("withdrawn", "why and from when the record is void", lambda c, _: c.withdrawn),
     _text("record", "id of the calibration record", lambda c, _: c.record),
     _text("record_hash", "SHA-256 of the calibration record", lambda c, _: c.record_sha256),
-    _text("ledger_head", "hash of the ledger's last line at the issue", lambda c, _: c.ledger_head),
+    _text(
+        "ledger_head",
+        "hash of the ledger's last line that decides about a record, at the issue",
+        lambda c, _: c.ledger_head,
+    ),
     _text("software", "program and version that made the certificate", lambda *_: f"toolkit {__version__}"),
     _text("record_software", "programs and versions that made the record", _record_software),
     _text("not_stated", "what the session did not state", lambda c, _: "; ".join(c.gaps) or None),

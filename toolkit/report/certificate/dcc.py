@@ -83,6 +83,7 @@ def _administrative(c: Certificate) -> Node:
                 _identification("calibrationLaboratory", c.record, "Calibration record"),
                 _identification("calibrationLaboratory", c.record_sha256, "SHA-256 of the record"),
                 _identification("calibrationLaboratory", c.ledger_head, "Head of the ledger"),
+                _identification("calibrationLaboratory", c.signature, "Signatures of the record"),
             ),
             c.received and node("dcc:receiptDate", c.received.isoformat()),
             node("dcc:beginPerformanceDate", day),

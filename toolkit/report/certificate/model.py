@@ -193,7 +193,7 @@ class Certificate:
     record_software: tuple[tuple[str, str], ...]
     data: tuple[DataFile, ...]
     ledger_head: str
-    ledger_count: int
+    signature: str
     cells: tuple[Indication, ...]
     resolutions: tuple[float | None, ...]
     loads: tuple[LoadResult, ...]
@@ -214,6 +214,7 @@ class Certificate:
             unverified=False,
             draft_reasons=self.draft_reasons,
             since=(self.withdrawn,) if self.withdrawn else (),
+            signature=self.signature,
         )
 
     @property

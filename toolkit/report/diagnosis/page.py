@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.effects.catalogue import effects
+from toolkit.report.content import signature_text
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.maps import size_maps
 from toolkit.report.diagnosis.numbers import chance, few, over
@@ -71,6 +72,7 @@ def page(result: Result, use: CalibrationUse | None = None) -> str:
         page_parts(
             Path(__file__).parent,
             mark=None if use is None else use.mark,
+            signature=signature_text(() if use is None else (use,)),
             diagnosis=diagnosis,
             headline=headline(diagnosis),
             lead=_lead(diagnosis),

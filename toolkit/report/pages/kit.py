@@ -19,6 +19,8 @@ from typing import Any, Literal
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from toolkit.calibration.records.use import UNSIGNED
+
 KIT = Path(__file__).parent
 _NO_BREAK = "\u00a0"
 
@@ -72,8 +74,10 @@ class Figure:
         return f"data:image/svg+xml;base64,{base64.b64encode(self.svg).decode()}"
 
 
-def page_parts(folder: Path, **context: object) -> Iterator[str]:
+def page_parts(folder: Path, *, signature: str = UNSIGNED, **context: object) -> Iterator[str]:
     """Yield the page of a folder in parts, so that the rows of its tables are never held together.
+
+    ``signature`` is its line of signatures.
 
     Raises
     ------
@@ -93,7 +97,7 @@ def page_parts(folder: Path, **context: object) -> Iterator[str]:
             "form-action 'none'",
         )
     )
-    return template.generate(policy=policy, style=style, script=script, **context)
+    return template.generate(policy=policy, style=style, script=script, signature=signature, **context)
 
 
 def facts(title: str, texts: Mapping[str, str]) -> Markup:

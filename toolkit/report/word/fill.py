@@ -12,11 +12,12 @@ from lxml import etree
 
 from toolkit.errors import TemplateError
 from toolkit.files import sha256_bytes
-from toolkit.report.content import ReportContent, Table
+from toolkit.report.content import SIGNATURE, ReportContent, Table
 from toolkit.report.figures import Picture
 from toolkit.report.tags import Tag
 from toolkit.report.word.bulk import Bulk, row_texts
 from toolkit.report.word.check import LintFinding, check_stories
+from toolkit.report.word.closing import close
 from toolkit.report.word.contents import write_contents
 from toolkit.report.word.controls import (
     apply_condition,
@@ -165,6 +166,8 @@ class _Filler:
             if site.form == "control" and site.tag.family == "figure":
                 self._figure_control(site)
         added = self._marks(used)
+        for name, text in close(body.find(q("w:body")), self.content, signed=SIGNATURE in used):
+            self.log.manifest.append(Entry(tag=f"closing:{name}", text=text, part=self.parts[0].name))
         page_mark = self.content.page_mark
         if page_mark is not None:
             mark_pages(self.package, page_mark)

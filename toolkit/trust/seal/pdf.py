@@ -1,8 +1,9 @@
 """PAdES: a PDF is sealed as a whole, and whoever changes or adds one byte breaks the seal.
 
-Sealing adds one revision: the attachments, the mark of PDF/A-3 where the file was PDF/A-2, the signature
-(ETSI EN 319 142-1, B-B, with a time stamp B-T). A sealed file has one signature, which covers all of it.
-Later revisions are never looked into: a file that has any is not the one that was sealed.
+What a document carries enters it before the seal, as a revision of its own: the attachments, the mark of
+PDF/A-3 where the file was PDF/A-2, the code on its last page. The seal is the last revision (ETSI EN
+319 142-1, B-B, with a time stamp B-T). A sealed file has one signature, which covers all of it. Later
+revisions are never looked into: a file that has any is not the one that was sealed.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from toolkit.errors import TrustError
 from toolkit.trust.seal.attachments import attach, attachments_of
 from toolkit.trust.seal.check import Forged, SealCheck, Sealed, judged
 from toolkit.trust.seal.cms import demand_plain
+from toolkit.trust.seal.qr import Place, draw, qr_modules
 from toolkit.trust.seal.x509 import HASHES, Trust, load_certificate
 
 if TYPE_CHECKING:
@@ -79,6 +81,50 @@ def seal_pdf(
     except (PdfError, SigningError, OSError, ValueError) as error:
         raise _unsealable("the PDF cannot be sealed", str(error), "a PDF that LibreOffice wrote") from error
     return sealed.getvalue()
+
+
+def proved_pdf(data: bytes, files: Mapping[str, bytes], code: bytes, place: Place) -> bytes:
+    """Return a PDF that carries files and, on a page, a QR code; it can be sealed then.
+
+    Raises
+    ------
+    TrustError
+        ``seal``: no PDF that can be changed; ``proof-size``
+    """
+    from pyhanko.pdf_utils.misc import PdfError
+
+    modules, changed = qr_modules(code), io.BytesIO()
+    try:
+        writer = _writer(data)
+        attach(writer, files)
+        draw(writer, modules, place)
+        writer.write(changed)
+    except (PdfError, OSError, ValueError) as error:
+        raise _unsealable(
+            "the PDF cannot carry a proof", str(error), "a PDF that LibreOffice wrote"
+        ) from error
+    return changed.getvalue()
+
+
+def carried_by(data: bytes) -> dict[str, bytes]:
+    """Return the files that a PDF carries, by name, sealed or not: what they say has yet to be proved.
+
+    Raises
+    ------
+    TrustError
+        ``unreadable-document``: no PDF that can be read
+    """
+    from pyhanko.pdf_utils.reader import PdfFileReader
+
+    try:
+        return attachments_of(PdfFileReader(io.BytesIO(data), strict=True))
+    except Exception as error:
+        # Hostile bytes: a file that cannot be read carries nothing.
+        raise TrustError(
+            "the PDF cannot be read", where="PDF", got=f"{type(error).__name__}: {error}"[:200],
+            expected="a PDF as it was issued", next_step="take the document as it was issued",
+            rule="unreadable-document",
+        ) from error  # fmt: skip
 
 
 def check_pdf(data: bytes, trust: Trust, *, now: dt.datetime | None = None) -> SealCheck:

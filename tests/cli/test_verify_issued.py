@@ -1,0 +1,263 @@
+"""`toolkit verify` and `toolkit ledger check` of certificates as people issued them, and since.
+
+The ledger of the home is withdrawn from, cut short, rewritten, and forged behind the issue.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.calibration.registry.test_signatures import RECORD, _found, _registry, _rewrite
+from tests.trust.seal.seal_factory import flipped, key, trust
+from toolkit.calibration.registry.approval import withdraw
+from toolkit.calibration.registry.ledger import head_bytes
+from toolkit.errors import ToolkitError
+from toolkit.lab.certificate import deliver_certificate
+from toolkit.lab.home import packaged_home
+from toolkit.lab.people import check_against
+from toolkit.lab.proofs import anchor_in, registry_ledger
+from toolkit.lab.sealing import Sealing
+from toolkit.lab.verification import Verdict, verify_file
+from toolkit.report.word.package import read_template
+from toolkit.trust.seal.pdf import carried_by, proved_pdf
+from toolkit.trust.seal.qr import Place
+from toolkit.trust.seal.x509 import Trust
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+
+
+@dataclass(frozen=True)
+class Issued:
+    """A home whose people issued two certificates of a record: ``sealed/`` and ``plain/``."""
+
+    home: Path
+
+    def file(self, kind: str, suffix: str) -> Path:
+        """Return a file of an issue by its ending."""
+        return next((self.home / kind).glob(f"*{suffix}"))
+
+    def verify(self, path: Path, *, known: Trust | None = None) -> Verdict:
+        """Verify a file with the home's own ledger."""
+        return verify_file(path, known or trust(), ledger=registry_ledger(lambda: _registry(self.home)))
+
+    def continuity(self, path: Path) -> str:
+        """Hold today's ledger against a file."""
+        instrument, comparison = check_against(_registry(self.home), None, path)
+        assert instrument == "m15-virtual"
+        return comparison.continuity
+
+
+@pytest.fixture(scope="module")
+def issued_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("home")
+    shutil.copytree(packaged_home() / "calibrations", home / "calibrations")
+    shutil.copytree(packaged_home() / "report_templates", home / "report_templates")
+    style = home / "report_templates" / "org.toml"
+    style.write_text(style.read_text().replace("[laboratory]", '[laboratory]\ncountry = "DE"'))
+    _found(home)
+    template = read_template(home / "report_templates" / "certificate.docx")
+    for kind, sealing in (("sealed", Sealing(key=key())), ("plain", None)):
+        deliver_certificate(
+            _registry(home, "anna"), RECORD, template, home / kind, issued=date(2026, 6, 1), draft=False,
+            replaces=None, amendment=None, dcc=True, sealing=sealing, keep=False, step=lambda _text: None,
+        )  # fmt: skip
+    return home
+
+
+@pytest.fixture
+def issued(issued_once: Path, tmp_path: Path) -> Issued:
+    return Issued(Path(shutil.copytree(issued_once, tmp_path / "home")))
+
+
+FILES = [(kind, suffix) for kind in ("sealed", "plain") for suffix in (".pdf", ".docx", ".xml")]
+
+
+@pytest.mark.parametrize(("kind", "suffix"), FILES)
+def test_what_was_issued_holds(issued: Issued, kind: str, suffix: str) -> None:
+    verdict = issued.verify(issued.file(kind, suffix))
+    assert (verdict.ledger, verdict.still_holds) == ("continues", True)
+    if (kind, suffix) == ("plain", ".pdf"):
+        # Its own bytes stand in no entry: the words of the page may be anybody's.
+        assert (verdict.signature, verdict.code) == ("unsigned", 1)
+        return
+    assert (verdict.signature, verdict.code) == ("valid", 0), verdict.why
+    assert verdict.issued_by == ("Tire laboratory" if kind == "sealed" else "Anna")
+    assert verdict.issued_at is not None
+
+
+@pytest.mark.parametrize(("kind", "suffix"), FILES)
+def test_a_withdrawal_since_is_told_of_every_file(issued: Issued, kind: str, suffix: str) -> None:
+    withdraw(_registry(issued.home, "anna"), RECORD, on=date(2026, 11, 21), reason="sign", by="anna")
+    verdict = issued.verify(issued.file(kind, suffix))
+    assert (verdict.ledger, verdict.still_holds, verdict.code) == ("continues", False, 1)
+    assert "withdrawn since: sign" in verdict.why
+    if suffix != ".docx":
+        assert issued.continuity(issued.file(kind, suffix)) == "continues"
+
+
+def _lines(home: Path) -> list[bytes]:
+    return (home / "calibrations/m15-virtual/ledger.jsonl").read_bytes().splitlines(keepends=True)
+
+
+def _rolled_back(home: Path) -> None:
+    folder = home / "calibrations/m15-virtual"
+    kept = _lines(home)[:2]
+    (folder / "ledger.jsonl").write_bytes(b"".join(kept))
+    (folder / "head.json").write_bytes(head_bytes(2, json.loads(kept[-1])["sha256"]))
+
+
+def _rewritten(home: Path) -> None:
+    lines = [json.loads(line) for line in _lines(home)]
+    _rewrite(home, [lines[0], {**lines[1], "since": "2020-01-01"}, *lines[2:]])
+
+
+def _changed(home: Path) -> None:
+    path = home / "calibrations/m15-virtual/ledger.jsonl"
+    path.write_bytes(path.read_bytes().replace(b"virtual checker", b"another checker", 1))
+
+
+@pytest.mark.parametrize("suffix", [".pdf", ".xml"])
+@pytest.mark.parametrize("kind", ["sealed", "plain"])
+@pytest.mark.parametrize(
+    ("attack", "continuity"), [(_rolled_back, "rolled_back"), (_rewritten, "forked"), (_changed, "forked")]
+)
+def test_a_ledger_that_became_another_is_told_of_every_document(
+    issued: Issued, attack: Callable[[Path], None], continuity: str, kind: str, suffix: str
+) -> None:
+    attack(issued.home)
+    file = issued.file(kind, suffix)
+    assert issued.continuity(file) == continuity
+    verdict = issued.verify(file)
+    assert (verdict.ledger, verdict.code) == (continuity, 1)
+    assert verdict.signature == ("valid" if kind == "sealed" else "unsigned")
+
+
+def test_an_entry_forged_behind_the_issue_does_not_pass_for_a_sound_ledger(issued: Issued) -> None:
+    lines = [json.loads(line) for line in _lines(issued.home)]
+    _rewrite(issued.home, [*lines, {k: v for k, v in lines[-1].items() if k != "signatures"}])
+    verdict = issued.verify(issued.file("plain", ".docx"))
+    assert (verdict.ledger, verdict.still_holds, verdict.code) == ("continues", False, 1)
+    assert "not signed" in verdict.why
+
+
+def test_a_changed_file_is_none_of_the_issue(issued: Issued) -> None:
+    for suffix in (".docx", ".xml"):
+        path = issued.file("plain", suffix)
+        data = path.read_bytes()
+        path.write_bytes(
+            data.replace(b"</dcc:value>", b"0</dcc:value>", 1) if suffix == ".xml" else data + b"!"
+        )
+        assert path.read_bytes() != data
+        assert issued.verify(path).code == 2, suffix
+    pdf = issued.file("sealed", ".pdf")
+    pdf.write_bytes(flipped(pdf.read_bytes(), 5000))
+    assert issued.verify(pdf).code == 2
+
+
+def _with(pdf: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    proof = json.loads(carried_by(pdf.read_bytes())["toolkit.json"])
+    change(proof)
+    plain = subprocess.run(["pdftocairo", "-pdf", str(pdf), "-"], check=True, capture_output=True).stdout
+    place = Place(page=0, left=10, top=10, size=100)
+    pdf.write_bytes(proved_pdf(plain, {"toolkit.json": json.dumps(proof).encode()}, b"x", place))
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda proof: proof["ledger"].update(line=proof["ledger"]["line"] + " "), "proof does not hold"),
+        (lambda proof: proof["ledger"].update(index=1), "proof does not hold"),
+        (lambda proof: proof["records"][0].update(id="m15-r1"), "another record"),
+        (lambda proof: proof["files"][0].update(sha256="0" * 64), "proof is of another"),
+        (lambda proof: proof["ledger"].pop("path"), "cannot be read"),
+    ],
+)
+def test_a_proof_that_was_tampered_with_is_no_proof(
+    issued: Issued, change: Callable[[dict[str, Any]], None], why: str
+) -> None:
+    pdf = issued.file("plain", ".pdf")
+    _with(pdf, change)
+    verdict = issued.verify(pdf)
+    assert (verdict.signature, verdict.code) == ("invalid", 2)
+    assert why in verdict.why
+
+
+def test_a_signer_whom_nobody_here_knows_is_untrusted(issued: Issued) -> None:
+    """A customer has the files and no ledger."""
+    verdict = verify_file(issued.file("plain", ".docx"), Trust())
+    assert (verdict.signature, verdict.ledger, verdict.code) == ("untrusted", "unknown", 1)
+
+
+def test_the_whole_proof_and_the_compact_one_are_of_one_entry(issued: Issued, tmp_path: Path) -> None:
+    anchors = [
+        anchor_in(issued.file(kind, suffix).read_bytes())
+        for kind in ("sealed", "plain")
+        for suffix in (".pdf", ".xml")
+    ]
+    assert all(anchor is not None and anchor.proved for anchor in anchors)
+    assert [anchor.index for anchor in anchors if anchor] == [2, 2, 3, 3]
+    for number, anchor in enumerate(anchors):
+        assert anchor is not None
+        (tmp_path / f"{number}.txt").write_bytes(anchor.compact)
+        assert issued.continuity(tmp_path / f"{number}.txt") == "continues"
+        verdict = issued.verify(tmp_path / f"{number}.txt")
+        assert (verdict.kind, verdict.issued_by, verdict.code) == ("proof", "Anna", 0)
+
+
+def test_a_record_and_its_ledger_are_verified_too(issued: Issued) -> None:
+    folder = issued.home / "calibrations/m15-virtual"
+    verdict = issued.verify(folder / "ledger.jsonl")
+    assert (verdict.kind, verdict.signature, verdict.code) == ("ledger", "valid", 0)
+    # It was entered before anybody was enrolled.
+    verdict = issued.verify(folder / f"{RECORD}.json")
+    assert (verdict.kind, verdict.signature, verdict.still_holds, verdict.code) == (
+        "record",
+        "unsigned",
+        True,
+        1,
+    )
+    _rewritten(issued.home)
+    assert issued.verify(folder / "ledger.jsonl").code == 2
+    assert issued.verify(issued.home / "people/ledger.jsonl").signature == "valid"
+
+
+def test_who_may_not_issue_leaves_nothing(issued: Issued) -> None:
+    before = _lines(issued.home)
+    template = read_template(issued.home / "report_templates" / "certificate.docx")
+    for signers in ((), ("carl",), ("mallory",)):
+        with pytest.raises(ToolkitError) as refusal:
+            deliver_certificate(
+                _registry(issued.home, *signers), RECORD, template, issued.home / "new", issued=None,
+                draft=False, replaces=None, amendment=None, dcc=False, keep=False, step=lambda _text: None,
+            )  # fmt: skip
+        assert refusal.value.rule in ("not-signed", "not-allowed")
+    assert _lines(issued.home) == before
+    assert not (issued.home / "new").exists()
+
+
+def test_the_last_page_shows_the_signatures_and_the_code(issued: Issued) -> None:
+    pdf = issued.file("sealed", ".pdf")
+    text = subprocess.run(["pdftotext", "-layout", str(pdf), "-"], check=True, capture_output=True, text=True)
+    last = text.stdout.rstrip("\f\n").split("\f")[-1]
+    assert "Signature: record unsigned; document issued by Anna" in last
+    assert "entry of the laboratory's ledger" in last
+    assert last.index("Signature:") < last.index("End of certificate")
+    listed = subprocess.run(
+        ["pdfimages", "-list", str(pdf)], check=True, capture_output=True, text=True
+    ).stdout
+    assert listed.splitlines()[-1].split()[:3] == [
+        str(text.stdout.count("\f")),
+        *listed.splitlines()[-1].split()[1:3],
+    ]

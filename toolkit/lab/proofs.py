@@ -1,0 +1,258 @@
+"""The ledger's proof that a document carries, and what the ledger of a home says of it.
+
+A document's entry of the ledger names it and the hashes of its files. Who signed the entry is proved by the
+home's own ledger, whose every line is held against the people of its time; without one the proof stands
+alone, and its signer is nobody that is known here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from toolkit.calibration.records.use import UNSIGNED
+from toolkit.errors import ToolkitError
+from toolkit.inputs import read_regular
+from toolkit.trust.anchor import COMPACT, Anchor, compare, parse_anchor, parse_compact
+from toolkit.trust.checkpoint import parse_checkpoint
+from toolkit.trust.seal.check import Signature
+from toolkit.trust.witness import SUFFIX
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.ledger import Entry
+    from toolkit.calibration.registry.registry import Registry
+
+PROOF = "toolkit.json"
+"""Name of the JSON document in an issued PDF: its records, its ledger's proof, the files issued with it."""
+
+ORIGIN = "toolkit/"
+"""What the name of a laboratory's log begins with; the instrument follows."""
+
+Continuity = Literal["continues", "forked", "rolled_back", "unknown"]
+_NO_LEDGER = "no ledger here knows its records"
+
+
+def anchor_in(data: bytes, *, where: object = None) -> Anchor | None:
+    """Return the proof in a PDF, a digital certificate, a manifest, or a text of its own; None without one.
+
+    Raises
+    ------
+    TrustError
+        ``anchor``, ``checkpoint``: what stands there is none; ``unreadable-document``
+    """
+    text: str | None
+    if data.startswith(b"%PDF-"):
+        from toolkit.trust.seal.pdf import carried_by
+
+        text = carried_by(data).get(PROOF, b"").decode(errors="replace")
+    elif data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<":
+        from toolkit.trust.seal.xml_proof import proof_in
+
+        text = proof_in(data)
+    else:
+        text = data.decode(errors="replace")
+    return None if not text else _anchor(text, where)
+
+
+def _anchor(text: str, where: object) -> Anchor | None:
+    if text.startswith(COMPACT):
+        return parse_compact(text, where=where)
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    entries = document.get("ledger", document) if isinstance(document, dict) else None
+    if not isinstance(entries, dict) or "checkpoint" not in entries:
+        return None
+    return parse_anchor(entries, where=where)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Named:
+    """A record that a document names, with its hash."""
+
+    record: str
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LedgerState:
+    """What a ledger says of a document: whether it continues it, and whether its records still hold.
+
+    ``signature``, ``issued_by`` and ``issued_at`` are those of the document's entry; ``unsigned`` and None
+    where it has none. ``decided_by``: who signed the decisions that its record rests on.
+    """
+
+    ledger: Continuity = "unknown"
+    still_holds: bool | None = None
+    why: str = _NO_LEDGER
+    signature: Signature = "unsigned"
+    issued_by: str | None = None
+    issued_at: str | None = None
+    decided_by: str | None = None
+
+
+Ledger = Callable[[Sequence[Named], Anchor | None], LedgerState]
+"""Asked with the records that a document names, and with the proof that it carries."""
+
+
+def entry_of(anchor: Anchor) -> Mapping[str, Any]:
+    """Return the entry of a proof as JSON values; empty where the proof holds its hash alone."""
+    try:
+        body = json.loads(anchor.line or "{}")
+    except (ValueError, RecursionError):
+        return {}
+    return body if isinstance(body, dict) else {}
+
+
+def hashes_of(anchor: Anchor) -> Mapping[str, str]:
+    """Return the hashes that the entry of an issued document holds of its files, by name."""
+    document = entry_of(anchor).get("document")
+    if not isinstance(document, dict):
+        return {}
+    return {name: str(value) for name, value in document.items() if name not in ("name", "content")}
+
+
+def no_ledger(_names: Sequence[Named], anchor: Anchor | None) -> LedgerState:
+    """Return what is known of a document where there is no ledger: what its proof says of itself."""
+    if anchor is None:
+        return LedgerState()
+    signed = bool(entry_of(anchor).get("signatures"))
+    why = "who signed its entry is not known here" if signed else _NO_LEDGER
+    return LedgerState(signature="untrusted" if signed else "unsigned", why=why)
+
+
+def registry_ledger(open_registry: Callable[[], Registry | None]) -> Ledger:
+    """Return what a registry says of documents: whether it continues their proof, and their records hold.
+
+    It is opened when a document names a record or carries a proof.
+    """
+
+    def ask(names: Sequence[Named], anchor: Anchor | None) -> LedgerState:
+        registry = open_registry()
+        if registry is None:
+            return no_ledger(names, anchor)
+        states = [_standing(registry, name) for name in names]
+        if anchor is not None:
+            states.append(_continuity(registry, anchor))
+        return _joined(states, no_ledger(names, anchor))
+
+    return ask
+
+
+def _joined(states: Sequence[LedgerState], nothing: LedgerState) -> LedgerState:
+    known = [state for state in states if state.still_holds is not None or state.ledger != "unknown"]
+    if not known:
+        return nothing
+    proof = next((state for state in known if state.ledger != "unknown"), nothing)
+    held = [state for state in known if state.still_holds is not None]
+    worst = next((state for state in held if not state.still_holds), held[0] if held else None)
+    whys = [state.why for state in (proof, worst) if state is not None and state in known]
+    return LedgerState(
+        ledger=proof.ledger,
+        still_holds=None if worst is None else worst.still_holds,
+        why="; ".join(dict.fromkeys(whys)),
+        signature=proof.signature,
+        issued_by=proof.issued_by,
+        issued_at=proof.issued_at,
+        decided_by=None if worst is None else worst.decided_by,
+    )
+
+
+def _continuity(registry: Registry, anchor: Anchor) -> LedgerState:
+    """Return how a registry's ledger stands to a proof, and who signed the entry where it has it."""
+    instrument = anchor.checkpoint.origin.removeprefix(ORIGIN)
+    if instrument not in registry.instruments():
+        return LedgerState()
+    ledger = registry.ledger(instrument)
+    comparison = compare(raw_lines(registry, instrument), anchor.checkpoint, anchor)
+    if comparison.continuity != "continues":
+        return LedgerState(ledger=comparison.continuity, why=f"the ledger of {instrument}: {comparison.why}")
+    if ledger.damage is not None:
+        why = f"the ledger of {instrument} is damaged: {ledger.damage}"
+        return LedgerState(ledger="continues", still_holds=False, why=why)
+    return _signed(registry, ledger.entries[anchor.index], ledger.void)
+
+
+def _signed(registry: Registry, entry: Entry, void: frozenset[int]) -> LedgerState:
+    """Return the entry's signature: every line of a sound ledger is what its people signed."""
+    from toolkit.calibration.registry.signatures import names_of
+
+    why = f"entry {entry.seq} of the ledger"
+    if not entry.signatures:
+        return LedgerState(ledger="continues", why=f"{why}, unsigned", issued_at=entry.time)
+    names = names_of(entry, registry.people().history)
+    if entry.seq in void:
+        why = f"{why} is signed by a key of {names} that was revoked from before that time on"
+        return LedgerState(ledger="continues", still_holds=False, why=why, signature="untrusted")
+    return LedgerState(
+        ledger="continues", why=f"{why}, signed by {names}", signature="valid", issued_by=names,
+        issued_at=entry.time,
+    )  # fmt: skip
+
+
+def raw_lines(registry: Registry, instrument: str) -> list[str]:
+    """Return the lines of a ledger as they stand, whole or damaged: a proof tells where it was changed."""
+    from toolkit.calibration.registry.ledger import LEDGER
+    from toolkit.calibration.registry.settled import content
+
+    data = content(registry.folder / instrument / LEDGER) or b""
+    return [line.decode(errors="replace") for line in data.split(b"\n") if line]
+
+
+def ledger_file_state(path: Path) -> LedgerState:
+    """Return what is true of a ledger's file: whether its lines hold, and what witnesses signed of it.
+
+    Raises
+    ------
+    RegistryError
+        it is damaged, or a line of it is no decision of the laboratory's people
+    TrustError
+        ``people-log``; a witness's checkpoint cannot be read
+    """
+    from toolkit.calibration.registry.people_log import FOLDER, read_people
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.settled import damaged
+
+    folder = path.absolute().parent
+    if folder.name == FOLDER and (folder / f"{FOLDER}-1.toml").is_file():
+        people = read_people(folder.parent / "calibrations").history
+        return LedgerState(signature="valid", why=f"{len(people.versions)} versions, each signed")
+    registry, instrument = Registry(folder.parent), folder.name
+    ledger = registry.ledger(instrument)
+    if ledger.damage is not None:
+        raise damaged(folder, ledger.damage)
+    signed = sum(bool(entry.signatures) for entry in ledger.entries)
+    why = f"{len(ledger.entries)} entries, {signed} of them signed by people who were enrolled then"
+    signature: Signature = "valid" if signed and registry.people().history.now else "unsigned"
+    known = sorted((registry.folder.parent / "trust" / "witnessed").glob(f"{instrument}-*{SUFFIX}"))
+    lines = raw_lines(registry, instrument)
+    continuity: Continuity = "unknown"
+    for file in known:
+        comparison = compare(lines, parse_checkpoint(read_regular(file).decode(errors="replace"), where=file))
+        continuity, why = comparison.continuity, f"{why}; {file.name}: {comparison.why}"
+        if continuity != "continues":
+            break
+    return LedgerState(ledger=continuity, signature=signature, why=why)
+
+
+def _standing(registry: Registry, name: Named) -> LedgerState:
+    try:
+        record = registry.load(name.record)
+        status = registry.status(name.record)
+    except ToolkitError:
+        return LedgerState()
+    if record.sha256 != name.sha256:
+        return LedgerState(still_holds=False, why=f"record {name.record} here is another one")
+    if status.state in ("withdrawn", "discarded"):
+        reason = f": {status.reason}" if status.reason else ""
+        return LedgerState(still_holds=False, why=f"record {name.record} was {status.state} since{reason}")
+    signed = registry.signature(name.record)
+    return LedgerState(
+        still_holds=True,
+        why=f"record {name.record} is {status.state}",
+        decided_by=None if signed == UNSIGNED else signed,
+    )

@@ -1,0 +1,118 @@
+"""The end of a document: its line of signatures, and on the last page the place of the ledger's proof.
+
+The place is empty in the Word file, whose hash the proof holds. In the PDF a QR code is drawn there, where
+the words before it stand.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+
+from lxml import etree
+
+from toolkit.errors import RenderError
+from toolkit.report.content import ReportContent, say
+from toolkit.report.word.contents_pages import poppler
+from toolkit.report.word.xml import W_P, W_SDT, W_T, Element, new_run, q
+from toolkit.trust.seal.qr import Place
+
+LABEL = "Signature"
+CAPTION = (
+    "This document is an entry of the laboratory's ledger. The code below, in the PDF, proves it; the file "
+    "toolkit.json attached to the PDF holds the proof whole."
+)
+SIZE = 170.0
+"""Of the code's square, in points."""
+_SPACE, _GAP = 12.0, 4.0  # around the code, in points
+_WORD = re.compile(
+    r'<word xMin="([\d.-]+)" yMin="([\d.-]+)" xMax="([\d.-]+)" yMax="([\d.-]+)">([^<]*)</word>'
+)
+_PAGE = re.compile(r'<page width="([\d.]+)" height="([\d.]+)">')
+
+
+def close(body: Element, content: ReportContent, *, signed: bool) -> list[tuple[str, str]]:
+    """Write the end of a document; return its texts by what they are.
+
+    It stands before the words by which a template ends the document, where these name it. ``signed``: the
+    template has a place of its own for the signatures.
+    """
+    words = dict(content.style.words)
+    texts = [] if signed else [("signature", f"{say(LABEL, words)}: {content.signature}")]
+    texts += [("proof", say(CAPTION, words))] if content.symbol else []
+    paragraphs = [_paragraph(text) for _, text in texts] + ([_space()] if content.symbol else [])
+    at = _end(body, content.identity)
+    body[at:at] = paragraphs
+    return texts
+
+
+def place_of_symbol(pdf: Path, page: int, content: ReportContent) -> Place:
+    """Return where the code goes on the last page, which is ``page`` (from 1).
+
+    Raises
+    ------
+    RenderError
+        ``proof-place``: the page has no such place, or something stands there
+    """
+    listing = poppler(["pdftotext", "-bbox", "-f", str(page), "-l", str(page), str(pdf), "-"])
+    rows = _WORD.findall(listing)
+    boxes, texts = [tuple(map(float, row[:4])) for row in rows], [html.unescape(row[4]) for row in rows]
+    caption = say(CAPTION, dict(content.style.words)).split()
+    size = _PAGE.search(listing)
+    at = next((at for at in reversed(range(len(texts))) if texts[at : at + len(caption)] == caption), None)
+    if at is None or size is None:
+        raise _without("its words are not on the last page")
+    shown = boxes[at : at + len(caption)]
+    left, top = min(box[0] for box in shown), max(box[3] for box in shown) + _GAP
+    right, bottom = left + SIZE, top + SIZE
+    inside = [
+        text
+        for text, (x0, y0, x1, y1) in zip(texts, boxes, strict=True)
+        if x0 < right and x1 > left and y0 < bottom and y1 > top
+    ]
+    if inside or bottom > float(size[2]) or right > float(size[1]):
+        raise _without(f"{' '.join(inside[:5])!r} stands there" if inside else "the page ends there")
+    return Place(page=page - 1, left=left, top=top, size=SIZE)
+
+
+def _end(body: Element, identity: str) -> int:
+    """Return where the end of a body begins: its last words that name the document, or its last section."""
+    at = len(body) - (len(body) > 0 and body[-1].tag == q("w:sectPr"))
+    shown = next((place for place in reversed(range(at)) if _words(body[place])), None)
+    if shown is not None and body[shown].tag in (W_P, W_SDT) and identity and identity in _words(body[shown]):
+        return shown
+    return at
+
+
+def _words(element: Element) -> str:
+    return "".join(text.text or "" for text in element.iter(W_T)).strip()
+
+
+def _paragraph(text: str) -> Element:
+    paragraph = etree.Element(W_P)
+    properties = etree.SubElement(paragraph, q("w:pPr"))
+    for name in ("w:keepNext", "w:keepLines", "w:suppressAutoHyphens"):
+        etree.SubElement(properties, q(name))
+    etree.SubElement(properties, q("w:spacing")).set(q("w:before"), str(round(20 * _SPACE)))
+    paragraph.append(new_run(text, None))
+    return paragraph
+
+
+def _space() -> Element:
+    paragraph = etree.Element(W_P)
+    properties = etree.SubElement(paragraph, q("w:pPr"))
+    etree.SubElement(properties, q("w:keepNext"))
+    spacing = etree.SubElement(properties, q("w:spacing"))
+    spacing.set(q("w:line"), str(round(20 * (SIZE + _SPACE))))
+    spacing.set(q("w:lineRule"), "exact")
+    return paragraph
+
+
+def _without(got: str) -> RenderError:
+    return RenderError(
+        "the PDF has no place for the ledger's proof", where="last page", got=got,
+        expected="the words that end the document, and an empty place below them",
+        next_step="take away what the template puts at the end of its last page; nothing was issued",
+        rule="proof-place",
+    )  # fmt: skip
