@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import date
 from functools import cached_property
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.clock import day_of, moment, today
 from toolkit.files import sha256_bytes
+from toolkit.trust.decisions import SIGNATURE
 
 LEDGER = "ledger.jsonl"
 HEAD = "head.json"
@@ -42,6 +43,9 @@ class Entry:
     ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file); the first one has ``heads``:
     count and last hash of every ledger until then, whose lines need no signature.
 
+    ``clock``: whether a time server kept the clock of the computer that wrote the line; older lines have
+    none.
+
     A signed line has ``action``, ``subject``, ``meaning``, ``extends``, ``people`` and ``signatures``
     (`toolkit.trust.decisions`).
     """
@@ -53,6 +57,7 @@ class Entry:
     id: str
     time: str
     by: str
+    clock: str | None = None
     record: str | None = None
     file: str | None = None
     inputs: str | None = None
@@ -72,6 +77,15 @@ class Entry:
     extends: str | None = None
     people: str | None = None
     signatures: tuple[Mapping[str, str], ...] = ()
+
+
+_LISTS = ("unverifiable", "evidence", "signatures")
+_TYPES: Mapping[str, tuple[type, ...]] = {
+    **{part.name: (str, type(None)) if part.default is None else (str,) for part in fields(Entry)},
+    **dict.fromkeys(_LISTS, (list,)), **dict.fromkeys(("document", "heads", "subject"), (dict,)),
+    "seq": (int,),
+}  # fmt: skip
+"""What each entry of a line is in JSON."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +171,7 @@ def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:
     for number, line in enumerate(parts[:-1], start=1):
         try:
             entry = _entry(line, number, prev)
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             damage = f"line {number} of the ledger is damaged: {error}"
             break
         entries.append(entry)
@@ -186,10 +200,16 @@ def _entry(line: bytes, number: int, prev: str) -> Entry:
         raise ValueError("it does not follow the line before")
     if body["event"] not in EVENTS:
         raise ValueError(f"unknown event {body['event']!r}")
+    for key, value in body.items():
+        if type(value) not in _TYPES[key]:
+            raise ValueError(f"{key} is {value!r}")
+    for row in body.get("signatures", ()):
+        if type(row) is not dict or {*row} != SIGNATURE or not all(isinstance(row[key], str) for key in row):
+            raise ValueError("a signature says other than by whom, by which key, for what")
     moment(body["time"])
     for key in ("known_on", "since"):
         if body.get(key) is not None:
             body[key] = date.fromisoformat(body[key])
-    for key in ("unverifiable", "evidence", "signatures"):
+    for key in _LISTS:
         body[key] = tuple(body.get(key, ()))
     return Entry(**{**body, "sha256": stated})
