@@ -149,6 +149,15 @@ CERTIFICATE_FILE = Form(
     rule="trust-certificate",
     expected="a certificate, PEM or DER",
 )
+REQUEST_FILE = Form(
+    title="the signing request",
+    limit=16 * MIB,
+    reason="a record has a hundredth of it",
+    error=TrustError,
+    rule="request",
+    expected="a file that --request wrote, or toolkit sign",
+    next_step="check the path",
+)
 FORMS = (
     SETTINGS_FILE,
     RECORDING_FILE,
@@ -164,6 +173,7 @@ FORMS = (
     DATA_FILE,
     PDF_FILE,
     CERTIFICATE_FILE,
+    REQUEST_FILE,
 )
 
 _SIZE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(?:([KMGT])I?)?B?\s*", re.IGNORECASE)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,3 +67,26 @@ def session_text(**changes: str) -> str:
     if not {"loads", "indications"} & changes.keys():
         entries.setdefault("polarity", polarity_text())
     return "\n".join(f"{key} = {value}" for key, value in entries.items() if value != "-") + "\n"
+
+
+def write_session(
+    place: Path,
+    values: NDArray[np.float64] | None = None,
+    *,
+    check_rows: NDArray[np.float64] | None = None,
+    tail: str = "",
+    name: str = "session",
+    digits: int = 7,
+    **changes: str,
+) -> Path:
+    """Write a hub session: ``values`` replaces its rows, other keywords entries of SESSION.toml."""
+    folder = place / name
+    folder.mkdir(exist_ok=True)
+    names = [f"{c} [mV/V]" for c in CELLS] + [f"{n} [{UNITS[n]}]" for n in LOADS]
+    values = hub_data(60, 1) if values is None else values
+    check = hub_data(9, 2) if check_rows is None else check_rows
+    (folder / "loads.csv").write_text(csv_text(names, values, runs=True, digits=digits))
+    (folder / "check.csv").write_text(csv_text(names, check, runs=False, digits=digits))
+    path = folder / "SESSION.toml"
+    path.write_text(session_text(**changes) + tail)
+    return path

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import typer
 
+from toolkit.calibration.registry.clock import today
 from toolkit.cli import calibrate, calibration
 from toolkit.errors import ToolkitError
 
@@ -99,7 +100,7 @@ def test_the_life_of_a_record(run: Run, session: Path) -> None:
     assert run("calibration", "verify", "--head", approved["head"])[0] == 0
     assert run("calibration", "verify", "--head", "0" * 64)[0] == 1
     withdrawn = run(
-        "calibration", "withdraw", "pair-r1", "--on", "2026-04-01", "--from", "2026-03-01",
+        "calibration", "withdraw", "pair-r1", "--on", today().isoformat(), "--from", "2026-03-01",
         "--reason", "dropped", "--by", "B",
     )  # fmt: skip
     assert (withdrawn[0], withdrawn[1]["void_from"]) == (0, "2026-03-01")
@@ -107,7 +108,7 @@ def test_the_life_of_a_record(run: Run, session: Path) -> None:
         run("calibration", "show", "pair-r1", "--known-at", "2026-03-31")[1]["record"]["status"] == "approved"
     )
     assert (
-        run("calibration", "show", "pair-r1", "--known-at", "2026-04-01")[1]["record"]["status"]
+        run("calibration", "show", "pair-r1", "--known-at", today().isoformat())[1]["record"]["status"]
         == "withdrawn"
     )
     events = run("calibration", "history", "pair-r1")[1]["events"]

@@ -8,16 +8,19 @@ from typing import Annotated
 import typer
 
 from toolkit.cli.console import (
+    Answers,
     Calibrations,
     Home,
     Json,
     LockFile,
     Machine,
     Quiet,
+    RequestFile,
     Sign,
     answer,
     exit_code,
     open_signers,
+    open_travel,
 )
 from toolkit.errors import ConfigError
 
@@ -41,6 +44,8 @@ def command(
     ] = False,
     lock_file: LockFile = False,
     sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
     full: Full = False,
     figures: Figures = None,
     home: Home = None,
@@ -77,8 +82,9 @@ def command(
             rule="usage",
         )
     registry = Registry(
-        registry_to_write(calibrations or out, home), lock_file=lock_file, signers=open_signers(sign)
-    )
+        registry_to_write(calibrations or out, home), lock_file=lock_file, signers=open_signers(sign),
+        travel=open_travel(request, answers),
+    )  # fmt: skip
     if dry_run and figures is not None:
         raise ConfigError(
             "a dry run makes no files",

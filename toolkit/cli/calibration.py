@@ -11,6 +11,7 @@ import typer
 from toolkit.cli import calibration_results as results
 from toolkit.cli.calibrate import Figures
 from toolkit.cli.console import (
+    Answers,
     Calibrations,
     Home,
     Id,
@@ -18,14 +19,17 @@ from toolkit.cli.console import (
     LockFile,
     Machine,
     Quiet,
+    RequestFile,
     Sign,
     answer,
     exit_code,
     open_signers,
+    open_travel,
 )
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.trust.signing import Travel
 
 app = typer.Typer(help="Calibration records: what is in force, and why.", no_args_is_help=True)
 
@@ -137,6 +141,8 @@ def import_record(
     calibrations: Calibrations = None,
     lock_file: LockFile = False,
     sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -151,8 +157,9 @@ def import_record(
     from toolkit.lab.registry_answer import record_row
 
     registry = Registry(
-        registry_to_write(calibrations, home), lock_file=lock_file, signers=open_signers(sign)
-    )
+        registry_to_write(calibrations, home), lock_file=lock_file, signers=open_signers(sign),
+        travel=open_travel(request, answers),
+    )  # fmt: skip
     record, existing = import_legacy(file, registry, again=again)
     path = registry.folder / record.instrument / f"{record.id}.json"
     payload = {
@@ -197,6 +204,8 @@ def approve(
     calibrations: Calibrations = None,
     lock_file: LockFile = False,
     sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -208,7 +217,9 @@ def approve(
     from toolkit.calibration.registry.approval import approve as decide
     from toolkit.lab.answers import finding_lines
 
-    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
+    registry = _registry(
+        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
+    )
     since = _day(in_force_from, "--in-force-from")
     decision = decide(
         registry, record_id, in_force_from=since or dt.date.max, checked_by=checked_by,
@@ -248,6 +259,8 @@ def withdraw(
     calibrations: Calibrations = None,
     lock_file: LockFile = False,
     sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -259,7 +272,9 @@ def withdraw(
     from toolkit.calibration.registry.approval import withdraw as decide
     from toolkit.lab.registry_answer import void_day
 
-    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
+    registry = _registry(
+        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
+    )
     known_on = _day(on, "--on") or dt.date.max
     status = decide(
         registry, record_id, on=known_on, void_from=_day(void_from, "--from"), reason=reason, by=by
@@ -294,10 +309,12 @@ def diff(
 def discard(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
     reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
-    by: Annotated[str, typer.Option("--by", help="Who discards.")] = "not stated",
+    by: Annotated[str, typer.Option("--by", help="Who discards.")],
     calibrations: Calibrations = None,
     lock_file: LockFile = False,
     sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -311,7 +328,9 @@ def discard(
     """
     from toolkit.calibration.registry.approval import discard as decide
 
-    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
+    registry = _registry(
+        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
+    )
     status = decide(registry, record_id, reason=reason, by=by)
     head = registry.head(_instrument_of(record_id))
     payload = {"id": record_id, "status": status.state, "reason": status.reason, "head": head}
@@ -368,11 +387,12 @@ app.command("due")(results.due)
 
 
 def _registry(
-    calibrations: Path | None, home: Path | None, *, lock_file: bool = False, sign: list[Path] | None = None
-) -> Registry:
+    calibrations: Path | None, home: Path | None, *, lock_file: bool = False,
+    sign: list[Path] | None = None, travel: Travel | None = None,
+) -> Registry:  # fmt: skip
     from toolkit.lab.home import open_registry
 
-    return open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))
+    return open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign), travel=travel)
 
 
 def _instrument_of(record_id: str) -> str:

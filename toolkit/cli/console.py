@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.findings import Finding
     from toolkit.trust.keys import Signer
+    from toolkit.trust.signing import Travel
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
@@ -37,6 +38,22 @@ Sign = Annotated[
         "--sign",
         metavar="KEY",
         help="Private SSH key that signs, or the public one of a key in the agent; once for each person.",
+    ),
+]
+RequestFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--request",
+        metavar="FILE",
+        help="Write what is to be signed to FILE, for 'toolkit sign' on another computer; enter nothing.",
+    ),
+]
+Answers = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--answer",
+        metavar="FILE",
+        help="Enter what was requested, by the answer of 'toolkit sign'; once for each file.",
     ),
 ]
 Machine = Annotated[
@@ -143,6 +160,31 @@ def open_signers(keys: Sequence[Path] | None) -> tuple[Signer, ...]:
     from toolkit.trust.keys import open_signer
 
     return tuple(open_signer(key, partial(getpass, f"passphrase of {key}: ")) for key in keys or ())
+
+
+def open_travel(request: Path | None, answers: Sequence[Path] | None) -> Travel:
+    """Return what travels to keys elsewhere: the request to write, or the answers that came back.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: both
+    TrustError
+        ``request``: an answer is none
+    """
+    from toolkit.trust.requests import read_request
+    from toolkit.trust.signing import Travel
+
+    if request is not None and answers:
+        from toolkit.errors import ConfigError
+
+        raise ConfigError(
+            "a request and its answer are two steps", where="--request, --answer", got="both",
+            expected="one of the two",
+            next_step="make the request, let it be signed, then give --answer; nothing was changed",
+            rule="usage",
+        )  # fmt: skip
+    return Travel(request=request, answers=tuple(map(read_request, answers or ())))
 
 
 def answer(payload: dict[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:

@@ -9,9 +9,10 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from toolkit.cli.console import print_error, print_usage_error
+from toolkit.cli.console import answer, print_error, print_usage_error
 from toolkit.errors import ToolkitError
 from toolkit.inputs import raise_limits, size_of
+from toolkit.trust.requested import Requested
 from toolkit.version import __version__
 
 # typer carries a copy of click whose exceptions it does not export: the root of its usage errors.
@@ -62,6 +63,7 @@ def _register() -> None:
         person,
         process,
         report,
+        sign,
         simulate,
         template,
         verify,
@@ -80,7 +82,7 @@ def _register() -> None:
     app.add_typer(machine.app, name="machine")
     app.add_typer(person.person, name="person")
     app.add_typer(person.ledger, name="ledger")
-    for module in (audit, simulate, diagnose, verify):
+    for module in (sign, audit, simulate, diagnose, verify):
         app.command(module.NAME)(module.command)
     app.command("explain")(installation.explain)
     app.command("qualify")(installation.qualify)
@@ -133,6 +135,12 @@ def run(arguments: list[str] | None = None) -> NoReturn:
     as_json = "--json" in arguments
     try:
         code = _command()(args=arguments, prog_name="toolkit", standalone_mode=False)
+    except Requested as outcome:
+        from toolkit.lab.signing import requested
+
+        quiet = not {"--quiet", "-q"}.isdisjoint(arguments)
+        answer(*requested(outcome), as_json=as_json, quiet=quiet)
+        code = 0
     except ToolkitError as error:
         print_error(error, as_json=as_json)
         code = error.exit_code

@@ -7,15 +7,31 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, LockFile, Quiet, Sign, answer, open_signers
+from toolkit.cli.console import (
+    Answers,
+    Calibrations,
+    Home,
+    Json,
+    LockFile,
+    Quiet,
+    RequestFile,
+    Sign,
+    answer,
+    open_signers,
+    open_travel,
+)
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.trust.people import Role
+    from toolkit.trust.signing import Travel
 
 person = typer.Typer(help="The people of the laboratory, their keys and roles.", no_args_is_help=True)
 ledger = typer.Typer(help="The ledger, as documents and witnesses know it.", no_args_is_help=True)
 
+By = Annotated[
+    str | None, typer.Option("--by", help="Who decides, by id; default: whose key signs or has answered.")
+]
 Why = Annotated[str, typer.Option("--reason", help="Why; the log of people keeps it.")]
 Instrument = Annotated[str, typer.Argument(help="Instrument, such as m15.")]
 
@@ -50,7 +66,10 @@ def enrol(
     recovery: Annotated[
         Path | None, typer.Option("--recovery", help="Key that is kept apart: first enrolment by one head.")
     ] = None,
+    by: By = None,
     sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
     calibrations: Calibrations = None,
     lock_file: LockFile = False,
     home: Home = None,
@@ -63,11 +82,13 @@ def enrol(
     """
     from toolkit.lab.people import enrol_person, people_answer
 
-    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
+    registry = _registry(
+        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
+    )
     recovered = open_signers([recovery])[0] if recovery is not None else None
     roles = cast("list[Role]", role)
     log = enrol_person(
-        registry, person_id, name=name, roles=roles, key=key, reason=reason, recovery=recovered
+        registry, person_id, name=name, roles=roles, key=key, reason=reason, recovery=recovered, by=by
     )
     answer(*people_answer(log), as_json=as_json, quiet=quiet)
     return 0
@@ -95,7 +116,10 @@ def revoke(
     ],
     reason: Why,
     key: Annotated[str | None, typer.Option("--key", help="Its fingerprint; default: every key.")] = None,
+    by: By = None,
     sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
     calibrations: Calibrations = None,
     lock_file: LockFile = False,
     home: Home = None,
@@ -108,8 +132,10 @@ def revoke(
     """
     from toolkit.lab.people import people_answer, revoke_key
 
-    registry = _registry(calibrations, home, lock_file=lock_file, sign=sign)
-    log = revoke_key(registry, person_id, fingerprint=key, since=since, reason=reason)
+    registry = _registry(
+        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
+    )
+    log = revoke_key(registry, person_id, fingerprint=key, since=since, reason=reason, by=by)
     answer(*people_answer(log), as_json=as_json, quiet=quiet)
     return 0
 
@@ -193,8 +219,9 @@ def witness(
 
 
 def _registry(
-    calibrations: Path | None, home: Path | None, *, lock_file: bool = False, sign: list[Path] | None = None
-) -> Registry:
+    calibrations: Path | None, home: Path | None, *, lock_file: bool = False,
+    sign: list[Path] | None = None, travel: Travel | None = None,
+) -> Registry:  # fmt: skip
     from toolkit.lab.home import open_registry
 
-    return open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))
+    return open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign), travel=travel)

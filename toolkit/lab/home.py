@@ -13,6 +13,7 @@ from toolkit.errors import ConfigError
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.trust.keys import Signer
+    from toolkit.trust.signing import Travel
 
 TEMPLATES = "report_templates"
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -73,11 +74,15 @@ def open_registry(
     *,
     lock_file: bool = False,
     signers: Sequence[Signer] = (),
+    travel: Travel | None = None,
 ) -> Registry:
     """Return the registry of `calibrations_folder`; ``lock_file``: where the file system has no locks."""
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.trust.signing import HERE
 
-    return Registry(calibrations_folder(calibrations, home), lock_file=lock_file, signers=signers)
+    return Registry(
+        calibrations_folder(calibrations, home), lock_file=lock_file, signers=signers, travel=travel or HERE
+    )
 
 
 def registry_if_any(calibrations: Path | None = None, home: Path | None = None) -> Registry | None:

@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.people_log import PeopleLog, enrol
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import write_atomic
@@ -34,11 +33,12 @@ _HEAD = re.compile(r"\b[0-9a-f]{64}\b")
 
 def enrol_person(
     registry: Registry, person_id: str, *, name: str, roles: Sequence[Role], key: Path, reason: str,
-    recovery: Signer | None = None,
+    recovery: Signer | None = None, by: str | None = None,
 ) -> PeopleLog:  # fmt: skip
     """Enrol a person, or add a key to one; the first enrolment is signed by two heads.
 
-    ``recovery`` is a second head's key, printed and kept apart, for a laboratory with one head.
+    ``recovery`` is a second head's key, printed and kept apart, for a laboratory with one head. ``by`` is who
+    decides; default: the first whose key signs.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def enrol_person(
         the key is refused, or the signers may not enrol; nothing is changed
     """
     log = registry.people()
-    since = now()
+    since = registry.now()
     public = parse_public(_text(key), where=key)
     people = log.history.now.people.person if log.history.now is not None else ()
     known = next((person for person in people if person.id == person_id), None)
@@ -56,19 +56,20 @@ def enrol_person(
     )  # fmt: skip
     if log.history.now is not None:
         changed = log.history.now.people.with_person(person)
-        return _enter(registry, changed, registry.signers, reason)
+        return _enter(registry, changed, registry.signers, reason, by)
     first = [person]
     signers = list(registry.signers)
     if recovery is not None:
         keys = (Key(key=recovery.public.line, since=since),)
         first.append(Person(id=RECOVERY, name="Recovery key", roles=("head",), keys=keys))
         signers.append(recovery)
-    return _enter(registry, People(person=tuple(first)), signers, reason)
+    return _enter(registry, People(person=tuple(first)), signers, reason, by)
 
 
 def revoke_key(
-    registry: Registry, person_id: str, *, fingerprint: str | None, since: str, reason: str
-) -> PeopleLog:
+    registry: Registry, person_id: str, *, fingerprint: str | None, since: str, reason: str,
+    by: str | None = None,
+) -> PeopleLog:  # fmt: skip
     """End a person's key, or all of them, from a time on; what it signed before holds.
 
     Raises
@@ -87,7 +88,7 @@ def revoke_key(
         raise _nobody(fingerprint or person_id, [key.public.fingerprint for key in person.keys])
     keys = tuple(replace(key, until=max(since, key.since)) if key in chosen else key for key in person.keys)
     people = version.people.with_person(replace(person, keys=keys))
-    return _enter(registry, people, registry.signers, reason)
+    return _enter(registry, people, registry.signers, reason, by)
 
 
 def people_answer(log: PeopleLog) -> tuple[dict[str, Any], str]:
@@ -218,14 +219,26 @@ def _head(text: str) -> str | None:
         return None
 
 
-def _enter(registry: Registry, people: People, signers: Sequence[Signer], reason: str) -> PeopleLog:
+def _enter(
+    registry: Registry, people: People, signers: Sequence[Signer], reason: str, by: str | None
+) -> PeopleLog:
     heads = {
         name: (len(registry.ledger(name).entries), registry.head(name)) for name in registry.instruments()
     }
-    owner = next((person.id for signer in signers if (person := people.owner(signer.public))), "nobody")
+    now = registry.people().history.now
+    deciding = people if now is None else now.people
+    answered = [str(answer.body["by"]) for answer in registry.travel.answers]
+    owners = [person.id for signer in registry.signers if (person := deciding.owner(signer.public))]
+    named = by or next(iter((*answered, *owners)), None)
+    if named is None and registry.travel.request is not None:
+        raise TrustError(
+            "a request says who decides", where="--by", got="nobody", expected="the id of who will sign",
+            next_step="add --by ID; nothing was changed", rule="person",
+        )  # fmt: skip
     return enrol(
-        registry.folder, people, signers, by=owner, reason=reason, heads=heads, lock_file=registry.lock_file
-    )
+        registry.folder, people, signers, by=named or "nobody", reason=reason, heads=heads,
+        lock_file=registry.lock_file, travel=registry.travel,
+    )  # fmt: skip
 
 
 def _text(path: Path) -> str:

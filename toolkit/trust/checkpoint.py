@@ -109,12 +109,13 @@ def parse_checkpoint(text: str, *, where: object = None) -> Checkpoint:
         value = base64.b64decode(root, validate=True)
         lines = tuple(_signature(line) for line in signatures.splitlines())
         whole = bool(origin) and size.isdecimal() and str(int(size)) == size and len(value) == HASH_BYTES
-        whole = whole and (not signatures or signatures.endswith("\n"))
+        checkpoint = Checkpoint(origin=origin, size=int(size), root=value, signatures=lines)
+        whole = whole and checkpoint.text == text  # base64 has more than one spelling
     except (ValueError, binascii.Error) as error:
         raise _unreadable(text, where) from error
     if not whole:
         raise _unreadable(text, where)
-    return Checkpoint(origin=origin, size=int(size), root=value, signatures=lines)
+    return checkpoint
 
 
 def _unreadable(text: str, where: object) -> TrustError:

@@ -12,9 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from toolkit.errors import TrustError
 from toolkit.trust.keys import Signer
-from toolkit.trust.people import MEANINGS, NAMESPACE, Action, History, Version, objections
+from toolkit.trust.people import MEANINGS, NAMESPACE, STATED, Action, History, Version, objections
 from toolkit.trust.ssh import BadSignatureError, PublicKey, check
 
 ACTIONS: Mapping[str, Action] = {
@@ -22,40 +21,19 @@ ACTIONS: Mapping[str, Action] = {
     "issued": "issue", "enrolled": "enrol",
 }  # fmt: skip
 _UNSIGNED = ("signatures", "sha256")
+SIGNATURE = {"by", "key", "namespace", "sig"}
+"""What a signature of a line says."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Signing:
-    """Who signs now: the people of the laboratory, and the keys that are at hand."""
+def stated(event: Mapping[str, Any], action: Action) -> list[str]:
+    """Return the people whom a decision names as those who make it."""
+    return [str(event[key]) for key in STATED.get(action, ()) if event.get(key)]
 
-    history: History
-    signers: tuple[Signer, ...] = ()
 
-    def check(self, action: Action, time: str, *, operator: str | None = None, where: object = None) -> None:
-        """Refuse a decision that the keys at hand do not make; nothing is signed yet.
-
-        Raises
-        ------
-        TrustError
-            ``not-signed``: no key; ``not-allowed``: it takes other people, or more
-        """
-        if self.history.now is None:
-            return
-        if not self.signers:
-            demand = self.history.now.people.policy.demand(action)
-            raise TrustError(
-                f"to {action} takes a signature", where=where, got="no key",
-                expected=f"{demand.signatures} by {' or '.join(demand.roles)}",
-                next_step="sign with --sign KEY; nothing was changed", rule="not-signed",
-            )  # fmt: skip
-        publics = [signer.public for signer in self.signers]
-        reasons = objections(self.history.at(time), action, time, publics, operator=operator)
-        if reasons:
-            raise TrustError(
-                f"these keys cannot {action}", where=where, got="; ".join(reasons),
-                expected=f"what {action} takes by the laboratory's policy",
-                next_step="see 'toolkit person list'; nothing was changed", rule="not-allowed",
-            )  # fmt: skip
+def action_of(event: Mapping[str, Any]) -> Action:
+    """Return what an event does; an import says so itself, for it is entered as a session's record is."""
+    action = ACTIONS[event["event"]]
+    return "import" if action == "enter" and event.get("action") == "import" else action
 
 
 def statement(
@@ -66,7 +44,7 @@ def statement(
     ``subject`` is the hash of the record that the decision is about, ``root`` that of the tree over the lines
     before.
     """
-    action = ACTIONS[event["event"]]
+    action = action_of(event)
     return {
         "action": action,
         "subject": {"record": event["id"], "sha256": subject},
@@ -76,18 +54,14 @@ def statement(
     }
 
 
-def signatures_of(signing: Signing, message: bytes) -> list[dict[str, str]]:
-    """Return the signatures of a line's content by every key at hand, as the line has them."""
-    rows = []
-    for signer in signing.signers:
-        person = None if signing.history.now is None else signing.history.now.people.owner(signer.public)
-        rows.append({
-            "by": "" if person is None else person.id,
-            "key": signer.public.fingerprint,
-            "namespace": NAMESPACE,
-            "sig": signer.armour(message, NAMESPACE),
-        })  # fmt: skip
-    return rows
+def signature_row(person: str, signer: Signer, message: bytes) -> dict[str, str]:
+    """Return a person's signature of a line's content, as the line has it."""
+    return {
+        "by": person,
+        "key": signer.public.fingerprint,
+        "namespace": NAMESPACE,
+        "sig": signer.armour(message, NAMESPACE),
+    }
 
 
 def unsigned(body: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,37 +74,39 @@ class SignedLine:
     """A line of a ledger, for its judgement.
 
     ``message`` is what is signed; ``body`` its entries; ``subject`` the hash of the record that its id had
-    when it was entered; ``operator`` the person who entered that.
+    when it was entered; ``operators`` the people who entered that, by id or name.
     """
 
     seq: int
     body: Mapping[str, Any]
     message: bytes
     subject: str | None
-    operator: str | None
+    operators: tuple[str, ...]
     root: bytes
 
 
 def violations(line: SignedLine, history: History) -> list[str]:
     """Say why a line is no decision of the laboratory's people; empty where it is."""
     body, time = line.body, str(line.body["time"])
-    action = ACTIONS[body["event"]]
+    action = action_of(body)
     rows = body.get("signatures")
     if not isinstance(rows, list) or not rows:
         return ["it is not signed"]
     version = history.at(time, body.get("people"))
-    stated = statement(body, line.subject, line.root, version)
-    reasons = [f"its {name!r} is not what it should be" for name in stated if body.get(name) != stated[name]]
+    said = statement(body, line.subject, line.root, version)
+    reasons = [f"its {name!r} is not what it should be" for name in said if body.get(name) != said[name]]
     publics: list[PublicKey] = []
     for row in rows:
         try:
-            publics.append(_signer_of(row, line.message, version))
+            publics.append(signer_of(row, line.message, version))
         except BadSignatureError as error:
             reasons.append(f"a signature proves nothing: {error}")
-    return reasons or objections(version, action, time, publics, operator=line.operator)
+    return reasons or objections(
+        version, action, time, publics, stated=stated(body, action), operators=line.operators
+    )
 
 
-def _signer_of(row: object, message: bytes, version: Version | None) -> PublicKey:
+def signer_of(row: object, message: bytes, version: Version | None) -> PublicKey:
     """Return the key of one signature.
 
     Raises
@@ -138,8 +114,8 @@ def _signer_of(row: object, message: bytes, version: Version | None) -> PublicKe
     BadSignatureError
         it does not hold, or names another key or person than it was made by
     """
-    if not isinstance(row, Mapping) or row.get("namespace") != NAMESPACE:
-        raise BadSignatureError("it is for another purpose")
+    if not isinstance(row, Mapping) or {*row} != SIGNATURE or row["namespace"] != NAMESPACE:
+        raise BadSignatureError("it is for another purpose, or says more than who signed")
     public = check(str(row.get("sig")), message, NAMESPACE)
     person = None if version is None else version.people.owner(public)
     if row.get("key") != public.fingerprint or person is None or row.get("by") != person.id:

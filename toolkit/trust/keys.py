@@ -50,6 +50,7 @@ def open_signer(path: Path, passphrase: Passphrase) -> Signer:
     data = _content(path)
     if not data.lstrip().startswith(b"-----BEGIN"):
         return agent_signer(parse_public(data.decode(errors="replace"), where=path))
+    _demand_outside(path)
     return _signer(path, data, passphrase)
 
 
@@ -64,6 +65,7 @@ def make_key(path: Path, passphrase: str, comment: str) -> PublicKey:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, Encoding, PrivateFormat
 
+    _demand_outside(path)
     if not passphrase:
         raise _unusable(path, "an empty passphrase", "a passphrase that is not empty")
     private = Ed25519PrivateKey.generate()
@@ -139,6 +141,17 @@ def _signer(path: Path, data: bytes, passphrase: Passphrase) -> Signer:
     if not isinstance(private, ed25519.Ed25519PrivateKey | rsa.RSAPrivateKey | ec.EllipticCurvePrivateKey):
         raise _unusable(path, "a kind of key that is refused", "ssh-ed25519")
     return Signer(public_of(private), lambda message: sign_with(private, message))
+
+
+def _demand_outside(path: Path) -> None:
+    home = next((folder for folder in path.resolve().parents if (folder / "calibrations").is_dir()), None)
+    if home is not None:
+        raise TrustError(
+            "a private key lies in a laboratory's home", where=path, got=f"inside {home}, which is copied",
+            expected="a key outside of every home",
+            next_step="move the key, for example to ~/.ssh; a copy of the home may hold it already",
+            rule="signing-key",
+        )  # fmt: skip
 
 
 def _content(path: Path) -> bytes:

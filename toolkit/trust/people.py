@@ -7,17 +7,22 @@ date on, signed nothing from that date on, whatever the version of that time sai
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+import functools
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Annotated, ClassVar, Literal
 
 from toolkit.declared import AtLeast, Distinct, Entry, Fault, Format, Size, Text, read_text, toml_text
 from toolkit.errors import TrustError
+from toolkit.files import sha256_bytes
+from toolkit.trust.names import name_key
 from toolkit.trust.ssh import PublicKey, parse_public
 
 FILE = "people.toml"
 NAMESPACE = "toolkit-ledger@v1"
+
+ROOT_HEADS = 2  # people, one of which may be a printed recovery key: a lost key must not end a laboratory
 
 Role = Literal["operator", "checker", "head", "auditor"]
 Action = Literal["enter", "approve", "withdraw", "discard", "import", "issue", "enrol"]
@@ -25,6 +30,12 @@ MEANINGS: Mapping[Action, str] = {
     "enter": "entered", "approve": "approved", "withdraw": "withdrawn", "discard": "discarded",
     "import": "entered", "issue": "issued", "enrol": "enrolled",
 }  # fmt: skip
+
+
+STATED: Mapping[Action, tuple[str, ...]] = {
+    "approve": ("by", "approved_by"), "withdraw": ("by",), "discard": ("by",), "enrol": ("by",),
+}  # fmt: skip
+"""The entries of a decision that name people: each of them signs it."""
 
 
 def moment(text: str) -> datetime | None:
@@ -97,6 +108,10 @@ class Person:
     roles: Annotated[tuple[Role, ...], Size(1), Distinct(), Entry("what the person does", example=["head"])]
     keys: Annotated[tuple[Key, ...], Size(1), Distinct("key"), Entry("of the person")]
 
+    def is_named(self, text: str) -> bool:
+        """Tell whether a text is this person's id or name, however that is written."""
+        return name_key(text) in (self.id, name_key(self.name))
+
     def key_at(self, fingerprint: str, time: str) -> Key | None:
         """Return the person's key of a fingerprint, where it signs at a time."""
         for key in self.keys:
@@ -147,12 +162,22 @@ class People:
     policy: Annotated[Policy, Entry("what each decision takes")] = Policy()
 
     def faults(self) -> Iterator[Fault]:
-        """Yield a key that two people have, and a decision that nobody could make."""
+        """Yield a name or a key that two people have, and a decision that nobody could make."""
         owners: dict[str, str] = {}
+        names: dict[str, str] = {}
         for index, person in enumerate(self.person):
+            for text in {person.id, name_key(person.name)}:
+                namesake = names.setdefault(text, person.id)
+                if namesake != person.id:
+                    yield Fault(
+                        key=("person", index, "name"), got=f"{person.name}, as {namesake} is called",
+                        expected="a name of this person's own: one person decides under one id",
+                    )  # fmt: skip
             for place, key in enumerate(person.keys):
-                words = key.key.split()[:2]
-                owner = owners.setdefault(" ".join(words), person.id)
+                try:
+                    owner = owners.setdefault(key.public.fingerprint, person.id)
+                except TrustError:
+                    continue  # the key's own fault
                 if owner != person.id:
                     yield Fault(
                         key=("person", index, "keys", place), got=f"the key of {owner}",
@@ -202,16 +227,33 @@ def parse_people(data: bytes, *, where: object) -> People:
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """The people from a time on, and the hash of the text that says so."""
+    """The people from a time on, the text that says so, and its hash."""
 
     since: str
     sha256: str
     people: People
+    text: str = field(repr=False)
 
 
-@dataclass(frozen=True, slots=True)
+@functools.lru_cache(maxsize=256)
+def version_of(data: bytes, since: str) -> Version:
+    """Return the version of the content of a ``people.toml``.
+
+    Raises
+    ------
+    ConfigError
+        an entry that cannot be used
+    """
+    people = parse_people(data, where=FILE)
+    return Version(since=since, sha256=sha256_bytes(data), people=people, text=data.decode())
+
+
+@dataclass(frozen=True)
 class History:
-    """Every version of the people of a laboratory, oldest first; none where nobody is enrolled."""
+    """Every version of the people of a laboratory, oldest first; none where nobody is enrolled.
+
+    Without slots: when each key ended is looked up once and kept.
+    """
 
     versions: tuple[Version, ...] = ()
 
@@ -234,12 +276,41 @@ class History:
 
     def revoked(self, fingerprint: str, time: str) -> str | None:
         """Return from when on a key that would sign at a time was revoked by any later version."""
+        end = self._ends.get(fingerprint)
+        return end if end is not None and end <= time else None
+
+    @functools.cached_property
+    def _ends(self) -> Mapping[str, str]:
+        ends: dict[str, str] = {}
         for version in self.versions:
             for person in version.people.person:
                 for key in person.keys:
-                    if key.public.fingerprint == fingerprint and key.until is not None and key.until <= time:
-                        return key.until
-        return None
+                    if key.until is not None:
+                        name = key.public.fingerprint
+                        ends[name] = min(key.until, ends.get(name, key.until))
+        return ends
+
+
+def inability(
+    version: Version | None, action: Action, time: str, public: PublicKey, operators: Collection[str] = ()
+) -> str | None:
+    """Say why a key's owner cannot sign a decision at a time, under a version; None where that is possible.
+
+    ``operators`` are the people, by id or name, who entered what is approved: none of them approves it.
+    """
+    if version is None:
+        return f"nobody was enrolled at {time}"
+    demand = version.people.policy.demand(action)
+    person = version.people.owner(public)
+    if person is None:
+        return f"{public.fingerprint} is the key of nobody enrolled at {time}"
+    if person.key_at(public.fingerprint, time) is None:
+        return f"the key {public.fingerprint} of {person.id} did not sign at {time}"
+    if not set(person.roles) & set(demand.roles):
+        return f"{person.id} is {' and '.join(person.roles)}; to {action} takes {' or '.join(demand.roles)}"
+    if action == "approve" and any(person.is_named(text) for text in operators):
+        return f"{person.id} entered what {person.id} approves"
+    return None
 
 
 def objections(
@@ -248,30 +319,27 @@ def objections(
     time: str,
     signers: Sequence[PublicKey],
     *,
-    operator: str | None = None,
+    stated: Collection[str] = (),
+    operators: Collection[str] = (),
 ) -> list[str]:
     """Say why keys that signed a decision at a time, under a version, do not make it; empty where they do.
 
-    ``operator`` is the person who entered what is approved: that one never approves it.
+    ``stated`` are the people whom the decision names; ``operators`` as of `inability`.
     """
-    if version is None:
-        return [f"nobody was enrolled at {time}"]
+    reasons = [
+        reason for public in signers if (reason := inability(version, action, time, public, operators))
+    ]
+    if version is None or reasons:
+        return reasons or [f"nobody was enrolled at {time}"]
+    owners = [version.people.owner(public) for public in signers]
+    people = {person.id: person for person in owners if person is not None}
+    if len(people) < len(signers):
+        return ["somebody signs it twice"]
     demand = version.people.policy.demand(action)
-    roles = " or ".join(demand.roles)
-    reasons: list[str] = []
-    people: dict[str, Person] = {}
-    for public in signers:
-        person = version.people.owner(public)
-        if person is None:
-            reasons.append(f"{public.fingerprint} is the key of nobody enrolled at {time}")
-        elif person.key_at(public.fingerprint, time) is None:
-            reasons.append(f"the key {public.fingerprint} of {person.id} did not sign at {time}")
-        elif not set(person.roles) & set(demand.roles):
-            reasons.append(f"{person.id} is {' and '.join(person.roles)}; to {action} takes {roles}")
-        elif action == "approve" and person.id == operator:
-            reasons.append(f"{person.id} entered what {person.id} approves")
-        else:
-            people[person.id] = person
-    if len(people) < demand.signatures and not reasons:
-        reasons.append(f"{len(people)} of {demand.signatures} signatures by {roles}")
+    if len(people) < demand.signatures:
+        reasons.append(f"{len(people)} of {demand.signatures} signatures by {' or '.join(demand.roles)}")
+    named = [(text, [key for key, person in people.items() if person.is_named(text)]) for text in stated]
+    reasons += [f"{text!r} is named and did not sign" for text, keys in named if not keys]
+    if len({key for _, keys in named for key in keys}) < sum(len(keys) for _, keys in named):
+        reasons.append(f"{' and '.join(map(repr, stated))} are one person")
     return reasons

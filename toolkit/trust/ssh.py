@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import functools
 import hashlib
 import struct
 from collections.abc import Callable
@@ -88,16 +89,24 @@ def parse_public(line: str, *, where: object = None) -> PublicKey:
     TrustError
         ``weak-key``: no key, or one of a kind or length that is refused
     """
+    try:
+        return _public(line)
+    except TrustError as error:
+        raise _refused(error.got, error.expected or "a public key", where) from error
+
+
+@functools.lru_cache(maxsize=1024)
+def _public(line: str) -> PublicKey:
     parts = line.split()
     try:
         blob = base64.b64decode(parts[1], validate=True)
         kind = _Reader(blob).string().decode()
     except (IndexError, binascii.Error, ValueError, BadSignatureError) as error:
-        raise _refused(line[:60], "ssh-ed25519 AAAA...", where) from error
+        raise _refused(line[:60], "ssh-ed25519 AAAA...") from error
     if kind != parts[0]:
-        raise _refused(f"{parts[0]} around a key of kind {kind}", "one kind", where)
+        raise _refused(f"{parts[0]} around a key of kind {kind}", "one kind")
     key = PublicKey(kind, blob)
-    public_object(key, where=where)
+    public_object(key)
     return key
 
 
@@ -172,9 +181,7 @@ def armoured(public: PublicKey, sign: Sign, message: bytes, namespace: str) -> s
         MAGIC + struct.pack(">I", 1) + _string(public.blob) + _string(namespace.encode()) + _string(b"")
         + _string(b"sha512") + _string(signature)
     )  # fmt: skip
-    text = base64.b64encode(blob).decode()
-    lines = [text[at : at + 70] for at in range(0, len(text), 70)]
-    return "\n".join([BEGIN, *lines, END, ""])
+    return _armour(blob)
 
 
 def check(text: str, message: bytes, namespace: str) -> PublicKey:
@@ -195,9 +202,13 @@ def check(text: str, message: bytes, namespace: str) -> PublicKey:
         raise BadSignatureError("its text is damaged") from error
     if blob[:10] != MAGIC + struct.pack(">I", 1):
         raise BadSignatureError("it is no SSH signature of version 1")
+    if text != _armour(blob):
+        raise BadSignatureError("its text is not as ssh-keygen writes it")
     parts = _Reader(blob[10:])
-    public_blob, purpose, _reserved, digest, signature = (parts.string() for _ in range(5))
+    public_blob, purpose, reserved, digest, signature = (parts.string() for _ in range(5))
     parts.end()
+    if reserved:
+        raise BadSignatureError("there is more in it than there should be")
     if purpose != namespace.encode():
         raise BadSignatureError(
             f"it was made for {purpose.decode(errors='replace')!r}, not for {namespace!r}"
@@ -247,6 +258,12 @@ def check_raw(key: PublicKey, signature: bytes, data: bytes) -> None:
             raise BadSignatureError(f"its algorithm {algorithm!r} is refused for a key of kind {key.kind}")
     except (InvalidSignature, ValueError) as error:
         raise BadSignatureError("it is no signature of this content by this key") from error
+
+
+def _armour(blob: bytes) -> str:
+    text = base64.b64encode(blob).decode()
+    lines = [text[at : at + 70] for at in range(0, len(text), 70)]
+    return "\n".join([BEGIN, *lines, END, ""])
 
 
 def _signed_data(message: bytes, namespace: str, digest: Literal["sha256", "sha512"]) -> bytes:

@@ -13,13 +13,13 @@ import typer
 
 from tests.calibration.calibration_factory import hub_data
 from tests.calibration.registry.test_legacy import GOOD
-from toolkit.calibration.registry.approval import name_key
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.difference import differences
 from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli import calibration
 from toolkit.errors import ToolkitError
+from toolkit.trust.names import name_key
 
 Run = Callable[..., tuple[int, dict[str, Any]]]
 FROM = ("--in-force-from", "2026-02-01", "--checked-by", "B")

@@ -21,6 +21,7 @@ from toolkit.calibration.control.chart import control_chart
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.approval import approve, discard, withdraw
 from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.history import approved_ids
 from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
@@ -84,13 +85,13 @@ def test_a_discarded_candidate_is_hidden_and_known_for_ever(run: Run, registry: 
 
 
 def test_it_can_never_be_approved_withdrawn_or_discarded_again(run: Run, registry: Registry) -> None:
-    discard(registry, "hub-r1", reason="loose cable")
+    discard(registry, "hub-r1", reason="loose cable", by="C")
     head = registry.head("hub")
     decision = ("--in-force-from", "2026-02-01", "--checked-by", "B")
     for words, rule in (
         (("approve", "hub-r1", *decision), "approval"),
         (("withdraw", "hub-r1", "--on", "2026-02-01", "--reason", "x", "--by", "B"), "withdrawal"),
-        (("discard", "hub-r1", "--reason", "x"), "discard"),
+        (("discard", "hub-r1", "--reason", "x", "--by", "C"), "discard"),
     ):
         code, told = run("calibration", *words)
         assert (code, told["rule"]) == (2, rule)
@@ -105,14 +106,17 @@ def test_it_can_never_be_approved_withdrawn_or_discarded_again(run: Run, registr
 
 def test_only_a_candidate_that_was_never_approved_is_discarded(run: Run, registry: Registry) -> None:
     assert approved(registry)
-    code, told = run("calibration", "discard", "hub-r1", "--reason", "x")
+    code, told = run("calibration", "discard", "hub-r1", "--reason", "x", "--by", "C")
     assert (code, told["rule"]) == (2, "discard")
     assert "withdrawn" in told["expected"]
-    withdraw(registry, "hub-r1", on=dt.date(2026, 3, 1), reason="drift", by="C")
-    assert run("calibration", "discard", "hub-r1", "--reason", "x")[0] == 2
+    withdraw(registry, "hub-r1", on=today(), reason="drift", by="C")
+    assert run("calibration", "discard", "hub-r1", "--reason", "x", "--by", "C")[0] == 2
     for words, rule in (
-        (("hub-r1", "--reason", " "), "discard"), (("hub-r9", "--reason", "x"), "missing"),
-        (("other-r1", "--reason", "x"), "missing"), (("hub", "--reason", "x"), "record-id"),
+        (("hub-r1", "--reason", " ", "--by", "C"), "discard"),
+        (("hub-r1", "--reason", "x", "--by", " "), "names"),
+        (("hub-r9", "--reason", "x", "--by", "C"), "missing"),
+        (("other-r1", "--reason", "x", "--by", "C"), "missing"),
+        (("hub", "--reason", "x", "--by", "C"), "record-id"),
     ):  # fmt: skip
         code, told = run("calibration", "discard", *words)
         assert (code, told["rule"]) == (2, rule)
@@ -141,7 +145,7 @@ def test_the_same_session_again_is_refused_with_the_reason(
         assert run("calibrate", session, *more)[1]["record"]["id"] == "hub-r2"
     assert approved(registry, "hub-r2")
     assert [row.ok for row in verify_registry(registry)] == [True, True]
-    discard_error = run("calibration", "discard", "hub-r2", "--reason", "x")
+    discard_error = run("calibration", "discard", "hub-r2", "--reason", "x", "--by", "C")
     assert discard_error[0] == 2
 
 
@@ -149,7 +153,7 @@ def test_a_legacy_import_is_discarded_alike(tmp_path: Path, registry: Registry) 
     path = tmp_path / "old.toml"
     path.write_text(GOOD)
     record, _ = import_legacy(path, registry)
-    discard(registry, record.id, reason="digits of another machine")
+    discard(registry, record.id, reason="digits of another machine", by="C")
     with pytest.raises(RegistryError, match="entered before") as caught:
         import_legacy(path, registry)
     assert caught.value.rule == "discarded"
@@ -163,7 +167,7 @@ def test_the_chart_leaves_a_discarded_session_out(registry: Registry, make_sessi
         values = hub_data(60, number)
         calibrate(make_session(values, name=f"s{number}", date=f"2026-0{number + 1}-05"), registry)
     points = [len(one.points) for one in control_chart(registry, "hub").series]
-    discard(registry, "hub-r3", reason="loose cable")
+    discard(registry, "hub-r3", reason="loose cable", by="C")
     chart = control_chart(registry, "hub")
     assert ("hub-r3", "discarded") in chart.left_out
     assert [len(one.points) for one in chart.series] == [count - 1 for count in points]
@@ -179,7 +183,7 @@ def _killed(folder: Path, at: int) -> None:
         real(handle)
 
     os.fsync = step
-    discard(Registry(folder), "hub-r1", reason="x")
+    discard(Registry(folder), "hub-r1", reason="x", by="C")
     os._exit(0)
 
 

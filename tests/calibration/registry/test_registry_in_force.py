@@ -11,6 +11,7 @@ import pytest
 from tests.calibration.calibration_factory import hub_data
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RecordError, RegistryError
@@ -86,7 +87,10 @@ def test_names_must_differ_and_a_decision_is_made_once(registry: Registry) -> No
     approve(registry, "hub-r1", in_force_from=day, checked_by="B", approved_by="C")
     with pytest.raises(RegistryError):
         approve(registry, "hub-r1", in_force_from=day, checked_by="B")
-    withdraw(registry, "hub-r1", on=day, reason="x", by="B")
+    with pytest.raises(RegistryError) as caught:
+        withdraw(registry, "hub-r1", on=day, reason="known before it was approved", by="B")
+    assert caught.value.rule == "time"
+    withdraw(registry, "hub-r1", on=today(), reason="x", by="B")
     for again in (
         lambda: withdraw(registry, "hub-r1", on=day, reason="x", by="B"),
         lambda: approve(registry, "hub-r1", in_force_from=day, checked_by="B", reason="y"),

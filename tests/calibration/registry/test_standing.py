@@ -93,7 +93,7 @@ def test_a_test_of_tomorrow_has_no_record_yet(two: Registry) -> None:
 
 def test_a_discarded_record_makes_no_draft(two: Registry, make_session: Sessions) -> None:
     calibrate(make_session(hub_data(60, 9), name="sound"), two)
-    discard(two, "hub-r3", reason="wrong cell mounted")
+    discard(two, "hub-r3", reason="wrong cell mounted", by="C")
     held = standing(two, "hub", on=MAY, named="hub-r3")
     (reason,) = held.reasons
     assert reason.text.startswith("discarded on ")

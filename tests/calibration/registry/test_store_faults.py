@@ -16,6 +16,7 @@ from tests.calibration.registry.test_legacy import GOOD
 from tests.faults import KILL, Outcome, Runner
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
 
@@ -41,7 +42,7 @@ def commands(
     decision = ["--reason", "overloaded", "--by", "C"]
     return {
         "approve": ["calibration", "approve", "hub-r2", "--in-force-from", "2026-02-06", "--checked-by", "B"],
-        "withdraw": ["calibration", "withdraw", "hub-r1", "--on", "2026-02-01", *decision],
+        "withdraw": ["calibration", "withdraw", "hub-r1", "--on", today().isoformat(), *decision],
         "discard": ["calibration", "discard", "hub-r2", *decision],
         "import": ["calibration", "import", legacy],
         "calibrate": ["calibrate", fresh],

@@ -34,6 +34,7 @@ NO_GATE = {
     "instrument-case": "a name that some file systems take for another's",
     "not-allowed": "people who may not decide: tests/calibration/registry/test_signatures.py",
     "people-log": "a forged log of people: tests/calibration/registry/test_signatures.py",
+    "request": "a signing request: tests/trust/forgeries",
     "locked": "another writer, or the lock file of one that ended",
     "no-locks": "a file system that keeps no writers apart",
     "unknown-machine": "a machine definition of another instrument is named",

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.dcc.standard import Standards
     from toolkit.calibration.records.record import CalibrationRecord
 
+
 # A copy of an instrument's folder in which a change can be tried: the registry itself is only read.
 
 
@@ -35,13 +36,14 @@ def rehearsal(registry: Registry, instrument: str) -> Iterator[Registry]:
     cut off is none of the copy. Errors name the places of the registry.
     """
     with tempfile.TemporaryDirectory(prefix="toolkit-rehearsal-") as place:
-        copy = Path(place)
+        copy = Path(place) / "calibrations"
+        copy.mkdir()
         settled.copy_files(registry.folder / instrument, copy / instrument)
         try:
             yield Registry(copy, rehearses=registry)
         except ToolkitError as error:
             parts = {
-                key: text.replace(place, str(registry.folder)) if text else text
+                key: text.replace(str(copy), str(registry.folder)) if text else text
                 for key, text in error.as_dict().items()
                 if key != "what"
             }

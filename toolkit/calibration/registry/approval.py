@@ -6,7 +6,6 @@ Both only add a line to the ledger.
 from __future__ import annotations
 
 import datetime as dt
-import unicodedata
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,19 +20,14 @@ from toolkit.calibration.registry.stored import stored_check
 from toolkit.errors import RegistryError, ToolkitError
 from toolkit.findings import Finding
 from toolkit.inputs import read_regular
+from toolkit.trust.names import name_key
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.ledger import Ledger
-
-# Entered, checked and approved by different names: not the same name written another way.
-
-
-# Small letters that are drawn like Latin ones, of the confusables of Unicode Technical Standard 39.
-_CYRILLIC = str.maketrans("асеіјорѕухһԁԛԝвкмнт", "aceijopsyxhdqwbkmht")
-_GREEK = str.maketrans("αορνυικτχβηζ", "aopvuiktxbhz")
+    from toolkit.calibration.registry.ledger import Entry, Ledger
 
 
 def check_names(record: CalibrationRecord, checked_by: str, approved_by: str | None) -> None:
@@ -59,20 +53,6 @@ def check_names(record: CalibrationRecord, checked_by: str, approved_by: str | N
                 rule="names",
             )
         roles[key] = role
-
-
-def name_key(name: str) -> str:
-    """Return what two spellings of one name have in common; empty where nothing can be seen.
-
-    >>> name_key(" J.  Smith ") == name_key("j. smith") == name_key("J. S\u200bmith")
-    True
-    """
-    # Compatibility forms first: they may unfold to spaces, capitals and marks.
-    text = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
-    visible = "".join(
-        c for c in text if unicodedata.category(c) not in ("Cf", "Cc", "Cn", "Co") or c.isspace()
-    )
-    return " ".join(visible.split()).translate(_CYRILLIC).translate(_GREEK)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +109,7 @@ def approve(
         the polarity readings or the machine definition cannot be used
     """
     folder = registry.folder / instrument_of(record_id)
-    day = known_on or today()
+    day = known_on or registry.today()
     record = registry.load(record_id)
     check_names(record, checked_by, approved_by)
     definition = machine_of(record.instrument, machine)
@@ -140,7 +120,7 @@ def approve(
             f"in force from {in_force_from.isoformat()}, session of {record.date}",
             f"a date from {record.date} on, or --reason TEXT, which the ledger keeps", "approval",
         )  # fmt: skip
-    _check_day(record, day, reason)
+    _check_day(record, day, reason, registry.today())
     interval = None if recall is None else str(parse_interval(recall))
     early = (day - in_force_from).days
     note = f"in force from {_days(early)} before the decision" if early > 0 else None
@@ -256,6 +236,7 @@ def withdraw(
                 "a record that stands",
                 "withdrawal",
             )
+        _check_after_approval(record_id, ledger.of(record_id), on)
         event: dict[str, Any] = {
             "event": "withdrawn",
             "id": record_id,
@@ -264,7 +245,7 @@ def withdraw(
             "known_on": on.isoformat(),
             "reason": reason,
         }
-        late = (today() - on).days
+        late = (registry.today() - on).days
         more = {
             "since": void_from and void_from.isoformat(),
             "note": f"entered {_days(late)} after it became known" if late > 0 else None,
@@ -277,14 +258,14 @@ def withdraw(
     return registry.status(record_id, known_at=max(on, today()))
 
 
-def _check_day(record: CalibrationRecord, day: dt.date, reason: str | None) -> None:
+def _check_day(record: CalibrationRecord, day: dt.date, reason: str | None, entered_on: dt.date) -> None:
     """Refuse a decision in the future, before its session, or dated back without a reason."""
     check_begun(day, "the day of the decision", record.id)
     _check_not_before(record, day)
-    if day < today() and not (reason and reason.strip()):
+    if day < entered_on and not (reason and reason.strip()):
         raise _refused(
             record.id, "a decision that is dated back needs a reason",
-            f"decided on {day.isoformat()}, entered on {today().isoformat()}",
+            f"decided on {day.isoformat()}, entered on {entered_on.isoformat()}",
             "--reason TEXT, which says why it was not entered on its day; the ledger keeps both days", "time",
         )  # fmt: skip
 
@@ -295,6 +276,17 @@ def _check_not_before(record: CalibrationRecord | None, day: dt.date) -> None:
         raise untimely(
             "a decision lies before the session that it is about", record.id,
             f"decided on {day.isoformat()}, session of {record.date}", f"a day from {record.date} on",
+        )  # fmt: skip
+
+
+def _check_after_approval(record_id: str, entries: Sequence[Entry], on: dt.date) -> None:
+    """Refuse a withdrawal that was known before the approval: that would not have been made."""
+    days = [entry.known_on for entry in entries if entry.event == "approved" and entry.known_on is not None]
+    if days and on < min(days):
+        raise untimely(
+            "a withdrawal lies before the approval that it ends", record_id,
+            f"known on {on.isoformat()}, approved on {min(days).isoformat()}",
+            f"a day from {min(days).isoformat()} on; --from says from which day on the record is void",
         )  # fmt: skip
 
 
@@ -321,7 +313,7 @@ def _refused(record_id: str, what: str, got: str, expected: str, rule: str) -> R
 # The end of a candidate: a line in the ledger. The record stays, and is known for ever.
 
 
-def discard(registry: Registry, record_id: str, *, reason: str, by: str = "not stated") -> RecordStatus:
+def discard(registry: Registry, record_id: str, *, reason: str, by: str) -> RecordStatus:
     """Discard a candidate: it can never be approved, and nothing is compared with it.
 
     The record is not read: a candidate that fails its gates may be discarded too.
@@ -329,18 +321,21 @@ def discard(registry: Registry, record_id: str, *, reason: str, by: str = "not s
     Raises
     ------
     RegistryError
-        ``discard``: no reason, or the record was approved, withdrawn or discarded before; ``missing``; the
-        ledger is damaged. Nothing is written
+        ``discard``: no reason, or the record was approved, withdrawn or discarded before; ``names``: a name
+        in which nothing can be seen; ``time``: before its session; ``missing``; the ledger is damaged.
+        Nothing is written
     """
     folder = registry.folder / instrument_of(record_id)
     if not reason.strip():
         raise _refused(record_id, "a discard needs a reason", "nothing", "--reason TEXT", "discard")
+    if not name_key(by):
+        raise _refused(record_id, "a discard needs a name", "nothing", "--by NAME: who discards", "names")
 
     def build(ledger: Ledger) -> Change:
         if record_id not in ledger.entered():
             raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
-        entries = ledger.of(record_id)
-        status = status_of(record_id, entries, dt.date.max)
+        _check_not_before(_read(folder, record_id), registry.today())
+        status = status_of(record_id, ledger.of(record_id), dt.date.max)
         if status.state != "candidate":
             standing = f"{status.state}: {status.reason}" if status.reason else status.state
             raise _refused(
@@ -354,7 +349,7 @@ def discard(registry: Registry, record_id: str, *, reason: str, by: str = "not s
                 "id": record_id,
                 "time": now(),
                 "by": by,
-                "known_on": today().isoformat(),
+                "known_on": registry.today().isoformat(),
                 "reason": reason.strip(),
             },
         )

@@ -14,7 +14,7 @@ from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.store import Change
 from toolkit.errors import RegistryError
-from toolkit.trust.decisions import Signing
+from toolkit.trust.signing import Signing
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -31,9 +31,12 @@ def issuer(registry: Registry, record_id: str) -> str | None:
         ``not-signed``, ``not-allowed``
     """
     history = registry.people().history
-    Signing(history=history, signers=registry.signers).check("issue", now(), where=record_id)
     if history.now is None:
         return None
+    signing = Signing(history=history, signers=registry.signers)
+    signing.demand_key("issue", record_id)
+    keys = [signer.public for signer in registry.signers]
+    signing.check({"id": record_id, "time": now()}, "issue", keys, ())
     people = (history.now.people.owner(signer.public) for signer in registry.signers)
     return " and ".join(dict.fromkeys(person.name for person in people if person is not None))
 

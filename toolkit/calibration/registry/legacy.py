@@ -69,7 +69,8 @@ def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tup
         record = _numbered(unnumbered, next_id(folder, unnumbered.instrument, ledger), source)
         check_transcribed(record, source)
         records.append(record)
-        return entering(record, {record.data[0].file: source}, by=record.entered_by)
+        change = entering(record, {record.data[0].file: source}, by=record.entered_by)
+        return dataclasses.replace(change, action="import")
 
     written = registry.commit(folder.name, build)
     return records[0], not written

@@ -19,12 +19,12 @@ from toolkit.calibration.registry.store import Change, commit
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import sha256_bytes, write_atomic
 from toolkit.inputs import read_regular
-from toolkit.trust.decisions import Signing
 from toolkit.trust.keys import Signer
-from toolkit.trust.people import FILE, History, People, Version, parse_people
+from toolkit.trust.people import FILE, ROOT_HEADS, History, People, version_of
+from toolkit.trust.signing import HERE, Signing, Travel
+from toolkit.trust.ssh import PublicKey
 
 FOLDER = "people"
-ROOT_HEADS = 2  # people, one of which may be a printed recovery key: a lost key must not end a laboratory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,20 +75,21 @@ def read_people(calibrations: Path) -> PeopleLog:
 
 def enrol(
     calibrations: Path, people: People, signers: Sequence[Signer], *, by: str, reason: str,
-    heads: Mapping[str, tuple[int, str]], lock_file: bool = False,
+    heads: Mapping[str, tuple[int, str]], lock_file: bool = False, travel: Travel = HERE,
 ) -> PeopleLog:  # fmt: skip
     """Enter a version of the people's file, signed; the first one founds the laboratory's trust.
 
     Raises
     ------
     TrustError
-        ``not-signed``, ``not-allowed``, ``people-log``; nothing is changed
+        ``not-signed``, ``not-allowed``, ``request``, ``people-log``; nothing is changed
     OutputError
         the home cannot be written to
     """
     folder = place_of(calibrations)
     data = people.text().encode()
-    digest, time = sha256_bytes(data), now()
+    digest = sha256_bytes(data)
+    time = travel.answers[0].time if travel.answers else now()
 
     def build(ledger: Ledger) -> Change:
         number = len(ledger.entries) + 1
@@ -102,17 +103,19 @@ def enrol(
 
     before = read_people(calibrations).history
     if before.now is None:
-        before = History((Version(since=time, sha256=digest, people=people),))
-        _check_root(people, signers)
-    commit(folder, build, lock_file=lock_file, signing=Signing(history=before, signers=tuple(signers)))
+        version = version_of(data, time)
+        before = History((version,))
+        if travel.request is None:
+            answered = [public for answer in travel.answers for public in answer.keys(version)]
+            _check_root(people, [*answered, *(signer.public for signer in signers)])
+    signing = Signing(history=before, signers=tuple(signers), travel=travel)
+    commit(folder, build, lock_file=lock_file, signing=signing)
     write_atomic(calibrations.parent / FILE, data)
     return read_people(calibrations)
 
 
-def _check_root(people: People, signers: Sequence[Signer]) -> None:
-    heads = {
-        person.id for signer in signers if (person := people.owner(signer.public)) and "head" in person.roles
-    }
+def _check_root(people: People, publics: Sequence[PublicKey]) -> None:
+    heads = {person.id for public in publics if (person := people.owner(public)) and "head" in person.roles}
     if len(heads) < ROOT_HEADS:
         raise TrustError(
             "the first enrolment takes two heads, or one and a recovery key", where=FILE,
@@ -131,9 +134,7 @@ def _history(folder: Path, ledger: Ledger) -> History:
             data = read_regular(path)
             if entry.event != "enrolled" or sha256_bytes(data) != entry.file:
                 raise _damaged(path, "it is not the file that was entered")
-            versions.append(
-                Version(since=entry.time, sha256=entry.file, people=parse_people(data, where=path))
-            )
+            versions.append(version_of(data, entry.time))
         except (OSError, ToolkitError) as error:
             raise _damaged(path, getattr(error, "got", None) or error) from error
     return History(tuple(versions))

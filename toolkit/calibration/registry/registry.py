@@ -15,7 +15,7 @@ from pathlib import Path
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
-from toolkit.calibration.registry.clock import today
+from toolkit.calibration.registry.clock import day_of, now, today
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, decisions
 from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, read_people
 from toolkit.calibration.registry.refit import check_reproduces
@@ -29,9 +29,9 @@ from toolkit.calibration.session.table import Table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
-from toolkit.trust.decisions import Signing
 from toolkit.trust.keys import Signer
 from toolkit.trust.people import History
+from toolkit.trust.signing import HERE, Signing, Travel
 
 _AT_ONCE = 200
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
@@ -69,9 +69,9 @@ class Registry:
     """The records of every instrument below one folder.
 
     ``lock_file``: writers keep each other out by a file, for a file system without locks. ``signers``: the
-    keys that sign what is decided through this object; a laboratory without people needs none.
-    ``rehearses``: this is a copy of that registry, to be thrown away: its lines are judged there, and nobody
-    signs what is tried here.
+    keys that sign what is decided through this object; a laboratory without people needs none. ``travel``:
+    the request to write, or the answers that came back, where keys are elsewhere. ``rehearses``: this is a
+    copy of that registry, to be thrown away: its lines are judged there, and nobody signs what is tried here.
     """
 
     def __init__(
@@ -80,13 +80,23 @@ class Registry:
         *,
         lock_file: bool = False,
         signers: Sequence[Signer] = (),
+        travel: Travel = HERE,
         rehearses: Registry | None = None,
     ) -> None:
         self.folder = folder
         self.lock_file = lock_file
         self.signers = tuple(signers)
         self.rehearses = rehearses
+        self.travel = travel
         self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
+
+    def now(self) -> str:
+        """Return the time of what is decided: of its request, where answers came back."""
+        return self.travel.answers[0].time if self.travel.answers else now()
+
+    def today(self) -> date:
+        """Return the day of what is decided by this computer's own time zone."""
+        return day_of(self.now())
 
     def instruments(self) -> tuple[str, ...]:
         """Return the instruments, sorted."""
@@ -134,7 +144,7 @@ class Registry:
             self.folder / instrument,
             build,
             lock_file=self.lock_file,
-            signing=Signing(history=people.history, signers=self.signers),
+            signing=Signing(history=people.history, signers=self.signers, travel=self.travel),
             judged=lambda ledger: self._judged(instrument, ledger, people),
         )
 
@@ -376,6 +386,10 @@ def start(folder: Path, record_id: str, ledger: Ledger) -> Started:
         raise _bad(record_id, path, "no entry of this record in the ledger", "an 'entered' line", "ledger")
     if entered.record != record.sha256:
         raise _bad(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
+    if entered.signatures and (entered.action == "import") != (record.kind == "legacy"):
+        raise _bad(
+            record_id, path, f"a {record.kind} record", f"what its entry says: {entered.action}", "ledger"
+        )
     if entered.file != sha256_bytes(data):
         raise _bad(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
     contents = {part.role: _data_file(record_id, folder / part.file, part.sha256) for part in record.data}

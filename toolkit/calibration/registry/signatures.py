@@ -8,39 +8,84 @@ from typing import Any
 
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.records.use import UNSIGNED
-from toolkit.calibration.registry.clock import day_of
+from toolkit.calibration.registry.clock import check_after, day_of
+from toolkit.calibration.registry.clock_state import clock_state
 from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
-from toolkit.trust.decisions import (
-    ACTIONS,
-    SignedLine,
-    Signing,
-    signatures_of,
-    statement,
-    unsigned,
-    violations,
-)
+from toolkit.errors import TrustError
+from toolkit.files import write_atomic
+from toolkit.trust.decisions import SignedLine, action_of, signature_row, statement, unsigned, violations
 from toolkit.trust.merkle import Growing, leaf_hash
-from toolkit.trust.people import History
+from toolkit.trust.people import Action, History
+from toolkit.trust.requested import Requested
+from toolkit.trust.requests import Request, check_same, check_standing
+from toolkit.trust.signing import HERE, Signing
 
 
-def signed_event(event: Mapping[str, Any], ledger: Ledger, signing: Signing) -> dict[str, Any]:
-    """Return the next event of a ledger with its signatures; as it is where nobody is enrolled.
+def timed_event(event: Mapping[str, Any], ledger: Ledger, signing: Signing | None) -> dict[str, Any]:
+    """Return an event with the state of the clock; what was requested has time and clock of its request.
 
     Raises
     ------
     TrustError
-        ``not-signed``, ``not-allowed``
+        ``request``: an answer no longer extends this ledger, or has waited too long
+    """
+    answers = () if signing is None else signing.travel.answers
+    for answer in answers:
+        check_standing(answer, seq=len(ledger.entries) + 1, prev=ledger.head)
+    if not answers:
+        return {**event, "clock": clock_state()}
+    return {**event, **{key: answers[0].body.get(key) for key in ("time", "clock")}}
+
+
+def signed_event(
+    event: Mapping[str, Any],
+    ledger: Ledger,
+    signing: Signing,
+    *,
+    action: Action | None = None,
+    file: str | None = None,
+) -> dict[str, Any]:
+    """Return the next event of a ledger with its signatures; as it is where nobody is enrolled.
+
+    ``action`` says of an entry that it is an import; ``file`` is the text of what it brings.
+
+    Raises
+    ------
+    TrustError
+        ``not-signed``, ``not-allowed``; ``request``: an answer is of another decision or another ledger
+    RegistryError
+        ``time``: it lies before the newest version of the people
+    Requested
+        the decision was written to a file to be signed elsewhere
     """
     if signing.history.now is None:
+        if signing.travel != HERE:
+            raise _nobody(event)
         return dict(event)
-    record_id = event["id"]
-    signing.check(
-        ACTIONS[event["event"]], event["time"], operator=_operator(ledger, record_id), where=record_id
-    )
+    event = {**event, **({"action": action} if action else {})}
+    signing.demand_key(action_of(event), event["id"])
+    version, time = signing.history.now, event["time"]
+    check_after(version.since, time, "the log of people")
     root = Growing(map(leaf_hash, ledger.lines)).root()
-    said = {**event, **statement(event, _subject(ledger, event), root, signing.history.at(event["time"]))}
-    body = {"seq": len(ledger.entries) + 1, "prev": ledger.head, **said}
-    return {**said, "signatures": signatures_of(signing, canonical(body).encode())}
+    said = {**event, **statement(event, _subject(ledger, event), root, version)}
+    message = canonical({"seq": len(ledger.entries) + 1, "prev": ledger.head, **said})
+    operators = _operators(ledger, event["id"])
+    path = signing.travel.request
+    request = Request(message=message, people=version.text, file=file, operators=operators, path=path)
+    if path is not None:
+        write_atomic(path, request.text)
+        raise Requested(request)
+    rows: list[Mapping[str, str]] = []
+    publics = [signer.public for signer in signing.signers]
+    for answer in signing.travel.answers:
+        check_same(answer, request)
+        publics += answer.keys(version)
+        rows += [row for row in answer.signatures if row not in rows]
+    signing.check(event, action_of(event), publics, operators)
+    for signer in signing.signers:
+        owner = version.people.owner(signer.public)
+        rows += [signature_row("" if owner is None else owner.id, signer, message.encode())]
+    return {**said, "signatures": rows}
 
 
 def unproved(
@@ -66,7 +111,7 @@ def unproved(
                 body=body,
                 message=canonical(unsigned(body)).encode(),
                 subject=_subject(ledger, body),
-                operator=_operator(ledger, entry.id),
+                operators=_operators(ledger, entry.id),
                 root=tree.root(),
             )
             reasons = violations(line, history.before(entry.seq) if of_people else history)
@@ -127,6 +172,16 @@ def _subject(ledger: Ledger, event: Mapping[str, Any]) -> str | None:
     return None if entered is None else entered.record
 
 
-def _operator(ledger: Ledger, record_id: str) -> str | None:
+def _operators(ledger: Ledger, record_id: str) -> tuple[str, ...]:
+    """Return who entered a record: those who signed its entry, and the operator whom it names."""
     entered = ledger.entered().get(record_id)
-    return entered.signatures[0]["by"] if entered is not None and entered.signatures else None
+    return () if entered is None else (*signers_of(entered), entered.by)
+
+
+def _nobody(event: Mapping[str, Any]) -> TrustError:
+    return TrustError(
+        "nobody is enrolled who could sign", where=event["id"], got="a laboratory without people",
+        expected="people whose keys sign: toolkit person enrol",
+        next_step="decide without --request and --answer, or enrol people first; nothing was changed",
+        rule="request",
+    )  # fmt: skip

@@ -27,10 +27,11 @@ from toolkit.calibration.registry.clock import check_after
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, head_bytes, next_line
 from toolkit.calibration.registry.lock import writing
 from toolkit.calibration.registry.settled import JOURNAL, before, content, damaged, is_part, state_of
-from toolkit.calibration.registry.signatures import signed_event
+from toolkit.calibration.registry.signatures import signed_event, timed_event
 from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes, sync_folder, write_atomic
-from toolkit.trust.decisions import Signing
+from toolkit.trust.people import Action
+from toolkit.trust.signing import Signing
 
 _DECIDED = ".pending.json.part"
 # A folder that another writer removes while this one waits for its lock is made again.
@@ -39,10 +40,14 @@ _ATTEMPTS = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """One transaction: new files by name, and the ledger event that they belong to."""
+    """One transaction: new files by name, and the ledger event that they belong to.
+
+    ``action``: what a signed entry says it is, where that is not what every event of its kind is.
+    """
 
     files: Mapping[str, bytes]
     event: Mapping[str, Any]
+    action: Action | None = None
 
 
 def commit(
@@ -67,7 +72,9 @@ def commit(
     OutputError
         the folder cannot be written to: the message says that nothing was changed, or what state it is in
     TrustError
-        ``not-signed``, ``not-allowed``: the decision takes other keys; nothing is written
+        ``not-signed``, ``not-allowed``: the decision takes other keys; ``request``; nothing is written
+    Requested
+        the decision was written to a file to be signed elsewhere; the folder is as it was
     """
     with _locked(folder, lock_file=lock_file):
         with _writable(folder):
@@ -79,9 +86,11 @@ def commit(
         change = build(ledger)
         if change is None:
             return False
+        event = timed_event(change.event, ledger, signing)
         last = ledger.entries[-1].time if ledger.entries else None
-        check_after(last, change.event["time"], folder / LEDGER)
-        event = change.event if signing is None else signed_event(change.event, ledger, signing)
+        check_after(last, event["time"], folder / LEDGER)
+        if signing is not None:
+            event = signed_event(event, ledger, signing, action=change.action, file=_text_of(change))
         line, digest = next_line(len(ledger.entries) + 1, ledger.head, event)
         lines = state.lines or b""
         journal = {
@@ -107,6 +116,12 @@ def commit(
         with contextlib.suppress(OSError):  # the next writer removes it
             (folder / _DECIDED).unlink()
         return True
+
+
+def _text_of(change: Change) -> str | None:
+    """Return the text of the file whose hash an entry names: of its record, or of the people."""
+    stated = change.event.get("file")
+    return next((data.decode() for data in change.files.values() if sha256_bytes(data) == stated), None)
 
 
 @contextlib.contextmanager

@@ -148,6 +148,7 @@ def _row(folder: Path, record_id: str, loaded: CalibrationRecord | ToolkitError,
 def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None:
     """Say which day of a record and its decisions cannot be; None where all can."""
     day = date.fromisoformat(record.date)
+    approvals = [entry.known_on for entry in entries if entry.event == "approved" and entry.known_on]
     for entry in entries:
         if entry.event == "entered" and not begun(day, moment(entry.time)):
             return f"its session of {record.date} lies after its entry at {entry.time}"
@@ -155,6 +156,11 @@ def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None
             continue
         if not begun(entry.known_on, moment(entry.time)):
             return f"it was {entry.event} at {entry.time} by a decision of {entry.known_on}"
+        if entry.event == "withdrawn" and approvals and entry.known_on < min(approvals):
+            return (
+                f"it was withdrawn on {entry.known_on.isoformat()}, before its approval on "
+                f"{min(approvals).isoformat()}"
+            )
         # A legacy record has no session: its date is that of the source.
         if record.kind == "fit" and entry.known_on < day:
             return (

@@ -59,18 +59,18 @@ def _withdrawal(reason: str, on: dt.date) -> Callable[[Bench], Act]:
 
 def _approval_of_discarded(bench: Bench) -> Act:
     record_id = bench.entered(Session())
-    discard(bench.registry, record_id, reason="a bridge was loose")
+    discard(bench.registry, record_id, reason="a bridge was loose", by="B")
     return bench.approval(record_id, SECOND)
 
 
 def _discarded_session(bench: Bench) -> Act:
-    discard(bench.registry, bench.entered(Session()), reason="a bridge was loose")
+    discard(bench.registry, bench.entered(Session()), reason="a bridge was loose", by="B")
     return _entry(bench, Session())
 
 
 def _discard_of_approved(bench: Bench) -> Act:
     def act() -> Refusals:
-        discard(bench.registry, _FIRST, reason="a bridge was loose")
+        discard(bench.registry, _FIRST, reason="a bridge was loose", by="B")
         return ()
 
     return act
@@ -105,6 +105,10 @@ DEMONSTRATIONS: tuple[Demonstration, ...] = (
     Demonstration(
         name="withdrawal before its session", stage="withdrawal", rules=("time",),
         prepare=_withdrawal("dropped", FIRST - _DAY),
+    ),
+    Demonstration(
+        name="withdrawal before its approval", stage="withdrawal", rules=("time",),
+        prepare=_withdrawal("dropped", SECOND),
     ),
     Demonstration(
         name="withdrawal without a reason", stage="withdrawal", rules=("withdrawal",),

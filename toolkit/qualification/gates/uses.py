@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from toolkit.calibration.registry.approval import discard, withdraw
+from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.standing import standing
 from toolkit.qualification.gates.bench import CHECKER, Act, Bench, Demonstration, Refusals
 from toolkit.qualification.gates.virtual_hub import FIRST, HUB, RIG, Session
@@ -51,7 +52,7 @@ def _refused(bench: Bench) -> str:
 
 
 def _withdrawn(bench: Bench) -> None:
-    withdraw(bench.registry, _FIRST, on=_TEST, reason="a cell was overloaded", by=CHECKER)
+    withdraw(bench.registry, _FIRST, on=today(), void_from=_TEST, reason="a cell was overloaded", by=CHECKER)
 
 
 def _superseded(bench: Bench) -> None:
@@ -63,7 +64,7 @@ def _expired(bench: Bench) -> None:
 
 
 def _discarded(bench: Bench) -> None:
-    discard(bench.registry, bench.entered(Session()), reason="a bridge was loose")
+    discard(bench.registry, bench.entered(Session()), reason="a bridge was loose", by="B")
 
 
 DEMONSTRATIONS: tuple[Demonstration, ...] = (

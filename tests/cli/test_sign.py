@@ -1,0 +1,256 @@
+"""A decision that travels: requested in the laboratory, signed on other computers, entered by its answers."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from toolkit.calibration.registry.registry import Registry
+from toolkit.cli.main import run as run_toolkit
+from toolkit.errors import TrustError
+from toolkit.lab.home import packaged_home
+from toolkit.trust.keys import make_key
+
+Run = Callable[..., tuple[int, str, str]]
+RECORD = "m15-virtual-r1"
+DECISION = (
+    "calibration",
+    "withdraw",
+    RECORD,
+    "--on",
+    "2026-11-23",
+    "--by",
+    "anna",
+    "--reason",
+    "not traceable",
+)
+PEOPLE = (("anna", "head"), ("ben", "head"), ("carl", "operator"), ("dora", "checker"))
+
+
+@pytest.fixture
+def run(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """A laboratory of four people whose keys lie outside of its home; the first words of what it answers."""
+    (tmp_path / "keys").mkdir()
+    shutil.copytree(packaged_home() / "calibrations", tmp_path / "home/calibrations")
+    monkeypatch.chdir(tmp_path / "home")
+
+    def call(*words: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            run_toolkit([str(word) for word in words])
+        printed = capsys.readouterr()
+        return int(ended.value.code or 0), printed.out, printed.err
+
+    for name, _ in PEOPLE:
+        keygen(tmp_path / "keys" / name)
+    root = ("--sign", "../keys/anna", "--recovery", "../keys/ben")
+    for name, role in PEOPLE:
+        if name == "ben":
+            continue
+        words = ("--name", f"{name.title()} Example", "--role", role, "--key", f"../keys/{name}.pub")
+        code, _, error = call("person", "enrol", name, *words, *(root if name == "anna" else root[:2]))
+        assert code == 0, error
+    return call
+
+
+def keygen(path: Path, passphrase: str = "") -> None:
+    command = ["ssh-keygen", "-q", "-t", "ed25519", "-N", passphrase, "-C", path.name, "-f", str(path)]
+    subprocess.run(command, check=True)
+
+
+def _entries() -> int:
+    return len(Registry(Path("calibrations")).ledger("m15-virtual").entries)
+
+
+def test_what_is_signed_is_shown_in_words_and_entered_by_the_same_command(run: Run) -> None:
+    before = _entries()
+    code, out, _ = run(*DECISION, "--request", "../r.json", "--json")
+    assert (code, json.loads(out)["takes"]) == (0, "1 of head")
+    assert _entries() == before, "a request changes nothing"
+    code, out, shown = run("sign", "../r.json", "--key", "../keys/anna", "--yes", "--json")
+    assert (code, json.loads(out)["by"]) == (0, "anna")
+    request = json.loads(Path("../r.json").read_text())
+    for value in json.loads(request["message"]).values():
+        for text in value.values() if isinstance(value, dict) else [value]:
+            assert str(text) in shown, "whatever is signed is shown"
+    assert "m15-virtual-r1" in shown
+    assert "not traceable" in shown
+    assert run(*DECISION, "--answer", "../r.anna.json")[0] == 0
+    assert Registry(Path("calibrations")).status(RECORD).state == "withdrawn"
+    assert run("calibration", "verify")[0] == 0
+
+
+def test_a_policy_of_two_takes_two_people_from_two_computers(run: Run) -> None:
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    for name, words in (("carl", "operator"), ("dora", "checker")):
+        code, _, error = run("sign", "../r.json", "--key", f"../keys/{name}", "--yes")
+        assert (code, words in error) == (2, True)
+    two = (*DECISION[:-1], "of two")
+    # The recovery key is the second head here: first and second signature go one way, or two.
+    assert run(*two, "--request", "../two.json")[0] == 0
+    assert run("sign", "../two.json", "--key", "../keys/anna", "--yes")[0] == 0
+    assert run("sign", "../two.anna.json", "--key", "../keys/anna", "--yes")[0] == 2
+    assert run("sign", "../two.anna.json", "--key", "../keys/ben", "--yes")[0] == 0
+    assert run("sign", "../two.json", "--key", "../keys/ben", "--yes")[0] == 0
+    answers = ("--answer", "../two.anna.json", "--answer", "../two.recovery.json")
+    assert run(*two, "--answer", "../two.recovery.json")[0] == 2, "anna is named and did not sign"
+    assert run(*two, *answers)[0] == 0
+    signers = [
+        row["by"] for row in Registry(Path("calibrations")).ledger("m15-virtual").entries[-1].signatures
+    ]
+    assert signers == ["anna", "recovery"]
+
+
+def test_the_first_enrolment_travels_between_two_heads(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "new/calibrations").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "new")
+    words = ["person", "enrol", "anna", "--name", "Anna", "--role", "head", "--key", "../keys/anna.pub"]
+    words += ["--recovery", "../keys/ben"]
+    assert run(*words, "--request", "../first.json")[0] == 2, "a request says who decides"
+    assert "takes 2 of head" in run(*words, "--by", "anna", "--request", "../first.json")[1]
+    for name in ("anna", "ben"):
+        assert run("sign", "../first.json", "--key", f"../keys/{name}", "--yes")[0] == 0
+    assert run(*words, "--answer", "../first.anna.json")[0] == 0, "the recovery key is at hand"
+    assert "anna" in run("person", "list")[1]
+
+
+def test_an_answer_is_refused_once_the_ledger_has_moved_on(run: Run) -> None:
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    assert run("sign", "../r.json", "--key", "../keys/anna", "--yes")[0] == 0
+    other = (*DECISION[:-1], "another reason")
+    code, _, error = run(*other, "--answer", "../r.anna.json")
+    assert (code, "not traceable" in error) == (2, True)
+    again = (
+        "approve",
+        RECORD,
+        "--in-force-from",
+        "2026-03-02",
+        "--reason",
+        "earlier",
+        "--checked-by",
+        "dora",
+    )
+    code, out, error = run("calibration", *again, "--sign", "../keys/dora")
+    assert code == 0, out + error
+    code, _, error = run(*DECISION, "--answer", "../r.anna.json")
+    assert (code, "new request" in error, "1 entry later" in error) == (2, True, True)
+    assert Registry(Path("calibrations")).status(RECORD).state == "approved"
+
+
+def test_a_request_and_its_answer_are_two_steps_of_a_laboratory_with_people(run: Run) -> None:
+    assert run(*DECISION, "--request", "../r.json", "--answer", "../r.json")[0] == 2
+    shutil.rmtree("people")
+    code, _, error = run(*DECISION, "--request", "../r.json")
+    assert (code, "nobody is enrolled" in error) == (2, True)
+    Path("../r.json").write_text("{}")
+    assert run("sign", "../r.json", "--key", "../keys/anna", "--yes")[0] == 2
+
+
+def test_consent_and_a_key_are_asked_for_and_no_answer_is_written_over(run: Run) -> None:
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    for words in (
+        (),
+        ("--key", "../keys/anna", "--agent"),
+        ("--key", "../keys/anna"),
+        ("--key", "../keys/no"),
+    ):
+        consent = () if words == ("--key", "../keys/anna") else ("--yes",)
+        assert run("sign", "../r.json", *words, *consent)[0] == 2
+    assert list(Path("..").glob("r.*.json")) == []
+    assert run("sign", "../r.json", "--key", "../keys/anna", "--yes")[0] == 0
+    before = Path("../r.anna.json").read_bytes()
+    code, _, error = run("sign", "../r.json", "--key", "../keys/anna", "--yes")
+    assert (code, "never written over" in error) == (2, True)
+    assert Path("../r.anna.json").read_bytes() == before
+
+
+def test_a_passphrase_comes_by_a_descriptor_and_is_printed_nowhere(run: Run, tmp_path: Path) -> None:
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    secret = "correct horse battery"  # noqa: S105
+    subprocess.run(
+        ["ssh-keygen", "-q", "-p", "-P", "", "-N", secret, "-f", "../keys/anna"],
+        check=True,
+        capture_output=True,
+    )
+    for phrase, expected in (("wrong", 2), (secret, 0)):
+        reader, writer = os.pipe()
+        os.write(writer, phrase.encode() + b"\n")
+        os.close(writer)
+        code, out, error = run(
+            "sign", "../r.json", "--key", "../keys/anna", "--passphrase-fd", reader, "--yes"
+        )
+        os.close(reader)
+        assert code == expected
+        assert secret not in out + error
+    assert run("sign", "../r.json", "--key", "../keys/anna", "--passphrase-fd", "99", "--yes")[0] == 2
+    written = b"".join(path.read_bytes() for path in tmp_path.glob("*.json"))
+    private = (tmp_path / "keys/anna").read_bytes().splitlines()[1]
+    assert secret.encode() not in written
+    assert private not in written
+
+
+def test_a_private_key_in_a_home_is_refused(run: Run) -> None:
+    shutil.copy("../keys/anna", "anna")
+    code, _, error = run(*DECISION, "--sign", "anna")
+    assert (code, "laboratory's home" in error) == (2, True)
+    with pytest.raises(TrustError):
+        make_key(Path("new"), "correct horse", "anna")
+    assert not Path("new").exists()
+
+
+@pytest.fixture
+def agent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """An SSH agent of the test's own."""
+    place = tmp_path / "agent"
+    process = subprocess.Popen(["ssh-agent", "-D", "-a", str(place)], stdout=subprocess.DEVNULL)
+    monkeypatch.setenv("SSH_AUTH_SOCK", str(place))
+    for _ in range(100):
+        if place.exists():
+            break
+        subprocess.run(["sleep", "0.05"], check=True)
+    yield
+    process.terminate()
+    process.wait()
+
+
+@pytest.mark.usefixtures("agent")
+def test_the_agents_key_is_the_one_that_may_sign(run: Run) -> None:
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    assert run("sign", "../r.json", "--agent", "--yes")[0] == 2
+    for name in ("carl", "anna"):
+        subprocess.run(["ssh-add", "-q", f"../keys/{name}"], check=True, capture_output=True)
+    code, out, error = run("sign", "../r.json", "--agent", "--yes")
+    assert (code, "signed by anna" in out) == (0, True), error
+    assert run(*DECISION, "--answer", "../r.anna.json")[0] == 0
+    subprocess.run(["ssh-add", "-q", "../keys/ben"], check=True, capture_output=True)
+    code, _, error = run("sign", "../r.json", "--agent", "--yes", "--out", "../other.json")
+    assert (code, "do not say who signs" in error) == (2, True), "two heads: nobody guesses"
+
+
+def test_what_would_move_the_cursor_is_shown_as_letters(run: Run) -> None:
+    reason = "a\x1b[2Jb\u202ec"
+    assert run(*DECISION[:-1], reason, "--request", "../r.json")[0] == 0
+    _, _, shown = run("sign", "../r.json", "--key", "../keys/anna", "--yes")
+    assert "\\u001b[2Jb\\u202ec" in shown
+    assert "\x1b" not in shown
+
+
+def test_a_rehearsal_in_a_laboratory_with_people_needs_no_key(run: Run, tmp_path: Path) -> None:
+    plan = packaged_home() / "toolkit/examples/virtual/session_plan.toml"
+    assert run("simulate", plan, "--out", tmp_path / "session", "--seed", "3")[0] == 0
+    session = tmp_path / "session" / "SESSION.toml"
+    code, _, error = run("calibrate", session, "--dry-run")
+    assert code in (0, 1), error
+    assert run("calibrate", session)[0] == 2
+    assert run("calibrate", session, "--request", "../enter.json")[0] == 0
+    assert run("sign", "../enter.json", "--key", "../keys/carl", "--yes")[0] == 0
+    code, _, error = run("calibrate", session, "--answer", "../enter.carl.json")
+    assert code in (0, 1), error
+    assert Registry(Path("calibrations")).ledger("m15-virtual").entries[-1].signatures[0]["by"] == "carl"

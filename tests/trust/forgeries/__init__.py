@@ -1,0 +1,1 @@
+"""Forgeries by a principle: each part of each signed thing, by each kind of change."""

@@ -1,0 +1,73 @@
+"""`toolkit sign REQUEST`: a person's signature of a decision, on that person's own computer."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer
+from toolkit.errors import ConfigError
+
+NAME = "sign"
+
+
+def command(
+    request: Annotated[Path, typer.Argument(help="What --request wrote, or the answer of another person.")],
+    key: Annotated[
+        Path | None, typer.Option("--key", help="Private SSH key, or the public one of a key in the agent.")
+    ] = None,
+    agent: Annotated[
+        bool, typer.Option("--agent", help="The key of the SSH agent that may sign it.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Answer; default: beside the request, by who signs.")
+    ] = None,
+    passphrase_fd: Annotated[
+        int | None, typer.Option("--passphrase-fd", help="File descriptor that gives the key's passphrase.")
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Sign without being asked, where no terminal is.")
+    ] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Show everything that a request asks to sign, and sign it; no laboratory's home is needed here.
+
+    The answer goes back to where the request was made: the same command, with --answer FILE.
+
+    Example: toolkit sign request.json --key ~/.ssh/anna
+    """
+    from getpass import getpass
+
+    from toolkit.lab.signing import agent_signer_of, passphrase_of, request_text, sign_request
+    from toolkit.trust.keys import open_signer
+    from toolkit.trust.requests import read_request
+
+    if agent == (key is not None):
+        raise _usage("--key, --agent", "both" if agent else "neither", "one of the two")
+    opened = read_request(request)
+    typer.echo(request_text(opened), err=True)
+    if key is None:
+        signer = agent_signer_of(opened)
+    elif passphrase_fd is not None:
+        signer = open_signer(key, lambda: passphrase_of(passphrase_fd))
+    else:
+        signer = open_signer(key, lambda: getpass(f"passphrase of {key}: "))
+    if not yes:
+        if not sys.stdin.isatty():
+            raise _usage("--yes", "no terminal to ask at", "consent: a terminal, or --yes")
+        typer.confirm("sign this?", abort=True, err=True)
+    path, person = sign_request(opened, signer, out)
+    payload = {"answer": str(path), "by": person.id, "key": signer.public.fingerprint}
+    answer(payload, f"signed by {person.id} ({person.name}): {path}", as_json=as_json, quiet=quiet)
+    return 0
+
+
+def _usage(where: str, got: str, expected: str) -> ConfigError:
+    return ConfigError(
+        "it is not clear how to sign", where=where, got=got, expected=expected,
+        next_step="see 'toolkit sign --help'; nothing was signed", rule="usage",
+    )  # fmt: skip
