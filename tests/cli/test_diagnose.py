@@ -60,7 +60,12 @@ def test_what_was_left_out_is_named_shown_and_predicted(run, tmp_path):
     # 2 N of noise over 160 rows against 0.03 (m/s)^2 beside a free viscous term: some 15; four of them
     assert drag["value"] == pytest.approx(800.0, abs=60.0)
     (one,) = made["fit"]["held_out"]
-    assert set(one) == {"channel", "unit", "nominal_rmse", "refitted_rmse", "augmented_rmse", "noise_floor"}
+    assert set(one) == {
+        "channel", "unit", "nominal_rmse", "refitted_rmse", "augmented_rmse", "noise_floor", "noise",
+    }  # fmt: skip
+    # White noise of 2 N: third differences of 160 rows know it to some 15 %.
+    assert set(one["noise"]) == {"sensor_sd", "process_sd", "how"}
+    assert (one["noise"]["sensor_sd"], one["noise"]["how"]) == (pytest.approx(2.0, rel=0.3), "differences")
     assert one["augmented_rmse"] < 2.4 < 7 < one["refitted_rmse"] <= one["nominal_rmse"]
     (place,) = made["mismatch"]
     assert set(place) == {"channel", "p_value", "share_of_variance", "where"}

@@ -84,6 +84,25 @@ class _Noise:
     apart: float = _set(
         2.0, "sd of the difference", "a larger one of the coloured and the plain solution is none of chance"
     )
+    as_known: float = _set(
+        1.1, "times the sensor's noise", "certificates and repeats are round: a residual is no more than it"
+    )
+    largest: float = _set(
+        0.1,
+        "of an output's spread",
+        "what nobody stated and no repeat shows, and is larger, is not known as noise",
+    )
+    still: float = _set(
+        1e-6, "of an output's spread", "a simulation that moves less has its noise as its spread"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Scatter:
+    """How far runs of the same thing may differ."""
+
+    fewest: int = _set(2, "runs held out", "one alone has no scatter that could be told from a mismatch")
+    least: float = _set(0.3, "sd of what a run shows of its own zero", "a smaller scatter changes no score")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,6 +206,18 @@ class _Structure:
     )
     stated_rows: int = _set(10, "values of an output", "fewer do not show that they scatter too much")
     stated_worth: float = _set(3.0, "degrees of freedom", "at least, however coloured the noise is")
+    foretold: float = _set(
+        0.2,
+        "of a coloured residual's mean square",
+        "foretold on unseen runs by what was recorded: it is no noise",
+    )
+    foretold_draws: int = _set(
+        399, "series of the residual's colour", "of which none may be foretold as well"
+    )
+    settled: float = _set(
+        20.0, "rows to an independent value", "after which a drawn series has its own spread"
+    )
+    longest_settling: int = _set(5_000, "rows", "drawn before a series begins, at most")
     line: float = _set(1e-8, "p-value of a spectral line", "the noise's own resonances are lines as well")
     line_share: float = _set(0.05, "of a residual's variance", "a line with less matters to nobody")
     line_around: int = _set(
@@ -205,6 +236,9 @@ class _Verdict:
 
     close: float = _set(3.0, "of the log-likelihood", "within which the data prefer neither of two effects")
     mostly: float = _set(0.5, "of the log-likelihood", "named effects explain it, beside what stays unknown")
+    nearly: float = _set(
+        0.9, "of the held-out mean square above the noise", "effects that take it stay, whatever the rest is"
+    )
     taken: float = _set(
         2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"
     )
@@ -246,11 +280,12 @@ class _Surface:
 
 
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
+SCATTER = _Scatter()
 SCREENING, STARTS, STEP, LATTICE = _Screening(), _Starts(), _Step(), _Lattice()
 STRUCTURE, VERDICT, LOCATION, SURFACE = _Structure(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCREENING, STARTS, STEP, LATTICE, STRUCTURE, VERDICT, LOCATION,
-    SURFACE,
+    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, LATTICE, STRUCTURE, VERDICT,
+    LOCATION, SURFACE,
 )  # fmt: skip
 
 

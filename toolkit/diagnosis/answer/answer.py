@@ -10,6 +10,7 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
+    from toolkit.diagnosis.fit.sensor_noise import NoiseParts
     from toolkit.effects.applied import EffectKey
 
 Verdict = Literal["named", "equivalent", "unknown", "nothing", "untestable"]
@@ -101,7 +102,10 @@ class NominalParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeldOutFit:
-    """Root mean square errors of an output on rows that no fit has seen, in its unit."""
+    """Root mean square errors of an output on rows that no fit has seen, in its unit.
+
+    ``noise`` parts the sensor's noise from the process's; None where no fit was made, and in older answers.
+    """
 
     channel: str
     unit: str
@@ -109,6 +113,7 @@ class HeldOutFit:
     refitted_rmse: float
     augmented_rmse: float
     noise_floor: float
+    noise: NoiseParts | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

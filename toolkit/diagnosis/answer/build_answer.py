@@ -21,7 +21,8 @@ from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.next_measurements import equivalent_to, implausible, next_measurements
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.fit.structure import groups
+from toolkit.diagnosis.fit.sensor_noise import noise_parts
+from toolkit.diagnosis.fit.structure import RUNS, groups
 from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
@@ -31,6 +32,8 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.problem import Problem
 
 
 def answer_of(case: Case, search: Search, findings: tuple[Finding, ...]) -> Diagnosis:
@@ -82,22 +85,46 @@ def mostly_unknown(search: Search) -> bool:
         return True
     if not search.structure:
         return False
-    unexplained = search.structure[0].gain / 2
+    shown = _taken(search)
+    if any(removed > VERDICT.nearly * above for removed, above in shown):
+        return False
+    unexplained = max(
+        (structure.gain / 2 for structure in search.structure if not structure.rest), default=0.0
+    )
     explained = sum(step.gain for step in search.steps)
     if explained < VERDICT.mostly * (explained + unexplained):
         return True
     if all(step.active.effect.from_digits for step in search.steps):
-        return False  # read off the digits: it does not imitate anything
-    # Outputs that show nothing but noise do not count: of nothing, nothing is two thirds.
-    shown = [
-        (
-            output.refitted_rmse**2 - output.augmented_rmse**2,
-            output.refitted_rmse**2 - output.noise_floor**2,
-        )
-        for output in _held_out(search, unknown=False)
-        if output.refitted_rmse**2 > VERDICT.shown * output.noise_floor**2
-    ]
+        return not search.steps  # read off the digits: it does not imitate anything
     return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
+
+
+def _taken(search: Search) -> list[tuple[float, float]]:
+    """Return what effects take of each output's held-out mean square, and what of it is above the noise.
+
+    Outputs that show nothing but noise do not count: of nothing, nothing is two thirds. Where the runs have
+    zeros of their own, these are no effect's to take, and every run counts about its own mean.
+    """
+    problem, shown = search.problem, []
+    for output in _held_out(search, unknown=False):
+        name, counted = output.channel, problem.kept[output.channel]
+        before, after, floor = output.refitted_rmse**2, output.augmented_rmse**2, output.noise_floor**2
+        if any(each.output == name and each.variables == RUNS for each in search.structure):
+            errors = (
+                problem.observed[name] - search.held_refitted.simulated[name],
+                problem.observed[name] - search.held_augmented.simulated[name],
+                search.augmented.residual[name],
+            )
+            before, after, floor = (_within_runs(problem, error, counted) for error in errors)
+        if before > VERDICT.shown * floor:
+            shown.append((before - after, before - floor))
+    return shown
+
+
+def _within_runs(problem: Problem, error: NDArray[np.float64], counted: NDArray[np.bool_]) -> float:
+    """Return the mean square of an error about its mean in every run."""
+    parts = [error[rows][counted[rows]] for rows in problem.slices if counted[rows].any()]
+    return float(np.mean(np.concatenate([part - part.mean() for part in parts]) ** 2))
 
 
 def _verdict(
@@ -294,6 +321,7 @@ def _held_out(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
                     _floor(search, output.name, output.sd),
                     math.inf if output.sd is not None else rmse(augmented.simulated[output.name]),
                 ),
+                noise=noise_parts(problem, search.augmented, output.name),
             )
         )
     return tuple(errors)
@@ -305,7 +333,7 @@ def _floor(search: Search, name: str, sd: float | None) -> float:
         return sd
     counted = search.problem.kept[name]
     noise = math.sqrt(float(np.mean(search.augmented.residual[name][counted] ** 2)))
-    if any(structure.output == name for structure in search.structure):
+    if any(structure.output == name and not structure.rest for structure in search.structure):
         share, _ = _structured(search, name)
         refitted = math.sqrt(float(np.mean(search.refitted.residual[name][counted] ** 2)))
         noise = min(noise, refitted * math.sqrt(max(1 - share, 0.0)))

@@ -18,6 +18,7 @@ from toolkit.diagnosis.answer.answer import (
     Place,
     Recorded,
 )
+from toolkit.diagnosis.fit.sensor_noise import Evidence, NoiseParts
 from toolkit.effects.applied import EffectKey
 from toolkit.effects.facts import Second
 from toolkit.errors import ConfigError
@@ -90,6 +91,7 @@ def _answer(entries: dict[str, Any]) -> Diagnosis:
                 refitted_rmse=_number(output["refitted_rmse"]),
                 augmented_rmse=_number(output["augmented_rmse"]),
                 noise_floor=_number(output["noise_floor"]),
+                noise=_noise(output.get("noise")),
             )
             for output in fit["held_out"]
         ),
@@ -169,6 +171,16 @@ def _effect(effect: dict[str, Any]) -> FoundEffect:
         rejected=tuple((_text(o["name"]), -_number(o["log_likelihood_less"])) for o in effect["rejected"]),
         held_out_log_score_gain=_number(effect["evidence"]["held_out_log_score_gain"]),
         p_value=_number(effect["evidence"]["p_value"]),
+    )
+
+
+def _noise(entry: dict[str, Any] | None) -> NoiseParts | None:
+    if entry is None:
+        return None
+    return NoiseParts(
+        sensor_sd=_number(entry["sensor_sd"]),
+        process_sd=_number(entry["process_sd"]),
+        how=_one_of(entry["how"], get_args(Evidence)),
     )
 
 

@@ -38,6 +38,10 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
                     "channel": output.channel, "unit": output.unit, "nominal_rmse": output.nominal_rmse,
                     "refitted_rmse": output.refitted_rmse, "augmented_rmse": output.augmented_rmse,
                     "noise_floor": output.noise_floor,
+                    "noise": None if output.noise is None else {
+                        "sensor_sd": output.noise.sensor_sd, "process_sd": output.noise.process_sd,
+                        "how": output.noise.how,
+                    },
                 }
                 for output in diagnosis.held_out
             ],

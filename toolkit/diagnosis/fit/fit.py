@@ -286,16 +286,6 @@ def log_prior(problem: Problem, p: Sequence[float]) -> float:
     )
 
 
-def held_out_score(problem: Problem, fit: Fit, rows: NDArray[np.bool_]) -> float:
-    """Return the log-likelihood of rows that a fit has not seen, under the noise of its training rows."""
-    total = 0.0
-    for name in problem.names:
-        where = problem.layout(name, rows)
-        if where.n:
-            total += log_likelihood(fit.residual[name][where.index], where, fit.noise[name])
-    return total
-
-
 def jacobian(problem: Problem, fit: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Return d(simulated)/d(x) over all rows of each output, and the sizes of x; x = (p, effects) / sizes."""
     space = Space.of(problem, fit.active)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.fit import Fit, fit, held_out_score, jacobian
+from toolkit.diagnosis.fit.fit import Fit, fit, jacobian
+from toolkit.diagnosis.fit.run_scatter import UnseenRun, scattered_scores
 from toolkit.diagnosis.policy import ROWS
 from toolkit.effects.applied import AppliedEffect
 
@@ -87,17 +88,43 @@ class HeldOut:
 
 def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], start: Fit) -> HeldOut:
     """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
-    scores, fits = [], []
+    fits = []
     simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
     for mask in folds.held:
         trained = fit(
             problem, active, start=start.p, rows=~mask, noise=start.noise, rounds=2, plain=start.plain
         )
-        scores.append(held_out_score(problem, trained, mask))
         fits.append(trained)
         for name in problem.names:
             simulated[name][mask] = trained.simulated[name][mask]
-    return HeldOut(scores=tuple(scores), simulated=simulated, fits=tuple(fits))
+    scores = np.zeros(len(fits))
+    for name in problem.names:
+        unseen = [
+            (k, run)
+            for k, (mask, trained) in enumerate(zip(folds.held, fits, strict=True))
+            for run in _unseen(problem, name, mask, trained)
+        ]
+        of_runs = scattered_scores([run for _, run in unseen], by_run=folds.by_run)
+        for (k, _), score in zip(unseen, of_runs, strict=True):
+            scores[k] += score
+    return HeldOut(scores=tuple(scores.tolist()), simulated=simulated, fits=tuple(fits))
+
+
+def _unseen(problem: Problem, name: str, mask: NDArray[np.bool_], trained: Fit) -> list[UnseenRun]:
+    """Return the rows of one output that a fold holds out, run by run."""
+    runs = []
+    for rows in problem.slices:
+        within = np.zeros_like(mask)
+        within[rows] = mask[rows]
+        where = problem.layout(name, within)
+        if where.n:
+            at = where.index
+            runs.append(
+                UnseenRun.of(
+                    trained.residual[name][at], trained.simulated[name][at], where, trained.noise[name]
+                )
+            )
+    return runs
 
 
 def matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> bool:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
+RUNS = ("run",)  # the variables of offsets of runs
 _ANGLES = ("TIRE_ANGLE", "DRUM_ANGLE")
 
 
@@ -57,7 +58,7 @@ def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
                 if product is not None and "time" not in (a, b):
                     listed.append(((a, b), product))
         if len(problem.runs) > 1:
-            listed.append((("run",), _run_offsets(problem)))
+            listed.append((RUNS, _run_offsets(problem)))
         for names, columns in listed:
             if columns.shape[1] * STRUCTURE.rows_per_column <= n:
                 dependences.append(SmoothDependence(output=output, variables=names, columns=columns))

@@ -18,6 +18,7 @@ from toolkit.diagnosis.policy import STEP
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
+from toolkit.diagnosis.search.noise_floor import hidden_in_noise
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -163,6 +164,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             screen, scored = view.screen, view.scored
             budget.check(f"step {turn + 1}: structure of the residual")
             structure = remainder(problem, screen, base, seed + 100 + turn)
+            structure += hidden_in_noise(problem, folds, base, seed + 200 + turn)
             if turn == 0:
                 before = structure
             if turn == STEP.most_effects:

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.fit.structure import SmoothDependence, groups
+from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import STEP, STRUCTURE
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.screen_step import search_p_values
@@ -83,12 +83,17 @@ def _tail(ratio: float, runs: int) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StructureFound:
-    """Structure that stays: where it is, and its p-value in the search."""
+    """Structure that stays: where it is, and its p-value in the search.
+
+    A ``rest`` is only larger than noise may be, or differs from run to run: it follows nothing that an effect
+    could imitate, and no effect beside it is withdrawn because of it.
+    """
 
     output: str
     variables: tuple[str, ...]
     gain: float
     p_value: float
+    rest: bool = False
 
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -108,7 +113,13 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
     weighed = [gain * trust for gain, trust in zip(gains, trusts, strict=True)]
     p_values = search_p_values(screen, [block for _, block in quick], weighed, seed)
     findings = [
-        StructureFound(output=dependence.output, variables=dependence.variables, gain=gain, p_value=p)
+        StructureFound(
+            output=dependence.output,
+            variables=dependence.variables,
+            gain=gain,
+            p_value=p,
+            rest=dependence.variables == RUNS,
+        )
         for dependence, gain, p in zip(listed, gains, p_values, strict=True)
         if p < STRUCTURE.alpha and _share(problem, base, dependence) > STEP.first
     ]
@@ -140,7 +151,9 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
     if p >= STRUCTURE.alpha:
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
-    return StructureFound(output=name, variables=("more than its stated noise",), gain=gain, p_value=p)
+    return StructureFound(
+        output=name, variables=("more than its stated noise",), gain=gain, p_value=p, rest=True
+    )
 
 
 def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:

@@ -1,0 +1,99 @@
+"""Scores of unseen runs against the multivariate normal density, written out as a full matrix."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from toolkit.diagnosis.fit.noise import Autoregression, autocovariance, layout, log_likelihood
+from toolkit.diagnosis.fit.run_scatter import UnseenRun, _scores, scattered_scores
+
+ROWS = 40
+
+
+def unseen(residual, simulated, noise):
+    return UnseenRun.of(residual, simulated, layout([np.arange(ROWS)], [np.ones(ROWS, dtype=bool)]), noise)
+
+
+def runs(offsets, gains, noise, *, seed=0):
+    rng = np.random.default_rng(seed)
+    simulated = np.linspace(1.0, 3.0, ROWS)
+    covariance = np.array(
+        [[autocovariance(noise, ROWS)[abs(i - j)] for i in range(ROWS)] for j in range(ROWS)]
+    )
+    root = np.linalg.cholesky(covariance)
+    residuals = [
+        offset + gain * simulated + root @ rng.standard_normal(ROWS)
+        for offset, gain in zip(offsets, gains, strict=True)
+    ]
+    return simulated, residuals, covariance
+
+
+@pytest.mark.parametrize("reflection", [(), (0.7, -0.2)])
+def test_the_score_of_a_run_is_the_density_of_its_residual_with_a_zero_and_a_gain_of_its_own(reflection):
+    noise = Autoregression(reflection=reflection, sd=0.5)
+    simulated, residuals, covariance = runs((3.0, -4.0, 5.0), (1.0, 0.5, -2.0), noise)
+    zero, gain = 2.0, 1.5
+    size = math.sqrt(np.mean(simulated**2))
+    scatter = zero**2 * np.ones((ROWS, ROWS)) + gain**2 * np.outer(simulated, simulated) / size**2
+    full = covariance + scatter
+    # The noise of the unseen rows is the likeliest: its square is the residuals' mean in that metric.
+    square = np.mean([r @ np.linalg.solve(full, r) for r in residuals]) / ROWS
+    expected = [
+        multivariate_normal(np.zeros(ROWS), max(square, 1.0) * full).logpdf(residual)
+        for residual in residuals
+    ]
+    found = _scores([unseen(residual, simulated, noise) for residual in residuals], zero, gain)
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_runs_that_agree_to_their_noise_are_scored_as_by_the_noise_of_the_training_rows():
+    noise = Autoregression(reflection=(), sd=0.5)
+    simulated, residuals, _ = runs((0.0,) * 8, (0.0,) * 8, noise)
+    where = layout([np.arange(ROWS)], [np.ones(ROWS, dtype=bool)])
+    plain = sum(log_likelihood(residual, where, noise) for residual in residuals)
+    found = sum(scattered_scores([unseen(r, simulated, noise) for r in residuals], by_run=True))
+    # Three quantities are the likeliest ones: half a chi-squared of three degrees more, 99.9 % of it.
+    assert plain <= found <= plain + 8.2
+
+
+def test_a_zero_that_moves_between_the_runs_costs_its_logarithm_and_not_its_square():
+    noise = Autoregression(reflection=(), sd=0.1)
+    off = (0.5, -0.4, 0.6, -0.5)  # some 30 standard errors of a run's mean
+    simulated, residuals, _ = runs(off, (0.0,) * 4, noise)
+    _, level, _ = runs((0.0,) * 4, (0.0,) * 4, noise)
+    moved, still = (
+        sum(scattered_scores([unseen(r, simulated, noise) for r in each], by_run=True))
+        for each in (residuals, level)
+    )
+    # Per run half the logarithm of 1 + n (scatter/sd)^2, about 3.5, where the plain score loses 450 or more.
+    each = 0.5 * math.log(1 + ROWS * (0.5 / 0.1) ** 2)
+    assert still - moved == pytest.approx(4 * each, rel=0.35)
+
+
+def test_blocks_of_a_run_have_no_zero_of_their_own():
+    noise = Autoregression(reflection=(), sd=0.1)
+    simulated, residuals, _ = runs((0.5, -0.4, 0.6, -0.5), (0.0,) * 4, noise)
+    unseen_runs = [unseen(residual, simulated, noise) for residual in residuals]
+    assert sum(scattered_scores(unseen_runs, by_run=True)) > 10 + sum(
+        scattered_scores(unseen_runs, by_run=False)
+    )
+
+
+def test_units_of_the_output_do_not_change_what_one_hypothesis_gains_over_another():
+    noise = Autoregression(reflection=(0.5,), sd=0.1)
+    gains = []
+    for factor in (1.0, 1000.0):
+        scaled = Autoregression(reflection=(0.5,), sd=0.1 * factor)
+        totals = []
+        for off in ((0.5, -0.4, 0.6), (0.0, 0.0, 0.0)):
+            simulated, residuals, _ = runs(off, (0.0,) * 3, noise)
+            listed = [unseen(factor * r, factor * simulated, scaled) for r in residuals]
+            totals.append(sum(scattered_scores(listed, by_run=True)))
+        gains.append(totals[1] - totals[0])
+    assert gains[0] == pytest.approx(gains[1], rel=1e-9)
+
+
+def test_no_runs_have_no_score():
+    assert scattered_scores([], by_run=True) == ()

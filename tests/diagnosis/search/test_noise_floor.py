@@ -1,0 +1,79 @@
+"""What coloured noise may not swallow: a large rest, and one that follows what was recorded."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.signal import lfilter
+
+from tests.diagnosis.cases import CELL, cell_case, write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.folds import folds_of
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.noise_floor import LARGE, hidden_in_noise
+from toolkit.diagnosis.simulators.build_simulator import model_of
+
+N = 600
+
+
+def coloured(phi, sd, rng):
+    return sd * math.sqrt(1 - phi**2) * lfilter([1], [1, -phi], rng.standard_normal(N + 500))[500:]
+
+
+def case_of(folder, rest, *, runs=3, sd=None):
+    """Return a load cell under a wandering load whose runs leave ``rest(load, rng)``."""
+    text, frames = cell_case(0.01), {}
+    if sd is not None:
+        text = text.replace('role = "output"', f'role = "output", sd = {sd}')
+    for k in range(runs):
+        rng = np.random.default_rng([7, k])
+        t = np.arange(N) * 0.1
+        L = 50 + 10 * np.sin(0.11 * t + k) + 7 * np.sin(0.043 * t * (1 + k) + 2 * k)
+        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "L": L, "F": L + rest(L, rng)})
+        text += f'[[recording.run]]\nfile = "r{k}.csv"\n'
+    return read_case(write_case(folder, text, simulator=CELL, **{"r1__csv": None, **frames}))
+
+
+def hidden(case):
+    problem = problem_of(case, model_of(case, None, None))
+    base = fit(problem)
+    return hidden_in_noise(problem, folds_of(problem, base), base, seed=1)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.9, 0.99])
+def test_noise_of_any_colour_that_is_small_hides_nothing(tmp_path, phi):
+    assert hidden(case_of(tmp_path, lambda _, rng: coloured(phi, 0.3, rng))) == ()
+
+
+def test_a_rest_above_a_tenth_of_the_spread_is_never_nothing(tmp_path):
+    case = case_of(tmp_path, lambda _, rng: coloured(0.98, 2.5, rng))
+    (found,) = hidden(case)
+    assert (found.variables, found.rest) == ((LARGE,), True)
+    answer = diagnose(case, None).diagnosis
+    assert (answer.verdict, answer.remaining, answer.effects) == ("unknown", "unknown", ())
+    noise = answer.held_out[0].noise
+    assert noise.process_sd > noise.sensor_sd
+    assert noise.total_sd == pytest.approx(2.5, rel=0.25)
+
+
+def test_a_noise_of_that_size_that_a_certificate_states_hides_nothing(tmp_path):
+    assert hidden(case_of(tmp_path, lambda _, rng: rng.normal(0, 2.5, N), sd=2.5)) == ()
+
+
+def test_a_coloured_rest_that_follows_the_load_is_no_noise(tmp_path):
+    # A band of loads in which the cell reads more, below a tenth of the spread.
+    bump = lambda L: 1.5 * np.exp(-(((L - 48) / 4) ** 2))  # noqa: E731
+    found = hidden(case_of(tmp_path, lambda L, rng: bump(L) + coloured(0.9, 0.05, rng)))
+    assert [one.variables for one in found] in ([("L",)], [("F",)])
+    assert not found[0].rest
+
+
+def test_of_a_constant_the_spread_is_its_noise(tmp_path):
+    text = cell_case(0.01) + '[[recording.run]]\nfile = "r0.csv"\n'
+    rng = np.random.default_rng(3)
+    table = pd.DataFrame({"t": np.arange(N) * 0.1, "L": np.full(N, 9.0), "F": 9 + coloured(0.5, 0.02, rng)})
+    case = read_case(write_case(tmp_path, text, simulator=CELL, r0__csv=table, r1__csv=None))
+    assert hidden(case) == ()

@@ -1,0 +1,109 @@
+"""Noise of the sensor apart from noise of the process: what no plant can make, and what is left beside it.
+
+A coloured noise takes whatever a simulation leaves out; alone it bounds nothing that physics may explain.
+The sensor's own noise shows elsewhere: on its certificate, in the difference of a run and its repeat, in the
+quickest differences from row to row, which a plant smooths away, and in the steps of the recorded numbers.
+What a residual has beyond it came through the plant, or was left out of the simulation.
+
+Source: Rice, Ann. Statist. 12 (1984) 1215, variance from differences; of third order, a parabola leaves none.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from toolkit.diagnosis.policy import NOISE
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.fit import Fit
+    from toolkit.diagnosis.fit.problem import Problem
+
+Evidence = Literal["stated", "repeats", "differences", "resolution"]
+
+_ORDER = 3  # of the differences
+_WEIGHT = math.comb(2 * _ORDER, _ORDER)  # variance of a difference of white noise of variance one
+_ROBUST = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseParts:
+    """Noise of one output, in its unit: the sensor's, the rest of a residual, and what shows the first."""
+
+    sensor_sd: float
+    process_sd: float
+    how: Evidence
+
+    @property
+    def total_sd(self) -> float:
+        """Both together."""
+        return math.hypot(self.sensor_sd, self.process_sd)
+
+    @property
+    def is_sensor(self) -> bool:
+        """No more is left than a sensor's noise that is known from elsewhere than this residual."""
+        return self.how in ("stated", "repeats") and self.total_sd <= NOISE.as_known * self.sensor_sd
+
+
+def noise_parts(problem: Problem, fit: Fit, name: str) -> NoiseParts:
+    """Return the two noises of an output beside a fit."""
+    counted = problem.kept[name]
+    residual = fit.residual[name][counted]
+    total = math.sqrt(float(np.mean(residual**2))) if len(residual) else 0.0
+    sensor, how = _sensor(problem, fit, name)
+    if sensor < problem.floor[name]:
+        sensor, how = problem.floor[name], "resolution"
+    if how in ("differences", "resolution"):
+        sensor = min(sensor, total) if total > 0 else sensor
+    return NoiseParts(sensor_sd=sensor, process_sd=math.sqrt(max(total**2 - sensor**2, 0.0)), how=how)
+
+
+def _sensor(problem: Problem, fit: Fit, name: str) -> tuple[float, Evidence]:
+    stated = problem.sd_of(name)
+    if stated is not None:
+        return stated, "stated"
+    repeated = _by_repeats(problem, fit, name)
+    if repeated is not None:
+        return repeated, "repeats"
+    return _by_differences(problem, fit, name), "differences"
+
+
+def _by_repeats(problem: Problem, fit: Fit, name: str) -> float | None:
+    """Return the noise of runs that repeat another row by row, its zero apart; None without such runs."""
+    places = dict(zip((run.name for run in problem.runs), problem.slices, strict=True))
+    squares, dof = 0.0, 0
+    for run in problem.runs:
+        first = places.get(run.conditions.get("repeat_of", ""))
+        again = places[run.name]
+        if first is None or first == again or first.stop - first.start != again.stop - again.start:
+            continue
+        both = problem.kept[name][first] & problem.kept[name][again]
+        if both.sum() < NOISE.fewest:
+            continue
+        # Of the residuals, not of the outputs: the inputs of a repeat are never quite the same.
+        apart = (fit.residual[name][first] - fit.residual[name][again])[both]
+        squares += float(np.sum((apart - apart.mean()) ** 2)) / 2
+        dof += int(both.sum()) - 1
+    return math.sqrt(squares / dof) if dof else None
+
+
+def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
+    where = problem.layout(name)
+    values = fit.residual[name][where.index]
+    quick = [
+        np.diff(values[segment], _ORDER)
+        for segment in where.segments
+        if segment.stop - segment.start > _ORDER
+    ]
+    if not quick:
+        return math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
+    return _ROBUST * float(np.median(np.abs(np.concatenate(quick)))) / math.sqrt(_WEIGHT)
+
+
+def spread(problem: Problem, name: str) -> float:
+    """Return the standard deviation of an output as it was recorded."""
+    values = problem.observed[name][problem.kept[name]]
+    return float(np.std(values)) if len(values) else 0.0

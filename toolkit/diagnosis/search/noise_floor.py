@@ -1,0 +1,114 @@
+"""Whether what is taken for noise may be: never where it is large, nor where it follows what was recorded.
+
+Structure is tested beside a noise whose colour was estimated from the same residual; a long-memory noise then
+foretells a smooth mismatch from its own past, and nothing seems left. Two questions do not depend on that
+colour: how large the rest is beside the output itself, and whether smooth functions of what was recorded,
+fitted on some runs, foretell it on the others better than they foretell noise of the same colour.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, predictor
+from toolkit.diagnosis.fit.sensor_noise import NoiseParts, noise_parts, spread
+from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
+from toolkit.diagnosis.policy import NOISE, STRUCTURE
+from toolkit.diagnosis.search.unexplained import StructureFound
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.fit import Fit
+    from toolkit.diagnosis.fit.folds import Folds
+    from toolkit.diagnosis.fit.problem import Problem
+
+    Array = NDArray[np.float64]
+
+LARGE = "a floor above a tenth of the output's spread"
+
+
+def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tuple[StructureFound, ...]:
+    """Return what a fit has taken for noise and is none, or cannot be shown to be any."""
+    found: list[StructureFound] = []
+    listed = groups(problem, base)
+    for at, name in enumerate(problem.names):
+        parts = noise_parts(problem, base, name)
+        if not problem.kept[name].any() or parts.is_sensor:
+            continue
+        if _is_large(problem, base, name, parts):
+            ratio = parts.total_sd / (NOISE.largest * spread(problem, name))
+            gain = 2 * problem.layout(name).n * math.log(ratio) / base.noise[name].correlation_rows
+            found.append(StructureFound(output=name, variables=(LARGE,), gain=gain, p_value=1.0, rest=True))
+        if parts.process_sd > parts.sensor_sd:
+            own = [group for group in listed if group.output == name and group.variables != RUNS]
+            follows = _followed(problem, folds, base, name, own, seed + at)
+            found += [] if follows is None else [follows]
+    return tuple(found)
+
+
+def _is_large(problem: Problem, base: Fit, name: str, parts: NoiseParts) -> bool:
+    """Tell whether a rest is above a tenth of the output's spread; of a constant, the spread is its noise."""
+    simulated = base.simulated[name][problem.kept[name]]
+    varies = float(np.std(simulated)) > NOISE.still * spread(problem, name)
+    return varies and parts.total_sd > NOISE.largest * spread(problem, name)
+
+
+def _followed(
+    problem: Problem, folds: Folds, base: Fit, name: str, listed: list[SmoothDependence], seed: int
+) -> StructureFound | None:
+    """Return on what a coloured rest depends, None where noise of its colour would seem to as well."""
+    where = problem.layout(name)
+    residual = base.residual[name][where.index]
+    noise = fit_noise(residual, where, floor=problem.floor[name])
+    if not listed or not noise.reflection:
+        return None
+    columns = [group.columns[where.index] for group in listed]
+    shares = [float(_foretold(column, residual[:, None], folds, where)[0]) for column in columns]
+    best = int(np.argmax(shares))
+    if shares[best] < STRUCTURE.foretold:
+        return None
+    drawn = _drawn(noise, where, np.random.default_rng(seed))
+    if any(_foretold(column, drawn, folds, where).max() >= shares[best] for column in columns):
+        return None
+    return StructureFound(
+        output=name,
+        variables=listed[best].variables,
+        gain=-where.n * math.log(1 - shares[best]) / noise.correlation_rows,
+        p_value=1 / (drawn.shape[1] + 1),
+    )
+
+
+def _foretold(columns: Array, series: Array, folds: Folds, where: Layout) -> Array:
+    """Return the share of every series' mean square that columns fitted on the other folds foretell, (k,)."""
+    wrong = np.zeros(series.shape[1])
+    there = np.zeros(series.shape[1])
+    for mask in folds.held:
+        held = mask[where.index]
+        if not held.any() or held.all():
+            continue
+        slopes = np.linalg.lstsq(columns[~held], series[~held], rcond=None)[0]
+        wrong += np.sum((series[held] - columns[held] @ slopes) ** 2, axis=0)
+        there += np.sum(series[held] ** 2, axis=0)
+    return np.asarray(1 - wrong / np.maximum(there, 1e-300))
+
+
+def _drawn(noise: Autoregression, where: Layout, rng: np.random.Generator) -> Array:
+    """Return series of the noise's colour, independent of everything, (values, draws)."""
+    from scipy.signal import lfilter
+
+    denominator = np.concatenate([[1.0], -predictor(noise.reflection)[-1]])
+    before = int(min(STRUCTURE.settled * noise.correlation_rows, STRUCTURE.longest_settling)) + 50
+    parts = [
+        lfilter(
+            [1.0],
+            denominator,
+            rng.standard_normal((before + segment.stop - segment.start, STRUCTURE.foretold_draws)),
+            axis=0,
+        )[before:]
+        for segment in where.segments
+    ]
+    return noise.sd * np.concatenate(parts)
