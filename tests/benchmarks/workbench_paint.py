@@ -43,7 +43,7 @@ def run(folder: Path, count: int) -> list[dict[str, object]]:
     rows = [row(f"{what}: ready", times[0], "empty home", times[1], "0.5 s")]
     rows += [row(f"{what}: first paint", *_painted(pages[large], pages[empty], count), "0.5 s")]
     started = time.perf_counter()
-    for question in ("candidates", "due", "drift", "work"):
+    for question in ("instruments", "candidates", "due", "drift", "work"):
         ask[large](f"/agenda/{question}")
     rows.append(row("its agenda, nothing remembered", [time.perf_counter() - started], "", None, ""))
     return rows

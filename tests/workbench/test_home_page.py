@@ -26,7 +26,7 @@ def test_the_instruments_are_those_of_list_and_due(
 ) -> None:
     listed = command(capsys, "calibration", "list", "--home", served.home)
     due = command(capsys, "calibration", "due", "--home", served.home)
-    page = served.page("/")
+    page = served.page("/agenda/instruments")
     in_force = {row["instrument"]: row["record"] for row in due["instruments"]}
     assert set(listed["heads"]) == set(in_force) == {"cell", "m15", "m15-virtual"}
     for name, head in listed["heads"].items():
@@ -87,11 +87,13 @@ def test_tests_without_report_and_unfinished_audits(lab: Path, tmp_path: Path) -
 def test_a_damaged_ledger_is_told_and_hides_no_other_instrument(own: Served) -> None:
     ledger = own.home / "calibrations" / "cell" / "ledger.jsonl"
     ledger.write_bytes(ledger.read_bytes().replace(b'"by":', b'"by" :', 1))
-    page = own.page("/")
+    page = own.page("/agenda/instruments")
     assert page.status == 200
     assert "damaged" in plain(page.body)
     assert "m15-r2" in page.body
     assert [own.page(f"/agenda/{name}").status for name in ("candidates", "due", "drift")] == [200] * 3
+    assert own.page("/").status == own.page("/records").status == 200
+    assert own.page("/record/cell-r7").status == 400
 
 
 def test_an_empty_home_says_what_comes_first(tmp_path: Path) -> None:
@@ -99,7 +101,7 @@ def test_an_empty_home_says_what_comes_first(tmp_path: Path) -> None:
 
     (tmp_path / "new" / "calibrations").mkdir(parents=True)
     with serving(tmp_path / "new") as bench:
-        assert "toolkit calibrate SESSION.toml" in plain(bench.page("/").body)
+        assert "toolkit calibrate SESSION.toml" in plain(bench.page("/agenda/instruments").body)
         assert bench.page("/agenda/candidates").data(count="candidates") == ["0"]
         assert bench.page("/records").status == 200
 
@@ -110,5 +112,5 @@ def test_a_witness_is_named_with_what_it_has_seen(own: Served) -> None:
     folder = own.home / "trust" / "witnessed"
     folder.mkdir(parents=True)
     (folder / "cell-notary.checkpoint").write_text(checkpoint_of(own.registry, "cell").text)
-    assert "notary: 8 of 8 entries seen" in plain(own.page("/").body)
-    assert own.page("/", Accept_Language="de").body.count("kein Zeuge") == 2
+    assert "notary: 8 of 8 entries seen" in plain(own.page("/agenda/instruments").body)
+    assert own.page("/agenda/instruments", Accept_Language="de").body.count("kein Zeuge") == 2

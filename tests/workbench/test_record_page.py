@@ -81,7 +81,7 @@ def test_the_gates_are_those_that_an_approval_meets(own: Served, capsys: Capture
 def test_the_gates_that_pass_are_named_and_those_that_cannot_be_judged(served: Served) -> None:
     body = served.page("/record/cell-r7/part/gates").body
     assert 'data-blocked="false"' in body
-    assert 'data-state="not judged" data-rule="polarity"' in body
+    assert "not judged polarity , lever : it needs a machine definition" in plain(body)
     assert '<code data-rule="sign">' in body
     assert "it needs an earlier approved record" in plain(served.page("/record/cell-r1/part/gates").body)
 

@@ -24,7 +24,7 @@ class Bench:
     def __init__(self, home: Path, registry: Registry, keys: Keys) -> None:
         self.home, self.registry, self.keys = home, registry, keys
         self._answers: dict[tuple[object, ...], object] = {}
-        self._work = threading.Lock()
+        self._asked: dict[tuple[str, str | None], threading.Lock] = {}
 
     @property
     def today(self) -> dt.date:
@@ -34,14 +34,16 @@ class Bench:
     def remembered(self, question: str, instrument: str | None, ask: Callable[[], Answer]) -> Answer:
         """Return an answer about an instrument's records (None: all), asked again when a byte changed.
 
-        One such question at a time: two cores serve a laboratory's other work too.
+        Who asks the same meanwhile waits for that answer; who asks something else does not.
         """
         names = self.registry.instruments() if instrument is None else (instrument,)
-        with self._work:
+        with self._asked.setdefault((question, instrument), threading.Lock()):
             state = tuple((name, self.registry.digest(name)) for name in names)
             key = (question, instrument, self.today, state)
             if key not in self._answers:
+                answer = ask()
                 while len(self._answers) >= _MOST_ANSWERS:
-                    self._answers.pop(next(iter(self._answers)))
-                self._answers[key] = ask()
+                    self._answers.pop(next(iter(self._answers)), None)
+                self._answers[key] = answer
+                return answer
             return self._answers[key]  # type: ignore[return-value]

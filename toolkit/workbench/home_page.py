@@ -1,7 +1,7 @@
 """The first page: what needs a decision today, and how the instruments stand.
 
-The page itself reads ledgers alone. Each question of the agenda is asked by a request of its own, so that one
-that takes seconds keeps nobody from the others.
+The page itself reads nothing: it stands at once, however large the home is. Each question is asked by a
+request of its own, so that one that takes seconds keeps nobody from the others.
 """
 
 from __future__ import annotations
@@ -25,12 +25,10 @@ MOST_ROWS = 50
 
 
 def home(request: Request) -> Response:
-    """Return the page: instruments and ledgers, and a place for each question of the agenda."""
+    """Return the page: a place for each question of the agenda, and for the instruments."""
     bench: Bench = request.app.state.bench
-    return page(
-        request, "home", instruments=questions.instruments_answer(bench.registry, bench.today),
-        questions=tuple(_QUESTIONS), today=bench.today.isoformat(),
-    )  # fmt: skip
+    waiting = tuple(name for name in _QUESTIONS if name != "instruments")
+    return page(request, "home", questions=waiting, today=bench.today.isoformat())
 
 
 def agenda(request: Request) -> Response:
@@ -39,6 +37,10 @@ def agenda(request: Request) -> Response:
     if name not in _QUESTIONS:
         raise HTTPException(404)
     return page(request, f"part_{name}", most=MOST_ROWS, **_QUESTIONS[name](request.app.state.bench))
+
+
+def _instruments(bench: Bench) -> dict[str, Any]:
+    return {"instruments": questions.instruments_answer(bench.registry, bench.today)}
 
 
 def _candidates(bench: Bench) -> dict[str, Any]:
@@ -59,6 +61,7 @@ def _work(bench: Bench) -> dict[str, Any]:
 
 
 _QUESTIONS: dict[str, Callable[[Bench], dict[str, Any]]] = {
+    "instruments": _instruments,
     "candidates": _candidates,
     "due": _due,
     "drift": _drift,

@@ -202,6 +202,8 @@ def _asked(request: Request) -> tuple[Bench, str]:
     match = ID.match(record_id)
     if match is None or match["instrument"] not in bench.registry.instruments():
         raise HTTPException(404)
-    if record_id not in bench.registry.ledger(match["instrument"]).entered():
+    ledger = bench.registry.ledger(match["instrument"])
+    # A damaged ledger knows nothing for sure: the registry refuses the record, and says why.
+    if ledger.damage is None and record_id not in ledger.entered():
         raise HTTPException(404)
     return bench, record_id
