@@ -5,10 +5,12 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+BROWSER := $(VENV)/.browser
 SYSTEM := $(VENV)/.system
 JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
+TEST_PACKAGES := chromium
 
 .PHONY: demo test check golden house pages bench benchmarks crash coverage fuzz proof setup lock clean
 
@@ -17,7 +19,7 @@ setup: $(STAMP) $(SYSTEM)
 demo: setup
 	$(BIN)/toolkit demo --out demo-out
 
-test: setup check
+test: setup check $(BROWSER)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal
 
 check: $(STAMP)
@@ -83,6 +85,11 @@ $(STAMP): requirements.lock pyproject.toml
 # installed: `toolkit doctor` prints the one command to run.
 $(SYSTEM): $(STAMP)
 	@$(BIN)/toolkit doctor --quiet || sh .ci/as-root apt-get-install $(APT_PACKAGES) || { $(BIN)/toolkit doctor; exit 1; }
+	@touch $@
+
+# The browser in which tests look at the workbench. People open it in their own.
+$(BROWSER): $(STAMP)
+	@test -x /usr/bin/chromium || sh .ci/as-root apt-get-install $(TEST_PACKAGES)
 	@touch $@
 
 # After a change of the dependencies: resolve again and pin every version with its hashes.

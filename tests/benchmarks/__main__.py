@@ -32,6 +32,7 @@ from tests.benchmarks import (
     tire_fits,
     unknown_rows,
     verify_records,
+    workbench_paint,
 )
 
 BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
@@ -53,6 +54,7 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "diagnose": diagnose_time.run,
     "diagnose-nulls": diagnose_nulls.run,
     "diagnose-worker": diagnose_worker.run,
+    "workbench": workbench_paint.run,
 }
 
 

@@ -41,6 +41,8 @@ ALLOWED = {
     ("toolkit.lab.home", "copyfile"): "data of the package",
     ("toolkit.cli.demo", "copytree"): "data of the package",
     ("toolkit.cli.template", "read_bytes"): "data of the package",
+    ("toolkit.workbench.assets", "read_bytes"): "data of the package",
+    ("toolkit.workbench.words", "read_bytes"): "data of the package",
     ("toolkit.diagnosis.simulators.user_code", "open"): "the null device, an output",
     ("toolkit.qualification.gates.bench", "copytree"): "a registry of the qualification's own",
     ("toolkit.qualification.gates.records", "read_bytes"): "a registry of the qualification's own",

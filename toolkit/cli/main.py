@@ -68,6 +68,7 @@ def _register() -> None:
         template,
         verify,
         watch,
+        workbench,
     )
 
     app.command(demo.NAME)(demo.command)
@@ -82,7 +83,7 @@ def _register() -> None:
     app.add_typer(machine.app, name="machine")
     app.add_typer(person.person, name="person")
     app.add_typer(person.ledger, name="ledger")
-    for module in (sign, audit, simulate, diagnose, verify):
+    for module in (sign, audit, simulate, diagnose, verify, workbench):
         app.command(module.NAME)(module.command)
     app.command("explain")(installation.explain)
     app.command("qualify")(installation.qualify)

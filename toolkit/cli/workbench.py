@@ -1,0 +1,57 @@
+"""`toolkit open [HOME]`: the workbench in the browser of this computer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer
+
+NAME = "open"
+
+
+def command(
+    home: Annotated[
+        Path | None,
+        typer.Argument(metavar="[HOME]", help="Laboratory's home; default: the nearest folder upward."),
+    ] = None,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Print the address and open nothing.")
+    ] = False,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; default: a free one.")] = 0,
+    host: Annotated[
+        str | None,
+        typer.Option(
+            "--host",
+            help="Address that other computers reach; needs --certificate and --key, and people enrolled.",
+        ),
+    ] = None,
+    certificate: Annotated[
+        Path | None, typer.Option("--certificate", metavar="FILE", help="Certificate of the host, PEM.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="Its private key, PEM.")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Open the workbench: what needs a decision, records with their gates, decisions.
+
+    It serves this computer alone, asks no other host for anything, and ends with Ctrl-C. Whoever has the
+    address that is printed is let in.
+
+    Example: toolkit open laboratory --no-browser
+    """
+    from toolkit.lab.home import find_home, open_registry
+    from toolkit.workbench.server import LOOPBACK, Listening, serve
+
+    folder = find_home(home)
+    listening = Listening(host=host or LOOPBACK, port=port, certificate=certificate, key=key)
+
+    def say(address: str, folder: Path) -> None:
+        payload = {"address": address, "home": folder}
+        text = f"workbench of {folder}\n{address}\nend it with Ctrl-C"
+        answer(payload, text, as_json=json, quiet=quiet)
+
+    serve(folder, open_registry(home=folder), listening, browser=not no_browser, say=say)
+    return 0

@@ -1,0 +1,151 @@
+"""What every gate of an approval says about a record: passed, failed, asked for, or not judged and why."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.registry import Registry
+
+_HISTORY, _MACHINE, _CHECK = "an earlier approved record", "a machine definition", "check loads"
+GATES: dict[str, str | None] = {
+    "sign": _HISTORY,
+    "span": _HISTORY,
+    "serial": _HISTORY,
+    "replacement": _HISTORY,
+    "layout-changed": _HISTORY,
+    "unit-changed": _HISTORY,
+    "polarity": _MACHINE,
+    "lever": _MACHINE,
+    "polarity-reading": None,
+    "range": None,
+    "bridge-range": None,
+    "tared": None,
+    "check-tolerance": None,
+    "check-load": _CHECK,
+}
+"""The rules that `judgement.judge` may name, and what each needs to say anything; None: nothing besides."""
+
+_STATES = {"blocks": "fail", "asks": "asks", "tells": "note"}
+
+
+def gates_answer(registry: Registry, record_id: str) -> dict[str, Any]:
+    """Return the gates of a record as an approval meets them today, and by what its signs are confirmed.
+
+    ``state`` of a gate: ``fail``, ``asks``, ``note``, ``pass``; ``not judged`` where something is missing.
+
+    Raises
+    ------
+    RecordError, RegistryError
+        the record, or one that it is compared with, fails a gate of its loading
+    """
+    from toolkit.calibration.registry.history import history_of
+    from toolkit.calibration.registry.judgement import judge_stored, machine_of
+    from toolkit.calibration.registry.stored import stored_check
+
+    record = registry.load(record_id)
+    ledger = registry.ledger(record.instrument)
+    machine = machine_of(record.instrument)
+    judged = judge_stored(registry, record, ledger, machine=machine)
+    before = history_of(registry, record, ledger, but=record.id).last
+    present = {
+        _HISTORY: before is not None,
+        _MACHINE: machine is not None,
+        _CHECK: stored_check(registry.folder, record) is not None,
+    }
+    gates = [
+        {
+            "rule": result.rule,
+            "state": _STATES[result.effect],
+            "where": result.where,
+            "message": result.message,
+        }
+        for result in judged.results
+    ]
+    told = {result.rule for result in judged.results}
+    for rule, need in GATES.items():
+        if rule not in told:
+            judgeable = need is None or present[need]
+            gates.append(
+                {
+                    "rule": rule, "state": "pass" if judgeable else "not judged", "where": "",
+                    "message": "" if judgeable else f"it needs {need}",
+                }
+            )  # fmt: skip
+    return {
+        "id": record_id,
+        "compared_with": None if before is None else before.id,
+        "blocked": bool(judged.failed),
+        "gates": gates,
+        "evidence": list(judged.evidence),
+    }
+
+
+def as_found_answer(registry: Registry, record_id: str) -> dict[str, Any]:
+    """Return what the record in force before a session makes of the session's rows: as found, load by load.
+
+    ``phase`` is what the session states: as_found, as_left, or None.
+
+    Raises
+    ------
+    RecordError, RegistryError
+        a record fails a gate of its loading
+    """
+    from toolkit.calibration.control.as_found import as_found, as_found_before, phase_of
+
+    record = registry.load(record_id)
+    phase = phase_of(record)
+    result = as_found_before(registry, record) if phase == "as_left" else as_found(registry, record)
+    if result is None:
+        return {"phase": phase, "session": None, "record": None, "loads": [], "within": None,
+                "reason": "no as-found session belongs to this as-left one"}  # fmt: skip
+    return {
+        "phase": phase,
+        "session": result.session_record,
+        "record": result.record,
+        "within": result.within,
+        "reason": result.reason,
+        "loads": [{**asdict(load), "within": load.within} for load in result.loads],
+    }
+
+
+def responses_answer(registry: Registry, record_id: str) -> dict[str, Any]:
+    """Return each load's response to each indication in SI, beside that of the last approved record.
+
+    The responses are those that the gates of sign and span compare.
+
+    Raises
+    ------
+    RecordError, RegistryError
+        a record fails a gate of its loading
+    """
+    from toolkit.calibration.registry.history import history_of
+    from toolkit.calibration.registry.response import range_of, response
+
+    record = registry.load(record_id)
+    before = history_of(registry, record, registry.ledger(record.instrument), but=record.id).last
+    rows: list[dict[str, Any]] = []
+    for load in record.loads:
+        old_load = None if before is None else next((o for o in before.loads if o.load == load.load), None)
+        for cell in record.cells:
+            old_cell = (
+                None if before is None else next((c for c in before.cells if c.name == cell.name), None)
+            )
+            # Both over one range, as the gates do: of a curve the secant depends on it.
+            over = range_of(cell)
+            new = response(record, load, cell, over)
+            old = None
+            if before is not None and old_load is not None and old_cell is not None:
+                old = response(before, old_load, old_cell, over)
+            change = None
+            if old is not None and old.per == new.per and old.value != 0:
+                change = 100 * (new.value - old.value) / abs(old.value)
+            rows.append(
+                {
+                    "load": load.load, "indication": cell.name, "unit": new.per,
+                    "value": new.value, "u": new.u, "before": None if old is None else old.value,
+                    "unit_before": None if old is None else old.per, "change_percent": change,
+                }
+            )  # fmt: skip
+    return {"record": record_id, "before": None if before is None else before.id, "responses": rows}

@@ -1,0 +1,206 @@
+"""The gate of the workbench: every request passes it before any page is asked.
+
+A server on the loopback interface is reached by every page that the person's browser has open, and by every
+other user of the computer. What keeps them out:
+
+- the **Host** of a request is the address that was printed: a name that was made to lead here is refused;
+- a **place**, a random first part of every path. Cookies do not know ports: without it the cookie would go to
+  whatever else listens on this computer;
+- a **key** in the address that was printed, exchanged for a cookie that no script reads (``HttpOnly``) and
+  that the browser sends from our own pages alone (``SameSite=Strict``);
+- what changes something needs the **Origin** of our pages and the **form key** that stands in them.
+
+A handler sees a form only as ``request.state.form``, after these checks: none can be forgotten.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from hmac import compare_digest
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs, parse_qsl
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import HTMLResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+LARGEST_FORM = 65_536
+"""Bytes of a form: names, a date, a reason."""
+
+FORM_TYPE = "application/x-www-form-urlencoded"
+ENTRANCE = "/open"
+COOKIE = "toolkit"
+HEADERS: Mapping[str, str] = {
+    "content-security-policy": "; ".join((
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data:",
+        "connect-src 'self'",
+        "form-action 'self'",
+        "base-uri 'none'",
+        "frame-ancestors 'none'",
+    )),
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(), geolocation=(), microphone=(), payment=(), usb=()",
+    # Not "no-referrer": with it a browser says "Origin: null" when our own form is sent.
+    "referrer-policy": "same-origin",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+}  # fmt: skip
+"""Of every answer: no other host is asked, no script or style stands in a page, no page frames ours."""
+
+
+def _random() -> str:
+    return secrets.token_urlsafe(32)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Keys:
+    """What one run of the server shares with its person alone.
+
+    ``entry`` stands in the printed address, ``cookie`` in the browser, ``form`` in our forms; ``place``
+    begins every path.
+    """
+
+    entry: str = field(default_factory=_random, repr=False)
+    cookie: str = field(default_factory=_random, repr=False)
+    form: str = field(default_factory=_random, repr=False)
+    place: str = field(default_factory=lambda: "/" + secrets.token_hex(8))
+
+
+@dataclass(frozen=True, slots=True)
+class _Refusal:
+    status: int
+    reason: str
+
+
+class Guard:
+    """ASGI middleware around the pages. ``origin`` is the one that was printed, as http://127.0.0.1:8731."""
+
+    def __init__(self, app: ASGIApp, *, origin: str, keys: Keys) -> None:
+        self.app, self.origin, self.keys = app, origin, keys
+        self.authority = origin.partition("://")[2]
+
+    @property
+    def address(self) -> str:
+        """The address that opens the workbench; whoever has it is let in."""
+        return f"{self.origin}{self.keys.place}{ENTRANCE}?key={self.keys.entry}"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request: refuse it, let the person in, or pass it on."""
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        if scope["type"] != "http":  # no page of ours asks for a web socket
+            await send({"type": "websocket.close", "code": 1008})
+            return
+        guarded = _with_headers(send)
+        headers = Headers(scope=scope)
+        refusal = self._address_refusal(scope, headers)
+        if refusal is None and scope["path"] == self.keys.place + ENTRANCE:
+            await self._entrance(scope)(scope, receive, guarded)
+            return
+        refusal = refusal or self._person_refusal(scope, headers)
+        if refusal is None and scope["method"] == "POST":
+            refusal = await self._read_form(scope, headers, receive)
+        if refusal is not None:
+            await _page(refusal.status, refusal.reason)(scope, receive, guarded)
+            return
+        await self.app(scope, receive, guarded)
+
+    def _address_refusal(self, scope: Scope, headers: Headers) -> _Refusal | None:
+        if headers.getlist("host") != [self.authority]:
+            return _Refusal(421, "This is not the address of the workbench.")
+        if scope["method"] not in ("GET", "HEAD", "POST"):
+            return _Refusal(405, "The workbench does not answer this method.")
+        if not scope["path"].startswith(self.keys.place + "/"):
+            return _Refusal(404, "There is no such page.")
+        return None
+
+    def _person_refusal(self, scope: Scope, headers: Headers) -> _Refusal | None:
+        if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
+            return _Refusal(403, "Another page asked for this; only the workbench's own pages may.")
+        if not compare_digest(_cookie(headers).encode(), self.keys.cookie.encode()):
+            return _Refusal(
+                401,
+                "This browser is not let in. Open the address that 'toolkit open' printed.",
+            )
+        if scope["method"] == "POST" and headers.getlist("origin") != [self.origin]:
+            return _Refusal(403, "Another page sent this; only the workbench's own pages may.")
+        return None
+
+    async def _read_form(self, scope: Scope, headers: Headers, receive: Receive) -> _Refusal | None:
+        """Read the form of a request into its state; what has no key of our pages is refused."""
+        if headers.get("content-type", "").partition(";")[0].strip().lower() != FORM_TYPE:
+            return _Refusal(415, "The workbench takes forms alone.")
+        body = bytearray()
+        more = True
+        while more:
+            message: Message = await receive()
+            if message["type"] != "http.request":
+                return _Refusal(400, "The form did not arrive whole.")
+            body += message.get("body", b"")
+            more = message.get("more_body", False)
+            if len(body) > LARGEST_FORM:
+                return _Refusal(413, "The form is too large.")
+        try:
+            form = dict(
+                parse_qsl(body.decode(), keep_blank_values=True, strict_parsing=True, max_num_fields=50)
+            )
+        except ValueError:
+            return _Refusal(400, "The form cannot be read.")
+        if not compare_digest(form.pop("form_key", "").encode(), self.keys.form.encode()):
+            return _Refusal(403, "The form is not one of this run of the workbench. Load its page again.")
+        scope.setdefault("state", {})["form"] = form
+        return None
+
+    def _entrance(self, scope: Scope) -> HTMLResponse:
+        keys = parse_qs(scope["query_string"].decode("latin-1")).get("key", [])
+        if scope["method"] != "GET" or len(keys) != 1:
+            return _page(403, "This address lacks its key.")
+        if not compare_digest(keys[0].encode(), self.keys.entry.encode()):
+            return _page(403, "This key is of another run of the workbench.")
+        # No redirect: the browser would still count it as asked by whoever opened the address, and keep the
+        # cookie back. The page that follows is asked by our own.
+        home = f"{self.keys.place}/"
+        response = HTMLResponse(
+            '<!doctype html><html lang="en"><meta charset="utf-8"><title>Workbench</title>'
+            '<link rel="icon" href="data:,">'
+            f'<meta http-equiv="refresh" content="0; url={home}">'
+            f'<p><a href="{home}">Open the workbench</a></p>'
+        )
+        response.set_cookie(
+            COOKIE, self.keys.cookie, path=self.keys.place, httponly=True, samesite="strict",
+            secure=self.origin.startswith("https:"),
+        )  # fmt: skip
+        return response
+
+
+def _cookie(headers: Headers) -> str:
+    try:
+        morsel = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+    except CookieError:
+        return ""
+    return "" if morsel is None else morsel.value
+
+
+def _page(status: int, reason: str) -> HTMLResponse:
+    text = reason.replace("&", "&amp;").replace("<", "&lt;")
+    return HTMLResponse(
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Workbench</title><p>{text}</p>', status
+    )
+
+
+def _with_headers(send: Send) -> Send:
+    async def guarded(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            headers.update(HEADERS)
+            headers.setdefault("cache-control", "no-store")
+        await send(message)
+
+    return guarded

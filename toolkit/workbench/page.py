@@ -1,0 +1,72 @@
+"""How a page is drawn: templates of this folder and of the page kit, in the language of who asks."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, pass_context
+from jinja2.runtime import Context
+from markupsafe import Markup
+from starlette.responses import HTMLResponse
+
+from toolkit.lab.answers import one_line
+from toolkit.report.pages.kit import environment
+from toolkit.workbench.words import decimal_sign, preferred, translations
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+
+    from toolkit.errors import ToolkitError
+
+TEMPLATES = Path(__file__).with_name("templates")
+
+
+@cache
+def templates(language: str) -> Environment:
+    """Return the templates in a language."""
+    drawn = environment(TEMPLATES)
+    drawn.add_extension("jinja2.ext.i18n")
+    drawn.install_gettext_translations(translations(language), newstyle=False)  # type: ignore[attr-defined]
+    drawn.globals |= {"language": language, "number": _number}
+    drawn.filters |= {"chart": _chart, "one_line": one_line}
+    return drawn
+
+
+def page(request: Request, name: str, *, status: int = 200, **context: object) -> HTMLResponse:
+    """Return a page, or a part of one, by its template."""
+    language = preferred(request.headers.get("accept-language", ""))
+    bench = request.app.state.bench
+    text = templates(language).get_template(f"{name}.html.j2").render(
+        place=bench.keys.place, form_key=bench.keys.form, home=bench.home.name, **context
+    )  # fmt: skip
+    return HTMLResponse(text, status, {"content-language": language})
+
+
+def refusal(request: Request, error: ToolkitError) -> HTMLResponse:
+    """Return an error as a page: what, where, got, expected, next step."""
+    return page(request, "part_error" if is_part(request) else "error", status=400, error=error.as_dict())
+
+
+def is_part(request: Request) -> bool:
+    """Tell whether a request is for a part of a page that stands already."""
+    return request.headers.get("hx-request") == "true"
+
+
+@pass_context
+def _number(context: Context, value: float | None, form: str = ".4g", unit: str = "") -> Markup:
+    """Return a number with its unit; the element's ``value`` is the number itself, as the JSON has it."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return Markup("<span>–</span>")
+    digits = format(value, form).replace(".", decimal_sign(context["language"])).replace("-", "\u2212")
+    text = f"{digits}\u00a0{unit}" if unit else digits
+    return Markup('<data value="{}">{}</data>').format(json.dumps(value), text)
+
+
+def _chart(content: Mapping[str, Any]) -> Markup:
+    """Return a chart's content as the text of an attribute, from which the page's script draws it."""
+    return Markup("{}").format(json.dumps(content, allow_nan=False))

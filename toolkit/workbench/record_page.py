@@ -1,0 +1,209 @@
+"""A record and its session: what the gates say, what the fit shows, and the decision.
+
+Every part is the answer of a command: `calibration show`, `history`, `report`, `budget`, `approve`.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import TYPE_CHECKING, Any
+
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse
+
+from toolkit.calibration.registry.registry import ID
+from toolkit.errors import ConfigError
+from toolkit.workbench.page import page, refusal
+from toolkit.workbench.record_charts import budget_chart, residual_chart
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+    from toolkit.workbench.bench import Bench
+
+DECISIONS = ("approve", "withdraw", "discard")
+
+
+def records(request: Request) -> Response:
+    """Return every record by instrument, as the ledgers have it: no record is read."""
+    registry = request.app.state.bench.registry
+    instruments = []
+    for name in registry.instruments():
+        damage = registry.ledger(name).damage
+        statuses = [] if damage else sorted(registry.statuses(name).values(), key=_newest_first)
+        instruments.append((name, damage, statuses))
+    return page(request, "records", instruments=instruments)
+
+
+def _newest_first(status: Any) -> int:
+    match = ID.match(status.id)
+    return 0 if match is None else -int(match["number"])
+
+
+def record(request: Request) -> Response:
+    """Return a record's page: its state and coefficients, and a place for each part."""
+    return _record_page(request)
+
+
+def _record_page(
+    request: Request,
+    *,
+    status: int = 200,
+    outcome: Mapping[str, Any] | None = None,
+    typed: Mapping[str, str] | None = None,
+) -> Response:
+    from toolkit.lab.registry_answer import history, shown
+
+    bench, record_id = _asked(request)
+    instrument = ID.match(record_id)["instrument"]  # type: ignore[index]
+    content, _ = shown(bench.registry, record_id, known_at=None)
+    events, _ = history(bench.registry.ledger(instrument), instrument, record_id)
+    return page(
+        request, "record", status=status, content=content, events=events["events"], outcome=outcome,
+        parts=tuple(_PARTS) if content["record"]["verified"] else ("gates", "responses"), typed=typed or {},
+        people=bench.registry.people().history.now is not None, today=bench.today.isoformat(),
+    )  # fmt: skip
+
+
+def part(request: Request) -> Response:
+    """Return one part of a record's page."""
+    bench, record_id = _asked(request)
+    name = request.path_params["part"]
+    if name not in _PARTS:
+        raise HTTPException(404)
+    instrument = ID.match(record_id)["instrument"]  # type: ignore[index]
+    content = bench.remembered(f"{name} {record_id}", instrument, lambda: _PARTS[name](bench, record_id))
+    return page(request, f"part_{name}", record_id=record_id, **content)
+
+
+def _gates(bench: Bench, record_id: str) -> dict[str, Any]:
+    from toolkit.lab.gates_answer import gates_answer
+    from toolkit.lab.rules import rules_catalogue
+
+    return {"judged": gates_answer(bench.registry, record_id), "rules": rules_catalogue()}
+
+
+def _responses(bench: Bench, record_id: str) -> dict[str, Any]:
+    from toolkit.lab.gates_answer import responses_answer
+
+    return {"compared": responses_answer(bench.registry, record_id)}
+
+
+def _fit(bench: Bench, record_id: str) -> dict[str, Any]:
+    from toolkit.calibration.fit.findings import session_findings
+    from toolkit.calibration.fit.session_fit import fit_session
+    from toolkit.calibration.registry.stored import stored_session
+    from toolkit.lab.session_answer import fit_report
+
+    stored = bench.registry.load(record_id)
+    fit = fit_session(stored_session(bench.registry.folder, stored))
+    loads = fit_report(fit, title=record_id, full=True, figures=None).loads
+    units = {load.load: load.unit for load in stored.loads}
+    return {
+        "loads": loads,
+        "units": units,
+        "charts": {name: residual_chart(load["rows"], units[name]) for name, load in loads.items()},
+        "findings": [finding.as_dict() for finding in session_findings(fit)],
+    }
+
+
+def _budget(bench: Bench, record_id: str) -> dict[str, Any]:
+    from toolkit.lab.budget import BudgetOrder, budget_answer
+
+    payload, _, _ = budget_answer(bench.registry, record_id, BudgetOrder())
+    charts = {name: budget_chart(name, budget) for name, budget in payload["loads"].items()}
+    return {"budgets": payload["loads"], "charts": charts, "findings": payload["findings"]}
+
+
+def _as_found(bench: Bench, record_id: str) -> dict[str, Any]:
+    from toolkit.lab.gates_answer import as_found_answer
+
+    return {"found": as_found_answer(bench.registry, record_id)}
+
+
+_PARTS: dict[str, Callable[[Bench, str], dict[str, Any]]] = {
+    "gates": _gates,
+    "responses": _responses,
+    "fit": _fit,
+    "budget": _budget,
+    "as_found": _as_found,
+}
+
+
+def decide(request: Request) -> Response:
+    """Decide about a record as the command line does: by name, behind its gates.
+
+    Where people are enrolled a decision is signed by their keys, which never come here: the page says how.
+    """
+    bench, record_id = _asked(request)
+    decision = request.path_params["decision"]
+    if decision not in DECISIONS:
+        raise HTTPException(404)
+    if bench.registry.people().history.now is not None:
+        return refusal(
+            request,
+            ConfigError(
+                "people are enrolled here: a decision is signed by their keys", where=record_id,
+                got="a decision without a signature", expected="the command that the record's page shows",
+                next_step="run it where the key is; nothing was changed", rule="not-signed",
+            ),
+        )  # fmt: skip
+    form = {name: value.strip() for name, value in request.state.form.items()}
+    if decision == "approve":
+        outcome = _approve(bench, record_id, form)
+        if not outcome.done:
+            return _record_page(
+                request, status=422, outcome={"findings": [f.as_dict() for f in outcome.findings]}, typed=form
+            )
+    elif decision == "withdraw":
+        from toolkit.calibration.registry.approval import withdraw
+
+        withdraw(
+            bench.registry,
+            record_id,
+            on=_day(form, "on"),
+            reason=form.get("reason", ""),
+            by=form.get("by", ""),
+        )
+    else:
+        from toolkit.calibration.registry.approval import discard
+
+        discard(bench.registry, record_id, reason=form.get("reason", ""), by=form.get("by") or "not stated")
+    return RedirectResponse(f"{bench.keys.place}/record/{record_id}", 303)
+
+
+def _approve(bench: Bench, record_id: str, form: Mapping[str, str]) -> Any:
+    from toolkit.calibration.registry.approval import approve
+
+    return approve(
+        bench.registry, record_id, in_force_from=_day(form, "in_force_from"),
+        checked_by=form.get("checked_by", ""), approved_by=form.get("approved_by") or None,
+        reason=form.get("reason") or None, recall=form.get("recall") or None,
+    )  # fmt: skip
+
+
+def _day(form: Mapping[str, str], name: str) -> dt.date:
+    try:
+        return dt.date.fromisoformat(form.get(name, ""))
+    except ValueError as error:
+        raise ConfigError(
+            "a day cannot be read", where=name.replace("_", " "), got=form.get(name) or "nothing",
+            expected="YYYY-MM-DD", next_step="write it as in 2026-03-31; nothing was changed", rule="usage",
+        ) from error  # fmt: skip
+
+
+def _asked(request: Request) -> tuple[Bench, str]:
+    """Return the bench and the record of an address: an id that a ledger knows; nothing else has one."""
+    bench: Bench = request.app.state.bench
+    record_id = request.path_params["record"]
+    match = ID.match(record_id)
+    if match is None or match["instrument"] not in bench.registry.instruments():
+        raise HTTPException(404)
+    ledger = bench.registry.ledger(match["instrument"])
+    # A damaged ledger knows nothing for sure: the registry refuses the record, and says why.
+    if ledger.damage is None and record_id not in ledger.entered():
+        raise HTTPException(404)
+    return bench, record_id
