@@ -58,7 +58,9 @@ def test_report_answers_with_the_contract(tmp_path: Path, resolved, capsys) -> N
     assert said["pdf"] == str(out / "report.pdf")
     assert (out / "report.pdf").is_file()
     assert said["pages"] >= 1
-    assert said["calibrations"] == [{"id": "m15-r2", "sha256": make_record().sha256, "unverified": False}]
+    assert said["calibrations"] == [
+        {"id": "m15-r2", "sha256": make_record().sha256, "unverified": False, "signature": "unsigned"}
+    ]
     assert said["figures"][0]["tag"] == "tk:figure.gough"
     assert "Gough plot" in said["figures"][0]["alt"]
     assert {"tag": "tk:tire.size", "text": "265/35 ZR 18", "part": "word/document.xml"} in said["manifest"]
@@ -184,7 +186,9 @@ def test_the_hand_over_has_one_manifest_and_the_content_hash_is_the_same_twice(
     ]  # fmt: skip
     for one in manifest["outputs"]:
         assert one["sha256"] == hashlib.sha256((out / one["name"]).read_bytes()).hexdigest()
-    assert manifest["calibrations"] == [{"id": "m15-r2", "sha256": make_record().sha256, "unverified": False}]
+    assert manifest["calibrations"] == [
+        {"id": "m15-r2", "sha256": make_record().sha256, "unverified": False, "signature": "unsigned"}
+    ]
     hashes = {one["name"]: one["sha256"] for one in manifest["inputs"]}
     assert hashes["f+0"] == hashlib.sha256(b"f+0").hexdigest()
     assert manifest["template"]["sha256"] == hashlib.sha256(template.read_bytes()).hexdigest()

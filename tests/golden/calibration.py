@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -159,13 +160,21 @@ def _own(folder: Path) -> Path:
     return Path(shutil.copytree(CALIBRATIONS, folder / "calibrations"))
 
 
+def _unsigned(xml: str) -> str:
+    """Return a digital certificate without what signs it: the proof in its comment, the line of signatures."""
+    signed = r" *<dcc:identification>(?:(?!</dcc:identification>).)*Signatures of the record.*?tion>\n"
+    return re.sub(
+        signed, "", re.sub("<dcc:comment>.*?</dcc:comment>", "", xml, flags=re.DOTALL), flags=re.DOTALL
+    )
+
+
 def _certificate(place: Workplace, record: str, template: Path, registry: Path) -> dict[str, Any]:
     answer = place.answer(
         "calibration", "certificate", record, "--template", template, "--out", f"out-{record}", "--dcc",
         "--known-at", DAY, calibrations=registry,
     )  # fmt: skip
     digital = next((place.folder / f"out-{record}").glob("*.xml"), None)
-    lines = [] if digital is None else digital.read_text().splitlines()
+    lines = [] if digital is None else _unsigned(digital.read_text()).splitlines()
     for number, line in enumerate(lines):
         if "Head of the ledger" in line:  # it has times in it
             lines[number - 2] = "      <dcc:value></dcc:value>"

@@ -19,11 +19,16 @@ from tests.golden.surface import CALIBRATIONS, ROOT, package_folder, run_command
 
 NO_RESULT = frozenset(
     """timing head heads ledger_head software template_sha256 content_sha256 manifest_file pages checks
+    signature ledger
     """.split()
 )
-"""Keys of answers that hold times, versions, ledger heads, layout and hashes of whole documents."""
-NO_RESULT_TAGS = frozenset(("tk:report.date", "tk:table.models.seconds", "tk:certificate.ledger_head"))
-"""Tags of documents that print the day, a time, or a ledger's head, which has times in it."""
+"""Keys of answers that hold times, versions, ledger heads, layout and hashes of whole documents,
+and who signed: no number follows from that."""
+NO_RESULT_TAGS = frozenset(
+    """tk:report.date tk:table.models.seconds tk:certificate.ledger_head tk:signature closing:signature
+    closing:proof""".split()
+)
+"""Tags of documents that print the day, a time, a ledger's head, which has times in it, or who signed."""
 
 
 @dataclass(slots=True)
