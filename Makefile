@@ -8,7 +8,7 @@ STAMP  := $(VENV)/.installed
 SYSTEM := $(VENV)/.system
 JOBS   ?= 2
 
-APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
+APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils xmlsec1
 
 .PHONY: demo test check golden house pages bench benchmarks crash coverage fuzz proof setup lock clean
 

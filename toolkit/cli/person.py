@@ -145,6 +145,9 @@ def prove(
     instrument: Instrument,
     entry: Annotated[int | None, typer.Option("--entry", help="Entry, from 1; default: the last.")] = None,
     sign: Sign = None,
+    time_stamp: Annotated[
+        str | None, typer.Option("--time-stamp", metavar="URL", help="Stamp the checkpoint (RFC 3161).")
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
 ) -> int:
@@ -155,7 +158,12 @@ def prove(
     from toolkit.lab.people import anchor_document, checkpoint_of
 
     registry = _registry(calibrations, home, sign=sign)
-    typer.echo(anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument)), nl=False)
+    document = anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument))
+    if time_stamp is not None:
+        from toolkit.lab.stamping import stamped
+
+        document = stamped(document, time_stamp)
+    typer.echo(document, nl=False)
     return 0
 
 
@@ -173,10 +181,19 @@ def check(
     Example: toolkit ledger check m15 --against certificate.pdf
     """
     from toolkit.lab.people import check_against
+    from toolkit.lab.sealing import TRUST, trusted
+    from toolkit.lab.stamping import stamp_of
 
-    comparison = check_against(_registry(calibrations, home), instrument, against)
+    registry = _registry(calibrations, home)
+    comparison = check_against(registry, instrument, against)
+    stamp = stamp_of(against, trusted(registry.folder.parent / TRUST))
+    text = f"{comparison.continuity}: {comparison.why}"
     payload = {"instrument": instrument, "ledger": comparison.continuity, "why": comparison.why}
-    answer(payload, f"{comparison.continuity}: {comparison.why}", as_json=as_json, quiet=quiet)
+    if stamp is not None:
+        text += f"\n{stamp.text}"
+        payload["time_stamp"] = f"{stamp.at:%Y-%m-%dT%H:%M:%SZ}"
+        payload["time_stamp_by"], payload["time_stamp_state"] = stamp.by, stamp.state
+    answer(payload, text, as_json=as_json, quiet=quiet)
     return 0 if comparison.continuity == "continues" else 1
 
 

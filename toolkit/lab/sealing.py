@@ -70,9 +70,9 @@ class Sealing:
         text = json.dumps(proof, ensure_ascii=False, indent=1).encode() + b"\n"
         stamps = None
         if self.stamps is not None:
-            from pyhanko.sign.timestamps import HTTPTimeStamper
+            from toolkit.trust.seal.stamps import StampServer
 
-            stamps = HTTPTimeStamper(self.stamps)
+            stamps = StampServer(self.stamps)
         sealed = seal_pdf(
             read_input(pdf, PDF_FILE),
             self.key,
