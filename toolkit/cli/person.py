@@ -140,6 +140,44 @@ def revoke(
     return 0
 
 
+@person.command()
+def policy(
+    action: Annotated[str, typer.Argument(help="enter, approve, withdraw, discard, import, issue or enrol.")],
+    role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
+    reason: Why,
+    signatures: Annotated[int, typer.Option("--signatures", help="Of different people.")] = 1,
+    by: By = None,
+    sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
+    calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Say whose signatures a decision takes, and how many; what was decided before stays as it was.
+
+    Example: toolkit person policy withdraw --role head --signatures 2 --reason "audit of May" --sign anna
+    """
+    from typing import get_args
+
+    from toolkit.lab.people import people_answer, set_demand
+    from toolkit.trust.people import Action
+
+    if action not in get_args(Action):
+        raise typer.BadParameter(", ".join(get_args(Action)), param_hint="ACTION")
+    registry = _registry(
+        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
+    )
+    log = set_demand(
+        registry, cast("Action", action), roles=cast("list[Role]", role), signatures=signatures,
+        reason=reason, by=by,
+    )  # fmt: skip
+    answer(*people_answer(log), as_json=as_json, quiet=quiet)
+    return 0
+
+
 @ledger.command()
 def prove(
     instrument: Instrument,
