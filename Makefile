@@ -10,7 +10,7 @@ SYSTEM := $(VENV)/.system
 JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
-TEST_PACKAGES := chromium
+TEST_PACKAGES := chromium xmlsec1
 
 .PHONY: demo test check golden house pages bench benchmarks crash coverage fuzz proof setup lock clean
 

@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 
 from tests.crash.bench import Bench
-from tests.crash.commands import QUICK, SLOW, office, whole_folder
+from tests.crash.commands import QUICK, SIGNED, SLOW, office, signed_folder, whole_folder
 from tests.faults import Runner
 
 
@@ -31,11 +31,17 @@ def main() -> int:
     say("| command | calls | points | lost | mixed | recovered |\n|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory(prefix="toolkit-crash-") as place:
         os.environ["TOOLKIT_SOFFICE"] = str(office(Path(place)))
+        for folder in ("all", "signed"):
+            (Path(place) / folder).mkdir()
         with Runner() as runner:
-            bench = Bench(whole_folder, Path(place), runner)
-            for command in (*QUICK, *SLOW):
+            bench, signed = (
+                Bench(prepare, Path(place) / folder, runner)
+                for prepare, folder in ((whole_folder, "all"), (signed_folder, "signed"))
+            )
+            for command in (*QUICK, *SLOW, *SIGNED):
                 if wanted.names and not command.name.startswith(tuple(wanted.names)):
                     continue
+                bench = signed if command in SIGNED else bench
                 count = bench.judge(command, most=wanted.most)
                 row = (
                     command.name,

@@ -31,6 +31,7 @@ class Command:
     sets : folders or files, each of which belongs together
     others : files of somebody else beside the results
     registry : results are the registry's, which its own reader completes
+    home : where below its folder the registry's home is
     then : the next entry, with which a registry's remnant goes; None: the command itself is one
     once : a result is never written over: the next run refuses where one is in place
     """
@@ -41,6 +42,7 @@ class Command:
     sets: tuple[str, ...] = ("out",)
     others: tuple[str, ...] = ()
     registry: bool = False
+    home: str = "."
     then: str | None = None
     once: bool = False
 
@@ -103,7 +105,7 @@ class Bench:
                         count.lost.append(f"{where}: then {sorted({*after} ^ {*new})}")
                     elif remnants := list(self._remnants()):
                         count.lost.append(f"{where}: left {remnants}")
-                    elif command.registry and self._run(VERIFY).code not in (0, 1):
+                    elif command.registry and self._asked(command, "verify") not in (0, 1):
                         count.lost.append(f"{where}: then verify fails")
                     else:
                         count.recovered += 1
@@ -145,7 +147,7 @@ class Bench:
         self, command: Command, seen: dict[str, bytes], old: dict[str, bytes], new: dict[str, bytes]
     ) -> bool:
         if command.registry:
-            return self._run(VERIFY).code not in (0, 1) or self._run(LIST).code != 0
+            return self._asked(command, "verify") not in (0, 1) or self._asked(command, "list") != 0
         for place in command.sets:
             ages = {
                 "old" if seen[name] == old.get(name) else "new"
@@ -160,14 +162,16 @@ class Bench:
             if name.endswith("manifest.json")
         )
 
+    def _asked(self, command: Command, question: str) -> int:
+        """Return how the registry's own reader ends."""
+        return self._run(
+            f"calibration {question} --calibrations {{work}}/{command.home}/calibrations --quiet"
+        ).code
+
     def _remnants(self) -> Iterator[str]:
         for path in self.work.rglob("*"):
             if path.name.startswith(_HIDDEN) or path.name.endswith(_PART):
                 yield str(path.relative_to(self.work))
-
-
-VERIFY = "calibration verify --calibrations {work}/calibrations --quiet"
-LIST = "calibration list --calibrations {work}/calibrations --quiet"
 
 
 def passing(name: str) -> bool:

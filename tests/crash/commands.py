@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -113,6 +114,57 @@ SLOW = (
     ),
 )
 
+_KEY = "{work}/../keys"
+_WITHDRAWAL = (
+    "calibration withdraw m15-virtual-r1 --on 2026-11-21 --by anna --reason reference --calibrations "
+    "{work}/signed/calibrations"
+)
+
+
+def _enrol(name: str, role: str, home: str, more: str = "") -> str:
+    return (
+        f"person enrol {name} --name {name.title()} --role {role} --key {_KEY}/{name}.pub --sign {_KEY}/anna "
+        f"--home {{work}}/{home} {more}"
+    )
+
+
+SIGNED = (
+    Command(
+        name="person enrol (first)",
+        words=_enrol("anna", "head", "new", f"--recovery {_KEY}/ben"),
+        sets=("new",), registry=True, home="new",
+        then=_enrol("dora", "checker", "new"),
+    ),
+    Command(
+        name="person enrol", words=_enrol("dora", "checker", "signed"),
+        sets=("signed",), registry=True, home="signed",
+        then=_enrol("carl", "operator", "signed"),
+    ),
+    Command(
+        name="person revoke",
+        words=f"person revoke recovery --from 2027-01-01T00:00:00Z --reason lost --sign {_KEY}/anna "
+        "--home {work}/signed",
+        sets=("signed",), registry=True, home="signed",
+        then=_enrol("carl", "operator", "signed"),
+    ),
+    Command(
+        name="calibration withdraw (signed)", words=f"{_WITHDRAWAL} --sign {_KEY}/anna",
+        sets=("signed",), registry=True, home="signed",
+    ),
+    Command(
+        name="calibration withdraw (answered)", words=f"{_WITHDRAWAL} --answer {{work}}/r.anna.json",
+        sets=("signed",), registry=True, home="signed",
+    ),
+    Command(
+        name="calibration withdraw (requested)", words=f"{_WITHDRAWAL} --request {{work}}/out/r.json",
+        sets=("out",), registry=True, home="signed",
+    ),
+    Command(
+        name="sign", once=True,
+        words=f"sign {{work}}/r.json --key {_KEY}/anna --yes --out {{work}}/out/r.json",
+    ),
+)  # fmt: skip
+
 # LibreOffice takes seconds and is not what is killed here: a conversion of before is taken again.
 _OFFICE = """#!{python}
 import hashlib, os, shutil, subprocess, sys, zipfile
@@ -162,6 +214,25 @@ def whole_folder(base: Path, runner: Runner) -> None:
     ):
         ended = runner.run([word.replace("{work}", str(base)) for word in words.split()], root=base)
         if ended.code not in (0, 1):
+            raise RuntimeError(f"{words}: {ended.err}")
+
+
+def signed_folder(base: Path, runner: Runner) -> None:
+    """Prepare two homes, one in which people are enrolled, keys outside of both, a request and its answer."""
+    keys = base.parent / "keys"
+    keys.mkdir()
+    for name in ("anna", "ben", "carl", "dora"):
+        command = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(keys / name)]
+        subprocess.run(command, check=True)
+    for home in ("signed", "new"):
+        shutil.copytree(ROOT / "calibrations", base / home / "calibrations")
+    for words in (
+        _enrol("anna", "head", "signed", f"--recovery {_KEY}/ben"),
+        f"{_WITHDRAWAL} --request {{work}}/r.json",
+        f"sign {{work}}/r.json --key {_KEY}/anna --yes",
+    ):
+        ended = runner.run([word.replace("{work}", str(base)) for word in words.split()], root=base)
+        if ended.code != 0:
             raise RuntimeError(f"{words}: {ended.err}")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.crash.bench import Bench, agrees, chosen, passing
-from tests.crash.commands import QUICK, quick_folder
+from tests.crash.commands import QUICK, SIGNED, quick_folder, signed_folder
 from tests.faults import Runner
 from toolkit.files import sha256_bytes
 
@@ -24,6 +24,19 @@ def test_nothing_is_lost_or_mixed_and_the_next_run_gives_the_same(bench: Bench, 
     count = bench.judge(command, most=4)
     assert (count.lost, count.mixed) == ([], [])
     assert count.recovered == count.points >= 9
+
+
+@pytest.fixture(scope="module")
+def signed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with Runner() as runner:
+        yield Bench(signed_folder, tmp_path_factory.mktemp("crash"), runner)
+
+
+@pytest.mark.parametrize("command", SIGNED, ids=lambda command: command.name)
+def test_between_signature_and_entry_neither_or_both_are_there(signed: Bench, command) -> None:
+    count = signed.judge(command, most=4)
+    assert (count.lost, count.mixed) == ([], [])
+    assert count.recovered == count.points >= 6
 
 
 def test_a_bench_that_could_not_see_a_fault_would_prove_nothing() -> None:

@@ -140,11 +140,52 @@ def revoke(
     return 0
 
 
+@person.command()
+def policy(
+    action: Annotated[str, typer.Argument(help="enter, approve, withdraw, discard, import, issue or enrol.")],
+    role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
+    reason: Why,
+    signatures: Annotated[int, typer.Option("--signatures", help="Of different people.")] = 1,
+    by: By = None,
+    sign: Sign = None,
+    request: RequestFile = None,
+    answers: Answers = None,
+    calibrations: Calibrations = None,
+    lock_file: LockFile = False,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Say whose signatures a decision takes, and how many; what was decided before stays as it was.
+
+    Example: toolkit person policy withdraw --role head --signatures 2 --reason "audit of May" --sign anna
+    """
+    from typing import get_args
+
+    from toolkit.lab.people import people_answer, set_demand
+    from toolkit.trust.people import Action
+
+    if action not in get_args(Action):
+        raise typer.BadParameter(", ".join(get_args(Action)), param_hint="ACTION")
+    registry = _registry(
+        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
+    )
+    log = set_demand(
+        registry, cast("Action", action), roles=cast("list[Role]", role), signatures=signatures,
+        reason=reason, by=by,
+    )  # fmt: skip
+    answer(*people_answer(log), as_json=as_json, quiet=quiet)
+    return 0
+
+
 @ledger.command()
 def prove(
     instrument: Instrument,
     entry: Annotated[int | None, typer.Option("--entry", help="Entry, from 1; default: the last.")] = None,
     sign: Sign = None,
+    time_stamp: Annotated[
+        str | None, typer.Option("--time-stamp", metavar="URL", help="Stamp the checkpoint (RFC 3161).")
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
 ) -> int:
@@ -155,7 +196,12 @@ def prove(
     from toolkit.lab.people import anchor_document, checkpoint_of
 
     registry = _registry(calibrations, home, sign=sign)
-    typer.echo(anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument)), nl=False)
+    document = anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument))
+    if time_stamp is not None:
+        from toolkit.lab.stamping import stamped
+
+        document = stamped(document, time_stamp)
+    typer.echo(document, nl=False)
     return 0
 
 
@@ -180,10 +226,19 @@ def check(
     Example: toolkit ledger check --against certificate.pdf
     """
     from toolkit.lab.people import check_against
+    from toolkit.lab.sealing import TRUST, trusted
+    from toolkit.lab.stamping import stamp_of
 
-    named, comparison = check_against(_registry(calibrations, home), instrument, against)
+    registry = _registry(calibrations, home)
+    named, comparison = check_against(registry, instrument, against)
+    stamp = stamp_of(against, trusted(registry.folder.parent / TRUST))
+    text = f"{comparison.continuity}: {comparison.why}"
     payload = {"instrument": named, "ledger": comparison.continuity, "why": comparison.why}
-    answer(payload, f"{comparison.continuity}: {comparison.why}", as_json=as_json, quiet=quiet)
+    if stamp is not None:
+        text += f"\n{stamp.text}"
+        payload["time_stamp"] = f"{stamp.at:%Y-%m-%dT%H:%M:%SZ}"
+        payload["time_stamp_by"], payload["time_stamp_state"] = stamp.by, stamp.state
+    answer(payload, text, as_json=as_json, quiet=quiet)
     return 0 if comparison.continuity == "continues" else 1
 
 

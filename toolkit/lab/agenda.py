@@ -55,7 +55,7 @@ def _witnesses(registry: Registry, instrument: str) -> list[dict[str, Any]]:
             checkpoint = remembered(path)
             if checkpoint is None or checkpoint.origin != f"toolkit/{instrument}":
                 continue  # of an instrument whose name begins with this one's
-            comparison = check_against(registry, instrument, path)
+            _, comparison = check_against(registry, instrument, path)
         except ToolkitError as error:
             rows.append({"name": name, "size": None, "state": "unreadable", "why": str(error.got)})
             continue
@@ -77,7 +77,7 @@ def candidates_answer(registry: Registry) -> list[dict[str, Any]]:
             if status.state != "candidate":
                 continue
             try:
-                rows.append(record_row(registry.load(record_id), status))
+                rows.append(record_row(registry.load(record_id), status, registry.signature(record_id)))
             except ToolkitError as error:
                 rows.append(
                     {"id": record_id, "status": "refused", "rule": error.rule, "reason": str(error.got)}

@@ -20,7 +20,7 @@ from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
 from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import leaf_hash, root_of
-from toolkit.trust.people import Key, People, Person, Role
+from toolkit.trust.people import MEANINGS, Action, Demand, Key, People, Person, Role
 from toolkit.trust.ssh import parse_public
 from toolkit.trust.witness import SUFFIX, countersign
 
@@ -91,6 +91,27 @@ def revoke_key(
     return _enter(registry, people, registry.signers, reason, by)
 
 
+def set_demand(
+    registry: Registry, action: Action, *, roles: Sequence[Role], signatures: int, reason: str,
+    by: str | None = None,
+) -> PeopleLog:  # fmt: skip
+    """Say whose signatures a decision takes from now on, and how many.
+
+    Raises
+    ------
+    TrustError
+        ``person``: nobody is enrolled; or the signers may not
+    ConfigError
+        roles or number cannot be, or nobody could make the decision
+    """
+    version = registry.people().history.now
+    if version is None:
+        raise _nobody(action, ())
+    demand = Demand(roles=tuple(dict.fromkeys(roles)), signatures=signatures)
+    policy = replace(version.people.policy, **{"import_" if action == "import" else action: demand})
+    return _enter(registry, replace(version.people, policy=policy), registry.signers, reason, by)
+
+
 def people_answer(log: PeopleLog) -> tuple[dict[str, Any], str]:
     """Return who is enrolled, as a payload and for people."""
     from toolkit.lab.answers import table
@@ -110,8 +131,17 @@ def people_answer(log: PeopleLog) -> tuple[dict[str, Any], str]:
         [person.id, person.name, ", ".join(person.roles), key.public.fingerprint, key.since, key.until or ""]
         for person, key in keys
     ]
-    payload = {"people": rows, "versions": len(log.history.versions), "since": version.since}
-    return payload, table(["id", "name", "roles", "key", "from", "until"], cells, align="<<<<<<")
+    demands = {action: version.people.policy.demand(action) for action in MEANINGS}
+    payload = {
+        "people": rows, "versions": len(log.history.versions), "since": version.since,
+        "policy": {
+            action: {"roles": list(demand.roles), "signatures": demand.signatures}
+            for action, demand in demands.items()
+        },
+    }  # fmt: skip
+    takes = [[action, str(d.signatures), " or ".join(d.roles)] for action, d in demands.items()]
+    text = table(["id", "name", "roles", "key", "from", "until"], cells, align="<<<<<<")
+    return payload, text + "\n\n" + table(["to", "takes", "of"], takes, align="<><")
 
 
 def checkpoint_of(registry: Registry, instrument: str) -> Checkpoint:

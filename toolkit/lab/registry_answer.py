@@ -80,6 +80,8 @@ def history(ledger: Ledger, instrument: str, name: str) -> tuple[dict[str, Any],
             "known_on": e.known_on and e.known_on.isoformat(), "since": e.since and e.since.isoformat(),
             "reason": e.reason, "note": e.note, "recall": e.recall,
             "unverifiable": list(e.unverifiable), "evidence": list(e.evidence), "sha256": e.sha256,
+            **({"clock": e.clock} if e.clock else {}),
+            **({"signed_by": [row["by"] for row in e.signatures]} if e.signatures else {}),
         }
         for e in entries
     ]  # fmt: skip
@@ -89,6 +91,8 @@ def history(ledger: Ledger, instrument: str, name: str) -> tuple[dict[str, Any],
         + (f", known on {e['known_on']}" if e["known_on"] else "")
         + (f", {e['note']}" if e["note"] else "")
         + (f", recall after {e['recall']}" if e["recall"] else "")
+        + (f", signed by {' and '.join(row['by'] for row in entry.signatures)}" if entry.signatures else "")
+        + (f", clock {entry.clock}" if entry.clock not in (None, "synchronised") else "")
         + (f"\n     {e['reason']}" if e["reason"] else "")
         + "".join(f"\n     {text}" for text in entry.evidence)
         for e, entry in zip(events, entries, strict=True)

@@ -38,9 +38,9 @@ class Sealing:
 
         stamps = None
         if self.stamps is not None:
-            from pyhanko.sign.timestamps import HTTPTimeStamper
+            from toolkit.trust.seal.stamps import StampServer
 
-            stamps = HTTPTimeStamper(self.stamps)
+            stamps = StampServer(self.stamps)
         return seal_pdf(data, self.key, reason=f"issued: {document}", stamps=stamps)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.errors import ConfigError, OutputError, TrustError
-from toolkit.files import write_atomic
+from toolkit.publication import publication
 from toolkit.trust.keys import Signer, agent_keys, agent_signer
 from toolkit.trust.people import Person, inability
 from toolkit.trust.requested import Requested
@@ -68,7 +68,8 @@ def sign_request(request: Request, signer: Signer, out: Path | None = None) -> t
             expected="a name that is free", next_step="name another with --out; nothing was signed",
             rule="not-empty",
         )  # fmt: skip
-    write_atomic(path, answer.text)
+    with publication(path.parent) as stage:
+        (stage / path.name).write_text(answer.text, encoding="utf-8")
     return path, person
 
 

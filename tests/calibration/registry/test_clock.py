@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import ctypes
 import datetime as dt
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from tests.calibration.control_factory import enter, write_session
 from tests.calibration.registry.test_legacy import GOOD
+from tests.trust.forgeries.laboratory import KEYS, event_of, laboratory
 from toolkit.calibration.registry import approval, candidate, clock, ledger
 from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.clock_state import clock_state
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
 from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.store import Change
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RegistryError
 
@@ -161,3 +166,26 @@ def test_no_laboratory_is_refused_for_its_time_zone() -> None:
 def test_the_projects_ledgers_are_in_order() -> None:
     project = Registry(Path(__file__).resolve().parents[3] / "calibrations")
     assert all(row.ok for row in verify_registry(project))
+
+
+def test_an_entry_tells_the_state_of_the_clock_and_waits_for_nobody(
+    entered: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert entered.ledger("cell").entries[-1].clock in ("synchronised", "not synchronised", "unknown")
+    for answer, state in ((0, "synchronised"), (5, "not synchronised"), (-1, "unknown"), (None, "unknown")):
+        library = (
+            SimpleNamespace() if answer is None else SimpleNamespace(adjtimex=lambda _buffer, a=answer: a)
+        )
+        monkeypatch.setattr(ctypes, "CDLL", lambda *_words, library=library, **_more: library)
+        assert clock_state() == state
+        monkeypatch.undo()
+
+
+def test_no_entry_lies_before_the_newest_version_of_the_people() -> None:
+    event = event_of("entered", "cell-r1", "2025-11-30T23:59:59Z", by="Carl Example")
+    with laboratory() as home:
+        registry = Registry(home / "calibrations", signers=[KEYS["carl"]])
+        with pytest.raises(RegistryError) as refusal:
+            registry.commit("cell", lambda _ledger: Change(files={}, event=event))
+    assert refusal.value.rule == "time"
+    assert (refusal.value.got, "2025-12-01T00:00:00Z" in str(refusal.value.expected)) == (event["time"], True)

@@ -101,7 +101,7 @@ def _held(
             for document in (*documents, checkpoint):
                 path = folder / "document.json"
                 path.write_text(document)
-                held.append(check_against(forged, RIG, path).continuity == "continues")
+                held.append(_continues(forged, path))
             return witnessed or any(held)
 
     return Forgery(kind=kind, what=what, accepted=accepted)
@@ -114,10 +114,10 @@ def _proof_holds(text: str) -> bool:
         try:
             anchor = parse_anchor(json.loads(text))
             signed = anchor.checkpoint.signed_by("anna", KEYS["anna"].public)
-            against = check_against(Registry(home / "calibrations"), RIG, path)
+            continues = _continues(Registry(home / "calibrations"), path)
         except ToolkitError:
             return False
-        return against.continuity == "continues" and anchor.proved and signed
+        return continues and anchor.proved and signed
 
 
 def _checkpoint_holds(text: str) -> bool:
@@ -126,7 +126,11 @@ def _checkpoint_holds(text: str) -> bool:
         path.write_text(text)
         try:
             signed = parse_checkpoint(text).signed_by("anna", KEYS["anna"].public)
-            against = check_against(Registry(home / "calibrations"), RIG, path)
+            continues = _continues(Registry(home / "calibrations"), path)
         except ToolkitError:
             return False
-        return signed and against.continuity == "continues"
+        return signed and continues
+
+
+def _continues(registry: Registry, document: Path) -> bool:
+    return check_against(registry, RIG, document).continuity == "continues"

@@ -83,6 +83,8 @@ def enrol(
     ------
     TrustError
         ``not-signed``, ``not-allowed``, ``request``, ``people-log``; nothing is changed
+    ConfigError
+        two people of one name or key, or a decision that nobody could make; nothing is changed
     OutputError
         the home cannot be written to
     """
@@ -90,6 +92,7 @@ def enrol(
     data = people.text().encode()
     digest = sha256_bytes(data)
     time = travel.answers[0].time if travel.answers else now()
+    version = version_of(data, time)  # what nobody could read again is never entered
 
     def build(ledger: Ledger) -> Change:
         number = len(ledger.entries) + 1
@@ -103,7 +106,6 @@ def enrol(
 
     before = read_people(calibrations).history
     if before.now is None:
-        version = version_of(data, time)
         before = History((version,))
         if travel.request is None:
             answered = [public for answer in travel.answers for public in answer.keys(version)]

@@ -12,7 +12,7 @@ from toolkit.calibration.registry.clock import check_after, day_of
 from toolkit.calibration.registry.clock_state import clock_state
 from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
 from toolkit.errors import TrustError
-from toolkit.files import write_atomic
+from toolkit.publication import publication
 from toolkit.trust.decisions import SignedLine, action_of, signature_row, statement, unsigned, violations
 from toolkit.trust.merkle import Growing, leaf_hash
 from toolkit.trust.people import Action, History
@@ -73,7 +73,8 @@ def signed_event(
     path = signing.travel.request
     request = Request(message=message, people=version.text, file=file, operators=operators, path=path)
     if path is not None:
-        write_atomic(path, request.text)
+        with publication(path.parent) as stage:
+            (stage / path.name).write_text(request.text, encoding="utf-8")
         raise Requested(request)
     rows: list[Mapping[str, str]] = []
     publics = [signer.public for signer in signing.signers]
