@@ -16,6 +16,7 @@ from pathlib import Path
 from tests.benchmarks import (
     audit_kills,
     audit_rate,
+    diagnose_equations,
     diagnose_nulls,
     diagnose_time,
     diagnose_worker,
@@ -52,6 +53,7 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "unknown": unknown_rows.run,
     "tires": tire_fits.run,
     "diagnose": diagnose_time.run,
+    "diagnose-equations": diagnose_equations.run,
     "diagnose-nulls": diagnose_nulls.run,
     "diagnose-worker": diagnose_worker.run,
     "workbench": workbench_paint.run,

@@ -84,7 +84,7 @@ def _diagnosed(
     except BudgetSpentError:
         return Result(diagnosis=_too_late(case, None, None, (), budget.step), search=None)
     failed = FailedRuns(model.simulate)
-    supervised = Supervised(model, budget.guarded(failed))
+    supervised = Supervised(model, failed, budget.guarded)
     problem = problem_of(case, supervised)
     findings = (
         *case_findings(problem),
@@ -101,7 +101,8 @@ def _diagnosed(
             )  # fmt: skip
         else:
             seed = int(case.sha256[:12], 16)
-            outcome = search(problem, seed=seed, budget=budget)
+            with budget.limited():
+                outcome = search(problem, seed=seed, budget=budget)
             answer = answer_of(case, outcome, findings)
     except BudgetSpentError as error:
         answer = _too_late(case, problem, declared, findings, str(error))
@@ -119,8 +120,9 @@ def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.fl
     """Return the simulation as declared; what cannot be simulated ends here."""
     budget.tell("the simulation as declared")
     values = tuple(parameter.value for parameter in problem.free)
+    started = time.monotonic()
     simulated = problem.simulate(values, ())
-    quick = budget.last_s < BUDGET.quick_s
+    quick = time.monotonic() - started < BUDGET.quick_s * len(problem.runs)
     repeats = problem.model.capability.repeats
     if quick and repeats is not None:
         repeats(problem.runs[0], problem.known)

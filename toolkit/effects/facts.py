@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 Values = Mapping[str, float]
 Channels = Mapping[str, "NDArray[np.float64]"]
 # (position, velocity, parameters) -> force-like term against the motion, of the arrays' shape or scalars
-ForceHook = Callable[[float, float, Values], float]
+ForceHook = Callable[[Any, Any, Values], Any]
 # (time, velocity, parameters) -> the same term along a recorded motion, of a force that has a memory
 RecordedHook = Callable[["NDArray[np.float64]", "NDArray[np.float64]", Values], "NDArray[np.float64]"]
-# (state, its spread, parameters) -> share of a rising rate that is left
-LimitHook = Callable[[float, float, Values], float]
+# (state, its spread, parameters) -> share of a rising rate that is left, of the arrays' shape or scalars
+LimitHook = Callable[[Any, float, Values], Any]
 # parameters -> size of the sliding force, and the distance over which it builds up (0: no bristle)
-BristleHook = Callable[[Values], tuple[float, float]]
+BristleHook = Callable[[Values], tuple[Any, Any]]
 # (positions (n,), parameters of every start) -> forces (n, directions x starts), the directions in blocks
 PatternHook = Callable[["NDArray[np.float64]", Sequence[Values]], "NDArray[np.float64]"]
 # (shown (n,), parameters, setting) -> what the channel would show without the effect

@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from toolkit.diagnosis.simulators.batch_integration import integrate_together
+from toolkit.diagnosis.case.case import Run
+from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import integrate
+from toolkit.diagnosis.simulators.marching import march
+from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.sliding_friction import Slide
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effects
 
 COULOMB = 2.0
 T = np.linspace(0.0, 4.0, 81)
@@ -67,12 +72,25 @@ def test_a_slide_loses_the_energy_of_its_friction():
 
 
 def test_columns_slide_and_turn_each_at_its_own_time():
-    reaches, starts = (1e-2, 1e-4, 1e-3), np.array([[0.0, 0.0, 0.1], [0.3, -0.8, 0.05], [0.0, 0.0, 0.5]])
-    alone = [
-        integrate(pushed(reach), T, starts[:, k], ATOL, [slide(reach)]) for k, reach in enumerate(reaches)
+    reaches, starts = np.array([1e-2, 1e-4, 1e-3]), np.array([[0.0, 0.0, 0.1], [0.3, -0.8, 0.05]])
+    friction = [
+        AppliedEffect(
+            effect=effects()["coulomb_friction"],
+            channel="v",
+            values={"coulomb": COULOMB, "presliding": reach},
+        )
+        for reach in reaches.tolist()
     ]
-    made = integrate_together(
-        pushed(np.array(reaches)), T, starts, ATOL, [(k, slide(reach)) for k, reach in enumerate(reaches)]
-    )
-    for k, one in enumerate(alone):
-        np.testing.assert_allclose(made[:, :2, k], one[:2].T, atol=2e-5)
+    forces = [Forces.of([one], ("x", "v"), {1: 0}, {"x": (1.0, 1.0), "v": (1.0, 1.0)}) for one in friction]
+    run = Run(name="", t=T, columns={}, conditions={}, declared={}, simulated={})
+
+    def driven(t, x, u, p):
+        return pushed(1.0)(t, np.stack([x[0], x[1], 0 * t]))[:2]
+
+    everywhere = ForcesTogether(forces, 2, [run])
+    flow = RowFlow(driven, Rows([run], ()), {"none": np.zeros(3)}, everywhere, np.tile(ATOL[:, None], 3))
+    made, reached = march(flow, np.vstack([starts, np.zeros((1, 3))])[:, :, None], np.arange(3))
+    assert reached.all()
+    for k, reach in enumerate(reaches.tolist()):
+        alone = integrate(pushed(reach), T, np.array([*starts[:, k], 0.0]), ATOL, [slide(reach)])
+        np.testing.assert_allclose(made[:2, k], alone[:2], atol=2e-5)

@@ -65,6 +65,8 @@ class Problem:
         """Return every output over all runs in their order; ``p`` are the free parameters."""
         values = dict(self.known)
         values.update(zip((parameter.name for parameter in self.free), map(float, p), strict=True))
+        if self.model.capability.together is not None and len(self.runs) > 1:
+            self.model.capability.together(self.runs, [(values, active)])
         outputs = [self.model.simulate(run, values, active) for run in self.runs]
         return {name: np.concatenate([output[name] for output in outputs]) for name in self.names}
 
@@ -75,8 +77,7 @@ class Problem:
             return
         names = [parameter.name for parameter in self.free]
         sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in points]
-        for run in self.runs:
-            together(run, sets)
+        together(self.runs, sets)
 
     def pushed(
         self,

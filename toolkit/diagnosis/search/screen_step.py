@@ -155,5 +155,6 @@ def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -
         return frozenset()
     residual = {name: problem.observed[name] - values for name, values in simulated.items()}
     screen = LinearisedFit.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
+    screen.prepare(candidates)
     ranked = best_of([score for candidate in candidates for score in screen.score(candidate)])
     return frozenset(trial.candidate.key for trial in ranked[: PRIORS.masked])

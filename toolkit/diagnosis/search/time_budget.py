@@ -14,12 +14,11 @@ from toolkit.worker.worker import LateError
 T = TypeVar("T")
 
 
-class _AlarmError(BaseException):
-    """The time is over; no simulator's own ``except Exception`` holds it up."""
+_GRACE = 0.5  # s after the end, so that a worker that is late is told by itself
 
 
-class BudgetSpentError(Exception):
-    """The budget is spent."""
+class BudgetSpentError(BaseException):
+    """The budget is spent; no simulator's own ``except Exception`` holds it up."""
 
 
 class TimeBudget:
@@ -32,7 +31,7 @@ class TimeBudget:
         self.until = time.monotonic() + budget_s
         self.step = "the simulation as declared"
         self.last_s = 0.0
-        self._tell, self._alarm = tell, alarm
+        self._tell, self._alarm, self._set = tell, alarm, False
 
     def tell(self, step: str) -> None:
         """Note the step that begins, and tell it on."""
@@ -54,34 +53,38 @@ class TimeBudget:
 
         def call(*arguments: Any, **keywords: Any) -> T:
             started = time.monotonic()
-            seconds = self.until - started
-            if seconds <= 0:
+            if self.until <= started:
                 raise BudgetSpentError(self.step)
             try:
-                with _alarm(seconds) if self._alarm else contextlib.nullcontext():
+                with self.limited() if self._alarm else contextlib.nullcontext():
                     return function(*arguments, **keywords)
-            except (_AlarmError, LateError):
+            except LateError:
                 raise BudgetSpentError(self.step) from None
             finally:
                 self.last_s = time.monotonic() - started
 
         return call
 
+    @contextlib.contextmanager
+    def limited(self) -> Iterator[None]:
+        """End with the budget what is done meanwhile, whatever it is: a fit as well as a simulation.
 
-@contextlib.contextmanager
-def _alarm(seconds: float) -> Iterator[None]:
-    """Raise in this thread after a time; nothing where the system or the thread knows no alarm."""
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
-        yield
-        return
+        Nothing where an alarm is set already, or where the system or the thread knows none.
+        """
+        main = threading.current_thread() is threading.main_thread()
+        if self._set or not main or not hasattr(signal, "setitimer"):
+            yield
+            return
 
-    def ring(*_: object) -> None:
-        raise _AlarmError
+        def ring(*_: object) -> None:
+            raise BudgetSpentError(self.step)
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        before = signal.signal(signal.SIGALRM, ring)
+        self._set = True
+        signal.setitimer(signal.ITIMER_REAL, max(self.until - time.monotonic(), 0.0) + _GRACE)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, before)
+            self._set = False

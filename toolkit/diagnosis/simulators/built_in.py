@@ -80,8 +80,8 @@ class WithEffects:
         if together is not None:
             plain = dataclasses.replace(
                 plain,
-                together=lambda run, sets: together(
-                    run, [(self._parameters(p), self._all(p, active)) for p, active in sets]
+                together=lambda runs, sets: together(
+                    runs, [(self._parameters(p), self._all(p, active)) for p, active in sets]
                 ),
             )
         if motion is not None:

@@ -115,6 +115,10 @@ class CaseCode:
         )
         return arrays
 
+    def number(self, run: Run) -> int:
+        """Return the number by which a run is known in the worker."""
+        return self._runs[run]
+
     def findings(self) -> tuple[Finding, ...]:
         """Return what is to be told of deaths that the diagnosis went on after."""
         if not self._deaths:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.forces import Forces
+from toolkit.diagnosis.simulators.columnwise import columnwise
+from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import OFF
 from toolkit.diagnosis.simulators.user_code import silenced
 from toolkit.errors import FitError
@@ -17,6 +18,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.columnwise import Columnwise
+
+    Array = NDArray[np.float64]
+    RatesAt = Callable[[Array, Array], Array]
+
+_TRIED = 16  # rows
 
 
 class Inputs:
@@ -58,6 +65,8 @@ class Equation:
         self.case, self.rhs, self._outputs, self._initial = case, rhs, outputs, initial
         self._drivers = tuple(channel.name for channel in case.drivers)
         self._shown = tuple(output.name for output in case.outputs)
+        self.columns: Columnwise | None = None
+        self._shown_columns: Columnwise | None = None
 
     def inputs(self, run: Run) -> Inputs:
         """Return a run's inputs between its rows."""
@@ -112,26 +121,54 @@ class Equation:
 
         return rhs
 
-    def rates_together(
-        self, run: Run, p: Mapping[str, Any], forces: Sequence[Forces], own: int
-    ) -> Callable[..., Any]:
-        """Return the same for several sets at once, a column each."""
-        plain, u = self.rhs, self.inputs(run)
-        there = [(k, force) for k, force in enumerate(forces) if force.listed]
+    def try_columns(self, run: Run, x: Array, p: Mapping[str, float]) -> None:
+        """Find out whether `rhs` and `outputs` take columns; ``x`` are states near to which it is tried."""
+        rng = np.random.default_rng(0)
+        rows = np.unique(np.linspace(0, run.rows - 1, _TRIED).astype(np.intp))
+        size = np.maximum(np.std(x, axis=1), 1e-3 * np.abs(x).max(axis=1))
+        stray = np.where(size > 0, size, 1.0)[:, None] * rng.normal(size=(len(x), len(rows)))
+        states = np.hstack([x[:, rows], x[:, rows] + stray])
+        rows = np.tile(rows, 2)
+        u = {name: run.columns[name][rows] for name in self._drivers}
+        sets = {name: value * (1 + 0.1 * rng.normal(size=len(rows))) for name, value in p.items()}
+        with silenced():
+            self.columns = columnwise(
+                self.rhs, lambda rhs, t, x, u, p: rhs(t, x, u, p), run.t[rows], states, u, sets
+            )
+            self._shown_columns = columnwise(self._outputs, self._ask, run.t[rows], states, u, sets)
 
-        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-            rate = np.zeros_like(x)
-            rate[:own] = plain(t, x[:own], u(t), p)
-            for k, one in there:
-                one.add(x[:, k], rate[:, k], own)
-            return rate
+    def _ask(self, outputs: Callable[..., Any], _: Any, x: Any, u: Any, p: Any) -> list[Any]:
+        shown = outputs(x, u, p)
+        values = [shown[name] for name in self._shown]
+        if any(isinstance(value, str | bytes) for value in values):
+            raise TypeError("a text")
+        return values
 
-        return rhs
+    def rates_at(self, run: Run, p: Mapping[str, float], forces: Forces, own: int) -> RatesAt:
+        """Return (times (m,), states (n, m)) -> their rates, forces among them."""
+        rate, columns = self.rates(run, dict(p), forces, own), self.columns
+
+        def by_row(t: Array, x: Array) -> Array:
+            return np.stack([rate(at, x[:, k]) for k, at in enumerate(t.tolist())], axis=1)
+
+        def at_once(t: Array, x: Array) -> Array:
+            rates = np.zeros_like(x)
+            u = {name: np.interp(t, run.t, run.columns[name]) for name in self._drivers}
+            sets = {name: np.full(len(t), value) for name, value in p.items()}
+            assert columns is not None  # noqa: S101  else by row
+            rates[:own] = columns(t, x[:own].copy(), u, sets)
+            ForcesTogether([forces], own).on(np.zeros(len(t), dtype=np.intp)).add(x, rates)
+            return rates
+
+        return by_row if columns is None else at_once
 
     def shown(
         self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs of states, (states, rows)."""
+        at_once = self._shown_together(run, p, x)
+        if at_once is not None:
+            return at_once
         values, inputs = dict(p), self.inputs(run)
         rows: dict[str, list[float]] = {name: [] for name in self._shown}
         with silenced():
@@ -153,6 +190,21 @@ class Equation:
             if not np.isfinite(values_of).all():
                 raise failed(self.case, run, f"no number in output {name!r}")
         return result
+
+    def _shown_together(self, run: Run, p: Mapping[str, float], x: Array) -> dict[str, Array] | None:
+        """Return the outputs of all rows by one call, None where that does not do: row by row says why."""
+        if self._shown_columns is None:
+            return None
+        u = {name: run.columns[name] for name in self._drivers}
+        sets = {name: np.full(run.rows, value) for name, value in p.items()}
+        try:
+            with silenced():
+                shown = self._shown_columns(run.t, np.ascontiguousarray(x), u, sets)
+        except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, the row alone raises it by name
+            return None
+        if not (np.abs(shown) < OFF).all():
+            return None
+        return dict(zip(self._shown, shown, strict=True))
 
 
 def _number(value: Any) -> float:

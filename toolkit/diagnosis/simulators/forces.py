@@ -11,15 +11,21 @@ friction (Dahl's) and a bristle without damping of its own.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.simulators.sliding_friction import Slide
+import numpy as np
+
+from toolkit.diagnosis.simulators.sliding_friction import Bristles, Slide, SlideColumns
 from toolkit.effects.applied import AppliedEffect
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
+
+    from toolkit.effects.applied import Conditioned
+
+    Array = NDArray[np.float64]
+    Places = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,26 +102,98 @@ class Forces:
                 made[one.way] = _reach(one.active)
         return tuple(made)
 
-    def add(self, x: NDArray[np.float64], rate: NDArray[np.float64], own: int) -> None:
+    def add(self, x: Array, rate: Array, own: int) -> None:
         """Add the forces to the rates of ``own`` states, and set those of the added ones, in place."""
         for one in self.listed:
-            i, values = one.velocity, one.active.values
-            term = one.active.effect.term
-            if term is None:
+            _add(one, x, rate, own)
+
+
+def _add(force: Force, x: Array, rate: Array, own: int) -> None:
+    """Add one force in place; ``x`` and ``rate`` (states,) or (states, columns)."""
+    i, values = force.velocity, force.active.values
+    term = force.active.effect.term
+    if term is None:
+        return
+    if term.limit is not None:
+        rate[i] = np.where(rate[i] > 0, rate[i] * term.limit(x[i], force.scale, values), rate[i])
+    elif force.bristle is not None and term.bristle is not None:
+        size, reach = term.bristle(values)
+        v, bend = x[i], x[own + force.bristle]
+        rate[i] -= size * bend
+        rate[own + force.bristle] = (v - abs(v) * bend) / reach
+        if force.way is not None:
+            rate[own + force.way] = v
+    elif term.force is not None:
+        rate[i] -= term.force(x[force.position], x[i], values)
+
+
+class ForcesTogether:
+    """The forces of several sets of parameters and effects: those of one effect at one place are one sweep.
+
+    ``own`` states are the equation's; ``added`` ones stand behind them, of the set that has the most.
+    """
+
+    def __init__(self, sets: Sequence[Forces], own: int, runs: Sequence[Conditioned] = ()) -> None:
+        """Take the forces of every set, and the runs in which they act or not; without runs they do."""
+        self.own, self.added, self._sets = own, max(forces.added for forces in sets), len(sets)
+        groups: dict[object, list[tuple[int, Force]]] = {}
+        for k, forces in enumerate(sets):
+            for force in forces.listed:
+                place = (force.velocity, force.position, force.bristle, force.way, force.active.key)
+                groups.setdefault((*place, *force.active.values), []).append((k, force))
+        self._groups = []
+        self.abrupt = np.zeros(len(sets), dtype=bool)  # what turns, or runs against a limit
+        for members in groups.values():
+            first = members[0][1]
+            values = {name: np.zeros(len(sets)) for name in first.active.values}
+            for k, force in members:
+                for name, value in force.active.values.items():
+                    values[name][k] = value
+            has = np.zeros(len(sets), dtype=bool)
+            has[[k for k, _ in members]] = True
+            if first.bristle is not None or (first.active.effect.term and first.active.effect.term.limit):
+                self.abrupt |= has
+            acts = np.array([first.active.acts_in(run) for run in runs] or [True])
+            self._groups.append((first, has, acts, values))
+
+    def on(self, sets: Places, runs: Places | int = 0) -> Acting:
+        """Return the forces on columns, of which ``sets`` are the sets and ``runs`` places of runs."""
+        listed, slides = [], []
+        for first, has, acts, values in self._groups:
+            there = has[sets] & acts[runs]
+            at = np.flatnonzero(there)
+            if not len(at):
                 continue
-            if term.limit is not None:
-                if rate[i] > 0:
-                    rate[i] *= term.limit(x[i], one.scale, values)
-            elif one.bristle is not None and term.bristle is not None:
-                size, reach = term.bristle(values)
-                v, bend = float(x[i]), float(x[own + one.bristle])
-                turning = v - abs(v) * bend
-                rate[i] -= size * bend
-                rate[own + one.bristle] = turning / reach
-                if one.way is not None:
-                    rate[own + one.way] = v
-            elif term.force is not None:
-                rate[i] -= term.force(float(x[one.position]), float(x[i]), values)
+            force = _of(first, values, sets[at])
+            listed.append((force, slice(None) if len(at) == len(sets) else at))
+            if first.bristle is not None:
+                slide = Forces((force,), self.added).slides(self.own)[0]
+                reach = np.broadcast_to(slide.reach, len(at))
+                slides.append(SlideColumns(slide.bend, slide.velocity, slide.way, reach, at))
+        return Acting(listed, Bristles(slides), self.own)
+
+
+class Acting:
+    """Forces on columns of states, and the bristles among them."""
+
+    def __init__(self, listed: Sequence[tuple[Force, Places | slice]], bristles: Bristles, own: int) -> None:
+        self._listed, self.bristles, self._own = listed, bristles, own
+
+    def __bool__(self) -> bool:
+        """Tell whether there are any."""
+        return bool(self._listed)
+
+    def add(self, x: Array, rate: Array) -> None:
+        """Add the forces to the rates of the states, in place; both (states, columns)."""
+        for force, at in self._listed:
+            part = rate[:, at]
+            _add(force, x[:, at], part, self._own)
+            rate[:, at] = part
+
+
+def _of(force: Force, values: Mapping[str, Array], sets: Places) -> Force:
+    there = {name: column[sets] for name, column in values.items()}
+    return replace(force, active=replace(force.active, values=there))  # type: ignore[arg-type]
 
 
 def _reach(effect: AppliedEffect) -> float:

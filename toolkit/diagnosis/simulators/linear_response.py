@@ -15,13 +15,13 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Rate = Callable[[float, "NDArray[np.float64]"], "NDArray[np.float64]"]
+    RatesAt = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 _STEP = 1e-6  # of a state's size, for differences
 
 
 def propagated(
-    rate: Rate,
+    rates_at: RatesAt,
     t: NDArray[np.float64],
     x: NDArray[np.float64],
     pushes: NDArray[np.float64],
@@ -35,7 +35,7 @@ def propagated(
 
     Parameters
     ----------
-    rate : (time, state) -> its rate, with what acts already
+    rates_at : (times (m,), states (n, m)) -> their rates, with what acts already
     t : rising times [s], (times,), several to each row of a recording
     x : the simulated states, (states, times)
     pushes : additions to the rate, (times, forces)
@@ -44,12 +44,11 @@ def propagated(
     """
     n, count = x.shape
     slopes = np.empty((count, n, n))
-    for k, now in enumerate(t.tolist()):
-        rates = rate(now, x[:, k])
-        for i in range(n):
-            moved = x[:, k].copy()
-            moved[i] += _STEP * sizes[i]
-            slopes[k, :, i] = (rate(now, moved) - rates) / (_STEP * sizes[i])
+    rates = rates_at(t, x)
+    for i in range(n):
+        moved = x.copy()
+        moved[i] += _STEP * sizes[i]
+        slopes[:, :, i] = ((rates_at(t, moved) - rates) / (_STEP * sizes[i])).T
     half = 0.5 * np.diff(t)[:, None, None]
     ahead = np.eye(n) - half * slopes[1:]
     on = np.linalg.solve(ahead, np.eye(n) + half * slopes[:-1])

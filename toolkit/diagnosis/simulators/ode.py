@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.batch_integration import (
-    NotTogetherError,
-    columns_of,
-    integrate_together,
-    takes_columns,
-)
 from toolkit.diagnosis.simulators.channels import channel_places, slopes, through_channels
 from toolkit.diagnosis.simulators.equation import Equation, failed
-from toolkit.diagnosis.simulators.forces import Forces
+from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
 from toolkit.diagnosis.simulators.linear_response import propagated
 from toolkit.diagnosis.simulators.ode_apart import OdeApart, handlers_of
 from toolkit.diagnosis.simulators.parameter_units import reduced
+from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output
 from toolkit.diagnosis.simulators.states import dimensions, fitting
+from toolkit.diagnosis.simulators.trajectory import Path, trajectories
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
@@ -33,7 +30,7 @@ from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import ConfigError, FitError
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    import pathlib
 
     from numpy.typing import NDArray
 
@@ -44,6 +41,7 @@ if TYPE_CHECKING:
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 _FINER = 4
+_MISSED = 3  # times in turn: an equation that is not smooth enough
 _MOST_HELD = 200_000_000  # bytes of simulations to remember
 
 
@@ -62,6 +60,11 @@ class OdeModel:
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
         self._held = 0  # bytes of what is kept
+        self._missed = 0  # times in turn that no guess led to a simulation
+        self._near: dict[Run, NDArray[np.float64]] = {}  # states simulated last
+        self._steps: dict[Run, NDArray[np.intp]] = {}  # of the simulation as declared
+        self._alone: set[Any] = set()  # what does not come to its end with others
+        self._slopes: dict[tuple[Run, ...], NDArray[np.float64] | None] = {}
         self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
         p = {parameter.name: parameter.value for parameter in case.parameters}
         start = self._equation.start(case.runs[0], p)
@@ -93,7 +96,6 @@ class OdeModel:
         }
         self.scale: dict[str, tuple[float, float]] = {}
         self.scale = self._sizes(p)
-        self._takes_columns = self._tried(p)
         self.capability = Capability(
             nominal_load_N=None,
             cells=(),
@@ -107,19 +109,13 @@ class OdeModel:
             ),
         )  # fmt: skip
 
-    def _tried(self, p: Mapping[str, float]) -> bool:
-        run = self.case.runs[0]
-        u = self._equation.inputs(run).row(run.rows // 2)
-        size = np.array([self.scale[name][1] for name in self.states])
-        with silenced():
-            return takes_columns(
-                self._equation.rhs, float(run.t[0]), self._equation.start(run, p), size, u, p
-            )
-
     def _sizes(self, p: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """Return for every state that a term may enter: size of its rate, and spread of itself."""
         runs = self.case.runs
+        first = self._equation.start(runs[0], p)
+        self._equation.try_columns(runs[0], np.repeat(first[:, None], runs[0].rows, axis=1), p)
         states = [self._integrate(run, p, ()) for run in runs]
+        self._equation.try_columns(runs[0], states[0], p)
         self._dimensions = dimensions(states[0], self._equation.shown(runs[0], p, states[0]), self.outputs)
         x = np.concatenate(states, axis=1)
         rates = [
@@ -199,13 +195,14 @@ class OdeModel:
         if run.rows < 2:
             return {}
         fine = self._between(run, p, forces, x)
-        rate = self._equation.rates(run, dict(p), acting, len(self.states))
+        rates_at = self._equation.rates_at(run, p, acting, len(self.states))
         sizes = np.array([*(self.scale[name][1] for name in self.states), *acting.sizes])
         try:
             with silenced():
                 moved = propagated(
-                    rate, self._finer(run).t, fine, pattern(fine[self._derivative_of[at]]), at=at, sizes=sizes
-                )[::_FINER]
+                    rates_at, self._finer(run).t, fine, pattern(fine[self._derivative_of[at]]),
+                    at=at, sizes=sizes,
+                )[::_FINER]  # fmt: skip
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
         outputs = self._equation.shown(run, p, x[:own_states])
@@ -236,7 +233,8 @@ class OdeModel:
         """Return every output of a free simulation over the whole run."""
         key, forces = self._key(run, p, active)
         if key not in self._kept:
-            self._keep(key, self._made(run, p, forces, self._integrate(run, p, forces), between=key[1]))
+            states = self._integrate(run, p, forces, alone=key in self._alone)
+            self._keep(key, self._made(run, p, forces, states, between=key[1]))
         simulated = self._kept[key]
         if isinstance(simulated, FitError):
             raise simulated
@@ -252,51 +250,93 @@ class OdeModel:
         return {name: values[::_FINER] for name, values in shown.items()}
 
     def _prepare(
-        self, run: Run, points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]]
+        self,
+        runs: Sequence[Run],
+        points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]],
     ) -> None:
-        """Integrate several sets of parameters and effects at once, for `simulate` to find."""
-        if not self._takes_columns or run.rows < 2:
+        """Integrate several runs, sets of parameters and effects at once, for `simulate` to find."""
+        runs = [run for run in runs if run.rows > 1]
+        if self._equation.columns is None or not runs:
             return
         listed = {}
         for p, active in points:
-            key, forces = self._key(run, p, active)
-            listed[key] = (p, forces)
+            keys = tuple(self._key(run, p, active)[0] for run in runs)
+            listed[keys] = (p, [applied for applied in active if applied.effect.stage == "dynamics"])
         # Those that are known already are done again with the others: their steps are then the same, and
         # differences between them are free of what the steps leave.
-        if len(listed) < 2 or all(key in self._kept for key in listed):
+        if all(key in self._kept for keys in listed for key in keys):
             return
-        self._together(run, [(key, *point) for key, point in listed.items()])
+        self._together(runs, [(keys, *point) for keys, point in listed.items()])
 
-    def _together(self, run: Run, listed: list[tuple[Any, Mapping[str, float], list[AppliedEffect]]]) -> None:
-        """Integrate sets together; in halves where one of them stands in the way, and that one not at all."""
-        if len(listed) < 2:
-            return
-        sets = [p for _, p, _ in listed]
+    def _together(
+        self,
+        runs: Sequence[Run],
+        listed: list[tuple[tuple[Any, ...], Mapping[str, float], list[AppliedEffect]]],
+    ) -> None:
+        """Integrate sets together; one that does not come to its end is left to be integrated alone."""
         try:
-            starts = np.stack([self._equation.start(run, p) for p in sets], axis=1)
-            forces = [self._forces(active) for *_, active in listed]
-            rates = self._equation.rates_together(run, columns_of(sets), forces, len(self.states))
-            own_states, added = len(self.states), max(force.added for force in forces)
-            atol = np.stack([self._tolerance(starts[:, 0], force, added) for force in forces], axis=1)
-            starts = np.vstack([starts, np.zeros((added, len(sets)))])
-            slides = [(k, slide) for k, force in enumerate(forces) for slide in force.slides(own_states)]
-            with silenced():
-                solutions = integrate_together(rates, run.t, starts, atol, slides)
-        except NotTogetherError:
-            middle = len(listed) // 2
-            self._together(run, listed[:middle])
-            self._together(run, listed[middle:])
-            return
+            solved, reached = self._solved(runs, [(p, active) for _, p, active in listed])
         except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, the same set alone raises it by name
             return
-        for k, (key, p, active) in enumerate(listed):
-            try:
-                self._keep(
-                    key,
-                    self._made(run, p, active, np.ascontiguousarray(solutions[:, :, k].T), between=key[1]),
-                )
-            except FitError as error:
-                self._keep(key, error)
+        for run, x, at in zip(runs, solved, range(len(runs)), strict=True):
+            for k, (keys, p, active) in enumerate(listed):
+                forces = [applied for applied in active if applied.acts_in(run)]
+                if not reached[k]:
+                    self._alone.add(keys[at])
+                    continue
+                if keys[at][1] and len(forces) < len(active):
+                    continue  # its added states stand elsewhere than those of the run alone
+                states = np.ascontiguousarray(x[:, k])
+                try:
+                    self._keep(keys[at], self._made(run, p, forces, states, between=keys[at][1]))
+                except FitError as error:
+                    self._keep(keys[at], error)
+
+    def _solved(
+        self,
+        runs: Sequence[Run],
+        listed: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]],
+    ) -> tuple[list[NDArray[np.float64]], NDArray[np.bool_]]:
+        """Return the states of several sets of parameters and effects in every run, (states, sets, rows).
+
+        And which of the sets were simulated to the end.
+
+        The states that forces bring along stand where `Forces` of all of a set's effects puts them.
+        """
+        columns, own = self._equation.columns, len(self.states)
+        assert columns is not None  # noqa: S101  asked by whoever calls
+        forces = [self._forces(active) for _, active in listed]
+        together, rows = ForcesTogether(forces, own, runs), Rows(runs, self._drivers)
+        starts = [np.stack([self._equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
+        atol = np.stack([self._tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
+        p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
+        x = np.zeros((own + together.added, len(listed), len(rows.t)))
+        steps = np.ones(len(rows.t) - 1, dtype=np.intp)
+        for run, at, start in zip(runs, rows.slices, starts, strict=True):
+            x[:own, :, at] = self._near[run][:, None] if run in self._near else start[:, :, None]
+            x[:own, :, at.start] = start
+            steps[at.start : at.stop - 1] = self._steps.get(run, 1)
+        slopes = self._slopes.get(tuple(runs))
+        if slopes is not None and slopes.shape[2] != len(x):
+            slopes = None
+        sizes = np.array(
+            [*(self.scale.get(name, (1.0, 1.0))[1] for name in self.states), *[1.0] * together.added]
+        )
+        for force in forces:
+            sizes[own : own + force.added] = force.sizes
+        flow = RowFlow(columns, rows, p, together, atol)
+        with silenced():
+            smooth = ~together.abrupt & (self._missed < _MISSED)
+            path, reached = trajectories(flow, Path(x, steps, slopes), sizes, smooth)
+        if smooth[0] and self.scale:
+            self._missed = self._missed + 1 if path.slopes is None else 0
+        for run, at in zip(runs, rows.slices, strict=True):
+            if reached[0]:
+                self._near[run] = path.x[:own, 0, at]
+            if path.slopes is not None and self.scale:
+                self._steps.setdefault(run, path.steps[at.start : at.stop - 1])
+        self._slopes[tuple(runs)] = path.slopes
+        return [path.x[:, :, at] for at in rows.slices], reached
 
     def _finer(self, run: Run) -> Run:
         """Return a run with rows between its rows, the inputs there as the equation sees them: linear."""
@@ -329,13 +369,18 @@ class OdeModel:
         )
 
     def _integrate(
-        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect]
+        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool = False
     ) -> NDArray[np.float64]:
         acting = self._forces(forces)
         rate = self._equation.rates(run, dict(p), acting, len(self.states))
         start = self._equation.start(run, p)
         if run.rows == 1:
             return start[:, None]
+        if self._equation.columns is not None and not alone:
+            with contextlib.suppress(Exception):  # whatever it is, row by row it is raised by name
+                (states,), reached = self._solved([run], [(p, forces)])
+                if reached[0]:
+                    return np.ascontiguousarray(states[:, 0])
         begun = np.concatenate([start, np.zeros(acting.added)])
         try:
             with silenced():
@@ -380,10 +425,9 @@ class OdeModel:
 
         acting = self._forces(forces)
         x = x[: len(self.states) + acting.added]
-        rate = self._equation.rates(run, dict(p), acting, len(self.states))
         try:
             with silenced():
-                rates = np.stack([rate(t, x[:, k]) for k, t in enumerate(run.t.tolist())], axis=1)
+                rates = self._equation.rates_at(run, p, acting, len(self.states))(run.t, x)
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
         return np.asarray(CubicHermiteSpline(run.t, x, rates, axis=1)(self._finer(run).t))
@@ -409,7 +453,7 @@ class OdeModel:
         return self._settings[run]
 
 
-def build(case: Case, _: Path | None, code: CaseCode | None) -> OdeModel | OdeApart:
+def build(case: Case, _: pathlib.Path | None, code: CaseCode | None) -> OdeModel | OdeApart:
     """Return the simulation of a case of this kind; ConfigError where its file lacks a function."""
     if code is None:
         return _loaded(case)

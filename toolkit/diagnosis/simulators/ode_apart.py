@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from toolkit.diagnosis.simulators.channels import channel_places
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, TermPattern
 from toolkit.effects.applied import AppliedEffect
@@ -13,7 +15,6 @@ from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
@@ -83,18 +84,28 @@ class OdeApart:
         return self._facts[question]
 
     def _together(
-        self, run: Run, points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]]
+        self,
+        runs: Sequence[Run],
+        points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]],
     ) -> None:
-        self._prepared[run] = {}
+        self._prepared = {run: {} for run in runs}
         sets = [(dict(p), _crossing(active)) for p, active in points]
-        shapes = {output.name: (len(sets), run.rows) for output in self.outputs} | {_USABLE: (len(sets),)}
+        rows = sum(run.rows for run in runs)
+        shapes: dict[str, tuple[int, ...]] = {output.name: (len(sets), rows) for output in self.outputs}
+        others = [self._code.number(run) for run in runs]
         try:
-            answers = self._code.arrays("together", run, {}, shapes, sets)
+            answers = self._code.arrays(
+                "together", runs[0], {}, shapes | {_USABLE: (len(sets), len(runs))}, sets, others
+            )
         except FitError:  # whatever it is, the same set alone raises it by name
             return
-        for k in map(int, answers[_USABLE].nonzero()[0]):
-            outputs = {output.name: answers[output.name][k] for output in self.outputs}
-            self._prepared[run][_key(*points[k])] = outputs
+        ends = np.cumsum([run.rows for run in runs]).tolist()
+        for i, (run, end) in enumerate(zip(runs, ends, strict=True)):
+            for k in map(int, answers[_USABLE][:, i].nonzero()[0]):
+                outputs = {
+                    output.name: answers[output.name][k, end - run.rows : end] for output in self.outputs
+                }
+                self._prepared[run][_key(*points[k])] = outputs
 
     def _sizes(self, channel: str | None, _: Largest) -> MotionSizes:
         sizes = self._fact("sizes", str(channel))
@@ -125,8 +136,6 @@ class OdeApart:
         if run.rows < 2:
             return {}
         assert isinstance(pattern, TermPattern)  # noqa: S101  no other crosses
-        import numpy as np
-
         forces = pattern(np.zeros(1)).shape[1]
         shapes = {output.name: (run.rows, forces) for output in self.outputs}
         term = (pattern.effect.name, tuple(dict(start) for start in pattern.starts))
@@ -146,21 +155,26 @@ def handlers_of(case: Case, model: Model) -> Handlers:
         motion = moving.sizes(channel, lambda _: 1.0)
         return [*(float(getattr(motion, name)) for name in _SIZES), float(motion.has_position)]
 
-    def prepared(run: int, _: Mapping[str, float], sets: Sequence[tuple[dict[str, float], Crossing]]) -> Any:
-        import numpy as np
-
-        points = [(p, _crossed(active)) for p, active in sets]
-        together(runs[run], points)
-        answers = Numbers({output.name: np.zeros((len(sets), runs[run].rows)) for output in model.outputs})
-        answers[_USABLE] = np.zeros(len(sets))
+    def prepared(
+        _: int,
+        __: Mapping[str, float],
+        sets: Sequence[tuple[dict[str, float], Crossing]],
+        numbers: Sequence[int],
+    ) -> Any:
+        points, chosen = [(p, _crossed(active)) for p, active in sets], [runs[number] for number in numbers]
+        together(chosen, points)
+        ends = np.cumsum([run.rows for run in chosen]).tolist()
+        answers = Numbers({output.name: np.zeros((len(sets), ends[-1])) for output in model.outputs})
+        answers[_USABLE] = np.zeros((len(sets), len(chosen)))
         for k, (p, active) in enumerate(points):
-            try:
-                outputs = model.simulate(runs[run], p, active)
-            except FitError:
-                continue
-            for output in model.outputs:
-                answers[output.name][k] = outputs[output.name]
-            answers[_USABLE][k] = 1.0
+            for i, (run, end) in enumerate(zip(chosen, ends, strict=True)):
+                try:
+                    outputs = model.simulate(run, p, active)
+                except FitError:
+                    continue
+                for output in model.outputs:
+                    answers[output.name][k, end - run.rows : end] = outputs[output.name]
+                answers[_USABLE][k, i] = 1.0
         return answers
 
     def pushed(

@@ -6,9 +6,10 @@ file that gives its outputs and states every fact.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from toolkit.findings import Finding
 
@@ -85,7 +86,7 @@ class Capability:
     findings : what a reader of the answer must know of the simulation
     repeats : (run, parameters) -> nothing; FitError where a second call gives another answer. None where the
         simulation is our own
-    together : makes several simulations of a run at once, for `simulate` to find; None where it cannot
+    together : makes several simulations of some runs at once, for `simulate` to find; None where it cannot
     motion : what moves in it, None where nothing does
     """
 
@@ -94,7 +95,7 @@ class Capability:
     unsure: Mapping[str, float]
     findings: tuple[Finding, ...]
     repeats: Callable[[Run, Parameters], None] | None
-    together: Callable[[Run, Sequence[tuple[Parameters, Sequence[AppliedEffect]]]], None] | None
+    together: Callable[[Sequence[Run], Sequence[tuple[Parameters, Sequence[AppliedEffect]]]], None] | None
     motion: Moving | None
 
 
@@ -130,20 +131,31 @@ class Model(Protocol):
 
 
 class Supervised:
-    """A simulation whose runs go through a supervisor, which counts or ends them, until it is released."""
+    """A simulation of which every question goes through a guard, which times or ends it, until released."""
 
     def __init__(
-        self, plain: Model, simulate: Callable[[Run, Parameters, Sequence[AppliedEffect]], Arrays]
+        self,
+        plain: Model,
+        simulate: Callable[[Run, Parameters, Sequence[AppliedEffect]], Arrays],
+        guarded: Callable[[Callable[..., Any]], Callable[..., Any]],
     ) -> None:
-        self._plain, self._simulate = plain, simulate
-        self.outputs, self.parameters, self.capability = plain.outputs, plain.parameters, plain.capability
+        self._plain = plain
+        self._simulate: Callable[[Run, Parameters, Sequence[AppliedEffect]], Arrays] = guarded(simulate)
+        self.outputs, self.parameters = plain.outputs, plain.parameters
+        known = plain.capability
+        together, motion = known.together, known.motion
+        self.capability = dataclasses.replace(
+            known,
+            together=None if together is None else guarded(together),
+            motion=None if motion is None else dataclasses.replace(motion, pushed=guarded(motion.pushed)),
+        )
 
     def observed(self, run: Run) -> Arrays:
         """Return what was recorded of every output."""
         return self._plain.observed(run)
 
     def simulate(self, run: Run, p: Parameters, active: Sequence[AppliedEffect]) -> Arrays:
-        """Return every output of a run, as the supervisor lets it through."""
+        """Return every output of a run, as the guard lets it through."""
         return self._simulate(run, p, active)
 
     def places(self, effect: Effect) -> Sequence[tuple[str | None, str | None]]:
@@ -151,5 +163,5 @@ class Supervised:
         return self._plain.places(effect)
 
     def release(self) -> None:
-        """Let every further run through as it is."""
-        self._simulate = self._plain.simulate
+        """Let every further question through as it is."""
+        self._simulate, self.capability = self._plain.simulate, self._plain.capability

@@ -68,51 +68,54 @@ def held(slides: Sequence[Slide], before: list[float]) -> Callable[[list[float]]
     return hold
 
 
-class HeldColumns:
-    """The same for states in columns, shape (states, columns); a column that turns is left to integration."""
+@dataclass(frozen=True, slots=True, eq=False)
+class SlideColumns:
+    """The bristles of one force in columns of states: places as in `Slide`, the columns that have it."""
 
-    def __init__(self, slides: Sequence[tuple[int, Slide]]) -> None:
-        """Take pairs of column and slide."""
-        listed = [slide for _, slide in slides]
-        self._column = np.array([column for column, _ in slides], dtype=np.intp)
-        self._bend, self._velocity, self._place = (
-            np.array([getattr(slide, name) for slide in listed], dtype=np.intp)
-            for name in ("bend", "velocity", "way")
-        )
-        self._reach = np.array([slide.reach for slide in listed])
-        self._on = np.zeros(len(listed), dtype=bool)
+    bend: int
+    velocity: int
+    way: int
+    reach: Array
+    at: NDArray[np.intp]
+
+
+class Bristles:
+    """Bristles among columns of states; while a body keeps its direction, its bend follows from its way."""
+
+    def __init__(self, slides: Sequence[SlideColumns]) -> None:
+        self._slides = slides
+
+    def __bool__(self) -> bool:
+        """Tell whether there are any."""
+        return bool(self._slides)
 
     @property
-    def turning(self) -> int:
-        """Number of columns in which something slides: each turns at its own time."""
-        return len(set(self._column.tolist()))
+    def columns(self) -> list[NDArray[np.intp]]:
+        """Columns of every bristle."""
+        return [slide.at for slide in self._slides]
 
-    def begin(self, x: Array) -> None:
-        """Take the states at the beginning of a step."""
-        v = x[self._velocity, self._column]
-        self._on, self._way = v != 0, np.sign(v)
-        self._off = x[self._bend, self._column] - self._way
-        self._begun = x[self._place, self._column]
+    def moving(self, y: Array) -> list[NDArray[np.bool_]]:
+        """Return for every bristle in which of its columns the body moves."""
+        return [y[slide.velocity, slide.at] != 0 for slide in self._slides]
 
-    def hold(self, y: Array) -> None:
-        """Set the bends of a later state, in place.
+    def hold(
+        self, begun: Array, y: Array, on: Sequence[NDArray[np.bool_]], turned: Sequence[NDArray[np.bool_]]
+    ) -> None:
+        """Set the bends of a later state, and note in which columns a body has turned, in place.
 
-        Raises
-        ------
-        TurnedError
-            a body has turned; the next call leaves its column as it is
+        Parameters
+        ----------
+        begun : states at the beginning of a step, (states, columns)
+        on : columns that are held, of every bristle
         """
-        if not len(self._on):
-            return
-        turned = self._on & (y[self._velocity, self._column] * self._way <= 0)
-        if turned.any():
-            self._on &= ~turned
-            raise TurnedError
-        travelled = np.maximum(self._way * (y[self._place, self._column] - self._begun), 0.0)
-        bent = self._way + self._off * np.exp(-travelled / self._reach)
-        on = self._on
-        y[self._bend[on], self._column[on]] = bent[on]
+        for slide, moving, turns in zip(self._slides, on, turned, strict=True):
+            way = np.sign(begun[slide.velocity, slide.at])
+            turns |= moving & (y[slide.velocity, slide.at] * way <= 0)
+            travelled = np.maximum(way * (y[slide.way, slide.at] - begun[slide.way, slide.at]), 0.0)
+            bent = way + (begun[slide.bend, slide.at] - way) * np.exp(-travelled / slide.reach)
+            y[slide.bend, slide.at] = np.where(moving, bent, y[slide.bend, slide.at])
 
-    def known(self, error: Array) -> None:
+    def known(self, error: Array, on: Sequence[NDArray[np.bool_]]) -> None:
         """Set the errors of the bends that are held to zero, in place; ``error`` (states, columns)."""
-        error[self._bend[self._on], self._column[self._on]] = 0.0
+        for slide, moving in zip(self._slides, on, strict=True):
+            error[slide.bend, slide.at] = np.where(moving, 0.0, error[slide.bend, slide.at])

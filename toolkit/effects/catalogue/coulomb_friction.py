@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,9 +19,9 @@ _SHORT = 0.05  # of the position's spread: the longest distance over which frict
 _STARTS = (0.01, 0.2, 2.0)  # of the usual way from row to row
 
 
-def _resisting(position: float, velocity: float, values: Values) -> float:
+def _resisting(position: Any, velocity: Any, values: Values) -> Any:
     # Smooth within a thousandth of the velocity's spread, so that a solver can meet its tolerance.
-    return values["coulomb"] * math.tanh(velocity / values.get("smooth", 1e-4))
+    return values["coulomb"] * np.tanh(velocity / values.get("smooth", 1e-4))
 
 
 def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Values) -> NDArray[np.float64]:
@@ -78,8 +77,8 @@ def _bristle(
     return before, after
 
 
-def _bristle_of(values: Values) -> tuple[float, float]:
-    return values["coulomb"], max(values.get("presliding", 0.0), values.get(LEAST_REACH, 0.0))
+def _bristle_of(values: Values) -> tuple[Any, Any]:
+    return values["coulomb"], np.maximum(values.get("presliding", 0.0), values.get(LEAST_REACH, 0.0))
 
 
 def _smoothing(case: Surroundings) -> dict[str, float]:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Term, Values
 from toolkit.effects.surroundings import Surroundings
@@ -9,8 +13,8 @@ from toolkit.effects.surroundings import Surroundings
 _WIDTH = 1e-3  # of the state's spread, over which the rate falls to nothing
 
 
-def _stopped(state: float, spread: float, values: Values) -> float:
-    return min(max((values["level"] - state) / (_WIDTH * spread), 0.0), 1.0)
+def _stopped(state: Any, spread: float, values: Values) -> Any:
+    return np.clip((values["level"] - state) / (_WIDTH * spread), 0.0, 1.0)
 
 
 def _highest(case: Surroundings) -> float:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,9 +21,9 @@ _WORK = 4_000_000  # rows times periods
 _LEAST = 40  # periods, however many the rows
 
 
-def _resisting(position: float, velocity: float, values: Values) -> float:
-    return -values["amplitude"] * math.sin(
-        2 * math.pi * position / values["period"] + math.radians(values["phase"])
+def _resisting(position: Any, velocity: Any, values: Values) -> Any:
+    return -values["amplitude"] * np.sin(
+        2 * np.pi * position / values["period"] + np.radians(values["phase"])
     )
 
 

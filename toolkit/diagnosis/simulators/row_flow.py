@@ -1,0 +1,187 @@
+"""The flow of an equation from each row to the next, for all rows and sets of parameters in one sweep.
+
+A right-hand side that takes columns takes the states of all rows as readily as those of several sets. Within
+an interval the inputs are linear and the equation is smooth, so that a few steps of Dormand and Prince's pair
+lead from row to row; how many, each interval's own error says.
+
+Source: Dormand, Prince, J. Comp. Appl. Math. 6 (1980) 19.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.integrate import RTOL, A, B, C, E
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Run
+    from toolkit.diagnosis.simulators.columnwise import Columnwise
+    from toolkit.diagnosis.simulators.forces import Acting, ForcesTogether
+    from toolkit.diagnosis.simulators.sliding_friction import Bristles
+
+    Array = NDArray[np.float64]
+    Places = NDArray[np.intp]
+    Rates = Callable[[float | Array, Array], Array]
+
+MOST_STEPS = 64  # from one row to the next: where an equation asks for more, all rows would wait for one
+_SAFE = 1.1
+_ROWS, _WEIGHTS, _ERROR = tuple(np.array(row) for row in A), np.array(B), np.array(E)
+
+
+class Rows:
+    """The rows of several runs one behind the other; between two runs nothing flows.
+
+    ``t``, ``u`` (rows,); ``run`` is the place of every row's run; ``last`` are the last rows of the runs.
+    """
+
+    def __init__(self, runs: Sequence[Run], drivers: Sequence[str]) -> None:
+        self.t = np.concatenate([run.t for run in runs])
+        self.u = {name: np.concatenate([run.columns[name] for run in runs]) for name in drivers}
+        counts = [run.rows for run in runs]
+        self.run = np.repeat(np.arange(len(runs)), counts)
+        self.last = np.cumsum(counts) - 1
+        self.slices = tuple(
+            slice(int(end) + 1 - count, int(end) + 1) for end, count in zip(self.last, counts, strict=True)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Columns:
+    """Parameters, forces and tolerances of columns of states."""
+
+    p: Mapping[str, Array]
+    acting: Acting
+    atol: Array
+
+
+class RowFlow:
+    """From the states of rows to those of the next rows, with what the steps leave as a share of tolerance.
+
+    Parameters
+    ----------
+    rhs : the equation's own, for columns
+    p : of every set, each (sets,)
+    forces : what enters the equation beside its own terms, of every set and run
+    atol : of every state, the forces' among them, in every set, (states, sets)
+    """
+
+    def __init__(
+        self, rhs: Columnwise, rows: Rows, p: Mapping[str, Array], forces: ForcesTogether, atol: Array
+    ) -> None:
+        self._rhs, self.rows, self._p, self._forces = rhs, rows, p, forces
+        self.atol = atol
+
+    def __call__(self, x: Array, steps: Places, sets: Places) -> tuple[Array, Array]:
+        """Return the states one row on, and the largest error of a step as a share of what is allowed.
+
+        Parameters
+        ----------
+        x : states at the rows, (states, sets, rows); the last rows of the runs are not led on
+        steps : of every interval, (rows - 1,)
+        sets : which of the sets the columns of ``x`` are
+
+        Returns
+        -------
+        states (states, sets, rows - 1), errors (sets, rows - 1)
+        """
+        ends, errors = x[:, :, 1:].copy(), np.zeros((x.shape[1], x.shape[2] - 1))
+        flows = np.ones(len(steps), dtype=bool)
+        flows[self.rows.last[:-1]] = False
+        for count in np.unique(steps[flows]).tolist():
+            at = np.flatnonzero(flows & (steps == count))
+            end, error = self._led(x[:, :, at].reshape(len(x), -1), at, count, sets)
+            ends[:, :, at] = end.reshape(len(x), len(sets), -1)
+            errors[:, at] = error.reshape(len(sets), -1)
+        return ends, errors
+
+    def columns(self, places: Places, sets: Places) -> Columns:
+        """Return what does not change along columns: row and set of each, (m,), the row for its run."""
+        p = {name: values[sets] for name, values in self._p.items()}
+        return Columns(p, self._forces.on(sets, self.rows.run[places]), self.atol[:, sets])
+
+    def equation(self, places: Places, columns: Columns) -> Rates:
+        """Return (share of the way to the next row, states) -> rates; the share is a number or (m,).
+
+        Parameters
+        ----------
+        places : row of every column, (m,)
+        """
+        rows, own, acting = self.rows, self._forces.own, columns.acting
+        t, step = rows.t[places], rows.t[places + 1] - rows.t[places]
+        u = [(name, column[places], column[places + 1] - column[places]) for name, column in rows.u.items()]
+
+        def rates(w: float | Array, y: Array) -> Array:
+            inputs = {name: value + w * rise for name, value, rise in u}
+            if not acting and len(y) == own:
+                return self._rhs(t + w * step, y.copy(), inputs, columns.p)
+            rate = np.zeros_like(y)
+            rate[:own] = self._rhs(t + w * step, y[:own].copy(), inputs, columns.p)
+            acting.add(y, rate)
+            return rate
+
+        return rates
+
+    def _led(self, y: Array, at: Places, count: int, sets: Places) -> tuple[Array, Array]:
+        places, of = np.tile(at, len(sets)), np.repeat(sets, len(at))
+        columns = self.columns(places, of)
+        rates, bristles, atol = self.equation(places, columns), columns.acting.bristles, columns.atol
+        h = (self.rows.t[places + 1] - self.rows.t[places]) / count
+        worst, first = np.zeros(y.shape[1]), rates(0.0, y)
+        for i in range(count):
+            on = bristles.moving(y)
+            while True:
+                z, last, share, turned = stepped(rates, y, first, h, i / count, 1 / count, atol, bristles, on)
+                if not any(turns.any() for turns in turned):
+                    break
+                on = [moving & ~turns for moving, turns in zip(on, turned, strict=True)]
+            y, first = z, last
+            np.maximum(worst, share, out=worst)
+        return y, worst
+
+
+def stepped(
+    rates: Rates,
+    y: Array,
+    first: Array,
+    h: Array,
+    w: float | Array,
+    width: float | Array,
+    atol: Array,
+    bristles: Bristles,
+    on: Sequence[NDArray[np.bool_]],
+) -> tuple[Array, Array, Array, list[NDArray[np.bool_]]]:
+    """Return state and rate after a step, its error as a share of what is allowed, and what has turned.
+
+    Parameters
+    ----------
+    y, first : states and their rates at its beginning, (states, columns)
+    h : its length [s], (columns,)
+    w, width : where it begins, and its length, as shares of the way from row to row
+    on : of every bristle, in which of its columns the bend follows from the way
+    """
+    k = np.empty((7, y.size))
+    k[0] = first.ravel()
+    turned = [np.zeros_like(moving) for moving in on]
+    for j, (c, row) in enumerate(zip(C, _ROWS, strict=True), start=1):
+        z = y + h * (row @ k[:j]).reshape(y.shape)
+        bristles.hold(y, z, on, turned)
+        k[j] = rates(w + c * width, z).ravel()
+    z = y + h * (_WEIGHTS @ k[:6]).reshape(y.shape)
+    bristles.hold(y, z, on, turned)
+    k[6] = rates(w + width, z).ravel()
+    share = h * (_ERROR @ k).reshape(y.shape) / (atol + RTOL * np.maximum(np.abs(y), np.abs(z)))
+    bristles.known(share, on)
+    return z, k[6].reshape(y.shape), np.sqrt(np.mean(share**2, axis=0)), turned
+
+
+def finer(steps: Places, errors: Array) -> Places:
+    """Return the steps of every interval by its errors, (rows,) both: a power of two, never fewer."""
+    wanted = steps * _SAFE * np.maximum(errors, 1e-30) ** 0.2
+    power = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.intp)
+    return np.where(errors > 1, np.maximum(power, 2 * steps), steps)
