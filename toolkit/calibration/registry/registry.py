@@ -31,7 +31,6 @@ from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
 from toolkit.trust.decisions import Signing
 from toolkit.trust.keys import Signer
-from toolkit.trust.people import History
 
 _AT_ONCE = 200
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
@@ -70,22 +69,12 @@ class Registry:
 
     ``lock_file``: writers keep each other out by a file, for a file system without locks. ``signers``: the
     keys that sign what is decided through this object; a laboratory without people needs none.
-    ``rehearses``: this is a copy of that registry, to be thrown away: its lines are judged there, and nobody
-    signs what is tried here.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        *,
-        lock_file: bool = False,
-        signers: Sequence[Signer] = (),
-        rehearses: Registry | None = None,
-    ) -> None:
+    def __init__(self, folder: Path, *, lock_file: bool = False, signers: Sequence[Signer] = ()) -> None:
         self.folder = folder
         self.lock_file = lock_file
         self.signers = tuple(signers)
-        self.rehearses = rehearses
         self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
 
     def instruments(self) -> tuple[str, ...]:
@@ -119,7 +108,7 @@ class Registry:
         TrustError
             ``people-log``
         """
-        return read_people(self.folder) if self.rehearses is None else PeopleLog(history=History(), heads={})
+        return read_people(self.folder)
 
     def commit(self, instrument: str, build: Callable[[Ledger], Change | None]) -> bool:
         """Make one change to an instrument's folder, signed where people are enrolled (`store.commit`).
@@ -141,9 +130,6 @@ class Registry:
     def _judged(self, instrument: str, ledger: Ledger, people: PeopleLog) -> Ledger:
         if ledger.damage is not None:
             return ledger
-        if self.rehearses is not None:
-            judged = self.rehearses.ledger(instrument)
-            return replace(ledger, damage=judged.damage, void=judged.void)
         version = people.history.now
         key = (instrument, ledger.head, "" if version is None else version.sha256)
         if key not in self._proved:
