@@ -161,7 +161,7 @@ def _own(folder: Path) -> Path:
 
 
 def _unsigned(xml: str) -> str:
-    """Return a digital certificate without the proof in its comment and the line of signatures."""
+    """Return a digital certificate without its proof and its line of signatures."""
     signed = r" *<dcc:identification>(?:(?!</dcc:identification>).)*Signatures of the record.*?tion>\n"
     return re.sub(
         signed, "", re.sub("<dcc:comment>.*?</dcc:comment>", "", xml, flags=re.DOTALL), flags=re.DOTALL

@@ -47,9 +47,10 @@ class Issuing:
         TrustError
             ``not-signed``, ``not-allowed``: asked before anything is made
         """
-        from toolkit.calibration.registry.issuing import issuer
+        from toolkit.calibration.registry.issuing import issuers
 
-        return content.issued_by(issuer(self.registry, content.calibrations[0].id))
+        names = issuers(self.registry, content.calibrations[0].id)
+        return content.issued_by(" and ".join(names) or None)
 
     def issue(self, content: ReportContent, *, document: str, decided: str) -> Issue:
         """Return what issues a document, such as ``certificate CC-1``.

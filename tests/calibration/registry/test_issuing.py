@@ -23,7 +23,7 @@ from tests.calibration.registry.test_signatures import (
 from toolkit.calibration.control.calibrate import rehearse
 from toolkit.calibration.registry import store
 from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.issuing import issue, issuer
+from toolkit.calibration.registry.issuing import issue, issuers
 from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError, RegistryError, TrustError
@@ -39,7 +39,7 @@ def _issue(registry: Registry) -> int:
 
 def test_a_laboratory_without_people_issues_unsigned(home: Path) -> None:
     registry = _registry(home)
-    assert issuer(registry, RECORD) is None
+    assert issuers(registry, RECORD) == ()
     assert _issue(registry) == 3
     entry = registry.ledger("m15-virtual").entries[-1]
     assert (entry.event, entry.id, dict(entry.document or {})) == ("issued", RECORD, DOCUMENT)
@@ -51,7 +51,7 @@ def test_a_laboratory_without_people_issues_unsigned(home: Path) -> None:
 def test_people_who_are_enrolled_sign_what_they_issue(home: Path) -> None:
     _found(home)
     registry = _registry(home, "dora", "anna")
-    assert issuer(registry, RECORD) == "Dora and Anna"
+    assert issuers(registry, RECORD) == ("Dora", "Anna")
     _issue(registry)
     line = json.loads(_registry(home).ledger("m15-virtual").lines[-1])
     assert (line["action"], line["meaning"]) == ("issue", "issued")
@@ -64,7 +64,7 @@ def test_who_may_not_issue_does_not(home: Path, signers: tuple[str, ...], rule: 
     _found(home)
     ledger = home / "calibrations/m15-virtual/ledger.jsonl"
     before = ledger.read_bytes()
-    for attempt in (issuer, lambda registry, _: _issue(registry)):
+    for attempt in (issuers, lambda registry, _: _issue(registry)):
         with pytest.raises(TrustError) as refusal:
             attempt(_registry(home, *signers), RECORD)
         assert refusal.value.rule == rule

@@ -133,4 +133,4 @@ def _checkpoint_holds(text: str) -> bool:
 
 
 def _continues(registry: Registry, document: Path) -> bool:
-    return check_against(registry, RIG, document).continuity == "continues"
+    return check_against(registry, RIG, document)[1].continuity == "continues"

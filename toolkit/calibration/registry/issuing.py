@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.store import Change
-from toolkit.errors import RegistryError
-from toolkit.trust.signing import Signing
+from toolkit.errors import RegistryError, TrustError
+from toolkit.trust.people import objections
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -22,23 +22,30 @@ if TYPE_CHECKING:
 ISSUED = "issued"
 
 
-def issuer(registry: Registry, record_id: str) -> str | None:
-    """Return the names of the people whose keys at hand may issue; None where nobody is enrolled.
+def issuers(registry: Registry, record_id: str) -> tuple[str, ...]:
+    """Return the names of the people whose keys at hand issue; none where nobody is enrolled.
 
     Raises
     ------
     TrustError
         ``not-signed``, ``not-allowed``
     """
-    history = registry.people().history
-    if history.now is None:
-        return None
-    signing = Signing(history=history, signers=registry.signers)
-    signing.demand_key("issue", record_id)
-    keys = [signer.public for signer in registry.signers]
-    signing.check({"id": record_id, "time": now()}, "issue", keys, ())
-    people = (history.now.people.owner(signer.public) for signer in registry.signers)
-    return " and ".join(dict.fromkeys(person.name for person in people if person is not None))
+    version = registry.people().history.now
+    if version is None:
+        return ()
+    publics = [signer.public for signer in registry.signers]
+    reasons = objections(version, "issue", now(), publics)
+    if reasons:
+        demand = version.people.policy.demand("issue")
+        raise TrustError(
+            "these keys cannot issue" if publics else "to issue takes a signature", where=record_id,
+            got="; ".join(reasons) if publics else "no key",
+            expected=f"{demand.signatures} by {' or '.join(demand.roles)}",
+            next_step="sign with --sign KEY; see 'toolkit person list'; nothing was issued",
+            rule="not-allowed" if publics else "not-signed",
+        )  # fmt: skip
+    people = (version.people.owner(public) for public in publics)
+    return tuple(dict.fromkeys(person.name for person in people if person is not None))
 
 
 def issue(registry: Registry, record_id: str, document: Mapping[str, str], *, decided: str) -> int:
@@ -58,7 +65,7 @@ def issue(registry: Registry, record_id: str, document: Mapping[str, str], *, de
     """
     from toolkit.calibration.registry.registry import instrument_of
 
-    instrument, by = instrument_of(record_id), issuer(registry, record_id)
+    instrument, names = instrument_of(record_id), issuers(registry, record_id)
     numbers: list[int] = []
 
     def build(ledger: Ledger) -> Change:
@@ -71,7 +78,7 @@ def issue(registry: Registry, record_id: str, document: Mapping[str, str], *, de
             )  # fmt: skip
         numbers.append(len(ledger.entries) + 1)
         event = {
-            "event": ISSUED, "id": record_id, "time": now(), "by": by or "not stated",
+            "event": ISSUED, "id": record_id, "time": now(), "by": names[0] if names else "not stated",
             "document": dict(document),
         }  # fmt: skip
         return Change(files={}, event=event)

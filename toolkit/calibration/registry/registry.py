@@ -30,7 +30,6 @@ from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
 from toolkit.trust.keys import Signer
-from toolkit.trust.people import History
 from toolkit.trust.signing import HERE, Signing, Travel
 
 _AT_ONCE = 200
@@ -70,23 +69,15 @@ class Registry:
 
     ``lock_file``: writers keep each other out by a file, for a file system without locks. ``signers``: the
     keys that sign what is decided through this object; a laboratory without people needs none. ``travel``:
-    the request to write, or the answers that came back, where keys are elsewhere. ``rehearses``: this is a
-    copy of that registry, to be thrown away: its lines are judged there, and nobody signs what is tried here.
+    the request to write, or the answers that came back, where keys are elsewhere.
     """
 
     def __init__(
-        self,
-        folder: Path,
-        *,
-        lock_file: bool = False,
-        signers: Sequence[Signer] = (),
-        travel: Travel = HERE,
-        rehearses: Registry | None = None,
+        self, folder: Path, *, lock_file: bool = False, signers: Sequence[Signer] = (), travel: Travel = HERE
     ) -> None:
         self.folder = folder
         self.lock_file = lock_file
         self.signers = tuple(signers)
-        self.rehearses = rehearses
         self.travel = travel
         self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
 
@@ -129,7 +120,7 @@ class Registry:
         TrustError
             ``people-log``
         """
-        return read_people(self.folder) if self.rehearses is None else PeopleLog(history=History(), heads={})
+        return read_people(self.folder)
 
     def commit(self, instrument: str, build: Callable[[Ledger], Change | None]) -> bool:
         """Make one change to an instrument's folder, signed where people are enrolled (`store.commit`).
@@ -151,9 +142,6 @@ class Registry:
     def _judged(self, instrument: str, ledger: Ledger, people: PeopleLog) -> Ledger:
         if ledger.damage is not None:
             return ledger
-        if self.rehearses is not None:
-            judged = self.rehearses.ledger(instrument)
-            return replace(ledger, damage=judged.damage, void=judged.void)
         version = people.history.now
         key = (instrument, ledger.head, "" if version is None else version.sha256)
         if key not in self._proved:
