@@ -90,6 +90,7 @@ def _painted(
             # The questions of the agenda are not the page; they would run while the next one is timed.
             page.route("**/agenda/*", lambda route: route.abort())
             page.goto(address)
+            page.wait_for_url(f"{place}/")
             page.goto(f"{place}/")
             page.wait_for_function("() => performance.getEntriesByName('first-contentful-paint').length")
             paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
