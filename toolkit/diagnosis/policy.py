@@ -60,6 +60,10 @@ class _Priors:
 
     within: float = _set(4.0, "prior sd", "further off it is not uncertain but imitates an effect: a bound")
     far: float = _set(3.0, "prior sd", "one in 370 by chance: beyond, the fit has absorbed what was left out")
+    end: float = _set(3.98, "prior sd", "a parameter that far is at its bound, to the fit's own tolerance")
+    moved: float = _set(
+        1.0, "prior sd", "a refit that went farther may have left what an effect needs: fits begin at both"
+    )
     masked: int = _set(
         4, "candidates", "of those seen from the declared values, fitted jointly where a prior is far off"
     )
@@ -177,6 +181,18 @@ class _Step:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Pairs:
+    """Which two effects are tried at once, where no single one passes."""
+
+    starts: int = _set(2, "starts of a candidate", "the likeliest of its shapes")
+    most: int = _set(60, "starts", "of some 1 800 pairs; others explain too little to be half of one")
+    better: float = _set(1.5, "times the better one's gain", "less is one effect and what mends its form")
+    apart: float = _set(1e-3, "of a response", "left beside the other's, or the two are one")
+    fitted: int = _set(4, "pairs", "fitted jointly, of those that are ranked first")
+    judged: int = _set(2, "pairs", "held out one after the other, the best first")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Lattice:
     """Whether recorded values stand on coarse steps."""
 
@@ -281,10 +297,10 @@ class _Surface:
 
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER = _Scatter()
-SCREENING, STARTS, STEP, LATTICE = _Screening(), _Starts(), _Step(), _Lattice()
+SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
 STRUCTURE, VERDICT, LOCATION, SURFACE = _Structure(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, LATTICE, STRUCTURE, VERDICT,
+    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, LATTICE, STRUCTURE, VERDICT,
     LOCATION, SURFACE,
 )  # fmt: skip
 

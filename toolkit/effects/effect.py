@@ -108,7 +108,9 @@ class Effect:
     share of what it does by which its law may be off; ``histories`` are the pasts that shape it beside an
     uneventful one; ``numerics`` are numbers of its computation in a case, which no fit moves; ``from_digits``
     says that it is read off the recorded digits and not searched; ``needs_signal`` that its output must have
-    most of the simulated signal in it; ``nuisance`` that it is fitted beside the effects and never named.
+    most of the simulated signal in it; ``nuisance`` that it is fitted beside the effects and never named;
+    ``reshapes`` that it changes the shape of an answer, so that parameters refitted without it may have gone
+    where it no longer helps.
 
     Of zeros: ``is_zero`` says that it adds one constant; ``zero_beside`` how large a constant may be that is
     only the point from which this effect starts; ``frees_zero`` that its size depends on a free constant.
@@ -147,6 +149,7 @@ class Effect:
     from_digits: bool = False
     needs_signal: bool = False
     nuisance: bool = False
+    reshapes: bool = False
     is_zero: bool = False
     zero_beside: Callable[[Values], float] | None = None
     frees_zero: bool = False

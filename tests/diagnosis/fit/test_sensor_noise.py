@@ -83,6 +83,7 @@ def test_printed_digits_are_the_least_noise(tmp_path):
     parts = parts_of(tmp_path, [np.zeros(N)], digits=1)
     # A step of 0.1 leaves its root of twelve.
     assert parts.sensor_sd == pytest.approx(0.1 / math.sqrt(12), rel=0.05)
+    assert (parts.how, parts.is_sensor) == ("resolution", True)
 
 
 def test_both_together_are_the_residual(tmp_path):

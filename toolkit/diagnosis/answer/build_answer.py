@@ -20,6 +20,7 @@ from toolkit.diagnosis.answer.answer import (
 from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.next_measurements import equivalent_to, implausible, next_measurements
 from toolkit.diagnosis.answer.power import not_found
+from toolkit.diagnosis.answer.refit_findings import refit_findings
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.fit.structure import RUNS, groups
@@ -67,7 +68,7 @@ def answer_of(case: Case, search: Search, findings: tuple[Finding, ...]) -> Diag
         depends_on=tuple((structure.output, structure.variables) for structure in search.structure),
         not_found=not_found(search.screen, search.scored, names, alpha=SCREENING.alpha / tests, units=units),
         next_measurements=next_measurements(search, effects, verdict),
-        findings=(*findings, *_outliers(case, search)),
+        findings=(*findings, *_outliers(case, search), *refit_findings(case, search)),
         complete=not search.skipped,
         skipped=search.skipped,
         recordings=recorded(case.runs),

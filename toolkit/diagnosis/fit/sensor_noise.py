@@ -45,7 +45,7 @@ class NoiseParts:
     @property
     def is_sensor(self) -> bool:
         """No more is left than a sensor's noise that is known from elsewhere than this residual."""
-        return self.how in ("stated", "repeats") and self.total_sd <= NOISE.as_known * self.sensor_sd
+        return self.how != "differences" and self.total_sd <= NOISE.as_known * self.sensor_sd
 
 
 def noise_parts(problem: Problem, fit: Fit, name: str) -> NoiseParts:
@@ -54,8 +54,9 @@ def noise_parts(problem: Problem, fit: Fit, name: str) -> NoiseParts:
     residual = fit.residual[name][counted]
     total = math.sqrt(float(np.mean(residual**2))) if len(residual) else 0.0
     sensor, how = _sensor(problem, fit, name)
-    if sensor < problem.floor[name]:
-        sensor, how = problem.floor[name], "resolution"
+    floor = problem.floor[name]
+    if sensor < floor or total <= NOISE.as_known * floor:
+        sensor, how = floor, "resolution"
     if how in ("differences", "resolution"):
         sensor = min(sensor, total) if total > 0 else sensor
     return NoiseParts(sensor_sd=sensor, process_sd=math.sqrt(max(total**2 - sensor**2, 0.0)), how=how)

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.policy import STEP
+from toolkit.diagnosis.policy import PRIORS, STEP
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.errors import FitError
@@ -75,7 +75,7 @@ def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tupl
     weight = _weight(problem)
     joints = []
     for scored in promising:
-        fitted = _fitted(problem, base, scored.active)
+        fitted = joint_fit(problem, base, (scored.active,))
         if fitted is not None:
             penalty = weight * sum(not parameter.ends_count for parameter in scored.active.searched)
             joints.append(Joint(scored=scored, fit=fitted, score=fitted.log_posterior - penalty))
@@ -102,14 +102,14 @@ def best_step(
     refitted : the held-out rows without any effect
     """
     form = max((applied.effect.form_error for applied in base.active), default=0.0)
-    for joint_fit in joint[: STEP.judged]:
-        made = joint_fit.fit
+    for trial in joint[: STEP.judged]:
+        made = trial.fit
         try:
             scores = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
         gain = scores.total - held_base.total
-        if gain < STEP.least_gain or joint_fit.score - base.log_posterior < STEP.least_gain:
+        if gain < STEP.least_gain or trial.score - base.log_posterior < STEP.least_gain:
             continue
         # One that a later effect drives to its bound is no better than one that starts there.
         if any(at_bound(each) for each in made.active) or not matters(problem, held_base, scores, least):
@@ -120,10 +120,10 @@ def best_step(
             continue
         step = Step(
             active=made.active[-1],
-            p_value=p_of[id(joint_fit.scored)],
+            p_value=p_of[id(trial.scored)],
             held_out_gain=gain,
             gain=made.log_posterior - base.log_posterior,
-            rivals=rivals(problem, joint_fit, joint),
+            rivals=rivals(problem, trial, joint),
         )
         return made, scores, step
     return None
@@ -160,24 +160,40 @@ def _weight(problem: Problem) -> float:
     return 0.5 * math.log(sum(int(rows.sum()) for rows in problem.kept.values()))
 
 
-def _fitted(problem: Problem, base: Fit, added: AppliedEffect) -> Fit | None:
-    """Return the joint fit with one effect more, None where the simulation runs with no part of it.
+def joint_fit(problem: Problem, base: Fit, added: Sequence[AppliedEffect]) -> Fit | None:
+    """Return the joint fit with effects more, None where the simulation runs with no part of them.
 
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
-    true one is not.
+    true one is not. An effect that changes an answer's shape begins at the declared parameters as well, where
+    a refit without it has moved them: they may have gone where it no longer helps.
     """
-    for share in (1.0, 0.5, 0.25, 0.125) if added.searched else (1.0,):
-        values = dict(added.values)
-        for parameter in added.searched:
-            if parameter.off is not None and math.isfinite(parameter.off):
-                values[parameter.name] = parameter.off + share * (
-                    added.values[parameter.name] - parameter.off
-                )
+    starts = [base.p]
+    moved = float(np.abs(problem.off_priors(base.p)).max(initial=0.0))
+    if moved > PRIORS.moved and any(effect.effect.reshapes for effect in added):
+        starts.append(tuple(parameter.value for parameter in problem.free))
+    fits = [_fitted(problem, base, added, start) for start in starts]
+    return max((fitted for fitted in fits if fitted), key=lambda fitted: fitted.log_posterior, default=None)
+
+
+def _fitted(
+    problem: Problem, base: Fit, added: Sequence[AppliedEffect], start: tuple[float, ...]
+) -> Fit | None:
+    for share in (1.0, 0.5, 0.25, 0.125) if any(effect.searched for effect in added) else (1.0,):
         try:
-            return fit(problem, (*base.active, replace(added, values=values)), start=base.p)
+            active = (*base.active, *(_shared(effect, share) for effect in added))
+            return fit(problem, active, start=start)
         except FitError:
             continue
     return None
+
+
+def _shared(effect: AppliedEffect, share: float) -> AppliedEffect:
+    """Return an effect with a share of its size."""
+    values = dict(effect.values)
+    for parameter in effect.searched:
+        if parameter.off is not None and math.isfinite(parameter.off):
+            values[parameter.name] = parameter.off + share * (effect.values[parameter.name] - parameter.off)
+    return replace(effect, values=values)
 
 
 def _shapes(effect: AppliedEffect) -> int:

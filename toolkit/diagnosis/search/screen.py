@@ -52,6 +52,26 @@ class Scored:
         """Number of parameters that were searched."""
         return max(len(self.candidate.active.searched), 1)
 
+    @property
+    def _off(self) -> dict[str, float]:
+        """Of every amplitude the value at which the effect is not there."""
+        parameters = {parameter.name: parameter for parameter in self.active.effect.parameters}
+        off = {name: parameters[name].off or 0.0 for name in self.start.amplitudes}
+        return {name: value for name, value in off.items() if math.isfinite(value)}
+
+    def reached(self, coefficients: Sequence[float]) -> AppliedEffect:
+        """Return the effect with the values that coefficients of its directions stand for."""
+        values = self.start.reached(coefficients, self._off) if coefficients else dict(self.start.values)
+        return replace(self.active, values=values)
+
+    def valued(self, coefficients: Sequence[float]) -> AppliedEffect | None:
+        """Return the same; None where the other sign would fit, and the effect has one only."""
+        reached, off = self.reached(coefficients), self._off
+        lowest = {parameter.name: parameter.bounds[0] for parameter in self.active.effect.parameters}
+        if len(off) == 1 and any(reached.values[name] < lowest[name] for name in off):
+            return None
+        return reached
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weighed:
@@ -225,18 +245,10 @@ class LinearisedFit:
         gain, coefficients, trust = self.gain(trial.directions, fixed=trial.candidate.discrete)
         if trial.candidate.discrete:
             return replace(trial, gain=gain, trust=trust)
-        parameters = {parameter.name: parameter for parameter in trial.active.effect.parameters}
-        amplitudes = {name: parameters[name] for name in trial.start.amplitudes}
-        off = {
-            name: amplitude.off or 0.0
-            for name, amplitude in amplitudes.items()
-            if math.isfinite(amplitude.off or 0.0)
-        }
-        values = trial.start.reached(coefficients, off) if coefficients else dict(trial.start.values)
-        if len(off) == 1 and any(values[name] < parameters[name].bounds[0] for name in off):
-            # The other sign would fit, and the effect has one only.
-            gain = 0.0
-        return replace(trial, gain=gain, trust=trust, active=replace(trial.active, values=values))
+        reached = trial.valued(coefficients)
+        if reached is None:
+            return replace(trial, gain=0.0, trust=trust, active=trial.reached(coefficients))
+        return replace(trial, gain=gain, trust=trust, active=reached)
 
     def gain(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, tuple[float, ...], float]:
         """Return twice the gain of the log-likelihood, the responses' coefficients, and its trust.

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.fit import Fit
+from toolkit.diagnosis.fit.fit import Fit, noise_of
+from toolkit.diagnosis.fit.noise import log_likelihood
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, SCREENING
 from toolkit.diagnosis.search.candidates import CandidateEffect
@@ -126,6 +127,55 @@ def _is_sought(candidate: CandidateEffect, turn: int) -> bool:
     gross that it comes first or second.
     """
     return not candidate.active.effect.from_digits and not (candidate.discrete and turn > 1)
+
+
+def from_declared(problem: Problem, base: Fit, view: Look) -> Look:
+    """Return a look with the effects in it that are significant from the declared parameters alone.
+
+    An effect that changes the shape of an answer (a lost sign, a stop, friction at rest) drives a refit
+    without it far off, and from there it may not help at all. Seen from the declared values it has to explain
+    more than the refit does, by as much as the search asks of every candidate.
+    """
+    from scipy.stats import chi2
+
+    ranked = {scored.candidate.key for scored in view.significant}
+    reshaping = [
+        candidate
+        for candidate in view.candidates
+        if candidate.active.effect.reshapes and candidate.key not in ranked
+    ]
+    if not reshaping or np.abs(problem.off_priors(base.p)).max(initial=0.0) < PRIORS.moved:
+        return view
+    screen = _about_declared(problem, base)
+    if screen is None:
+        return view
+    trials = screen.sharpened(
+        [score for candidate in reshaping for score in screen.score(candidate)], SCREENING.sharpened
+    )
+    significant, p_of = [], dict(view.p_of)
+    for trial in best_of(trials):
+        gain = trial.gain + 2 * (screen.log_likelihood - base.log_posterior)
+        p = float(chi2.sf(max(gain, 0.0) * trial.trust, trial.dof)) * (len(view.scored) + len(trials))
+        if p < SCREENING.alpha:
+            significant.append(replace(trial, gain=gain))
+            p_of[id(significant[-1])] = p
+    together = sorted((*view.significant, *significant), key=lambda trial: -trial.gain)
+    return replace(view, significant=tuple(together), p_of=p_of)
+
+
+def _about_declared(problem: Problem, base: Fit) -> LinearisedFit | None:
+    """Return the screen about the declared parameters; None where the effects so far cannot be run there."""
+    declared = tuple(parameter.value for parameter in problem.free)
+    try:
+        simulated = problem.simulate(declared, base.active)
+    except FitError:
+        return None
+    residual = {name: problem.observed[name] - values for name, values in simulated.items()}
+    layouts = {name: problem.layout(name) for name in problem.names}
+    there = replace(base, p=declared, simulated=simulated, residual=residual)
+    noise = noise_of(problem, residual, layouts)
+    likelihood = sum(log_likelihood(residual[n][at.index], at, noise[n]) for n, at in layouts.items())
+    return LinearisedFit.of(problem, replace(there, noise=noise, log_posterior=likelihood))
 
 
 def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -> frozenset[EffectKey]:

@@ -19,8 +19,9 @@ from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise
+from toolkit.diagnosis.search.pairs import best_pair
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
-from toolkit.diagnosis.search.screen_step import look, masked
+from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.errors import FitError
@@ -161,6 +162,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         for turn in range(STEP.most_effects + 1):
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
             view = look(problem, base, listed, turn=turn, seed=seed + turn)
+            view = from_declared(problem, base, view)
             screen, scored = view.screen, view.scored
             budget.check(f"step {turn + 1}: structure of the residual")
             structure = remainder(problem, screen, base, seed + 100 + turn)
@@ -178,11 +180,20 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 outcome = best_step(problem, folds, base, held_base, joint, view.p_of, least, held_refitted)
                 if outcome is not None:
                     break
-            if outcome is None:
+            if outcome is not None:
+                base, held_base, step = outcome
+                if not _is_nuisance(step, steps):
+                    steps.append(step)
+                continue
+            if turn + 2 > STEP.most_effects:
                 break
-            base, held_base, step = outcome
-            if not _is_nuisance(step, steps):
-                steps.append(step)
+            budget.check(f"step {turn + 1}: pairs of candidates")
+            least = STEP.later if turn else STEP.first
+            both = best_pair(problem, folds, base, held_base, screen, scored, least)
+            if both is None:
+                break
+            base, held_base, pair = both
+            steps += pair
         base, held_base = refined(problem, folds, base, held_base, listed)
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:

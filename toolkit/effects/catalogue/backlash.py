@@ -37,4 +37,5 @@ EFFECT = Effect(
         ),
     ),
     drive=_followed,
+    reshapes=True,
 )

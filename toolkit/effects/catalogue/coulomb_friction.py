@@ -140,4 +140,5 @@ EFFECT = Effect(
     term=Term(of="velocity", force=_resisting, recorded=_recorded, bristle=_bristle_of),
     numerics=_smoothing,
     form_error=0.03,
+    reshapes=True,
 )

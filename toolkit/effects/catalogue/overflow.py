@@ -43,4 +43,5 @@ EFFECT = Effect(
         ),
     ),
     term=Term(of="state", limit=_stopped, shares=(1.0,)),
+    reshapes=True,
 )

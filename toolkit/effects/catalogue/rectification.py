@@ -33,4 +33,5 @@ EFFECT = Effect(
     channel=_folded,
     on_channel=ChannelFacts(where=("output", "cell", "program_load"), tare="own", by_value=False),
     discrete=True,
+    reshapes=True,
 )

@@ -44,4 +44,5 @@ EFFECT = Effect(
     ),
     channel=_clipped,
     on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=False),
+    reshapes=True,
 )

@@ -1,0 +1,77 @@
+"""What a look sees from where: a refit without an effect may have gone where it no longer helps."""
+
+import numpy as np
+import pandas as pd
+
+from tests.diagnosis.cases import write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.candidates import candidates
+from toolkit.diagnosis.search.screen_step import from_declared, look
+from toolkit.diagnosis.simulators.build_simulator import model_of
+
+SPEED = """
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"n": p["gain"] * inputs["u"] + p["zero"]})
+"""
+CASE = """schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.gain]
+value = 1.0
+unit = "1"
+sd = 0.3
+[simulation.parameters.zero]
+value = 0.0
+unit = "1/s"
+sd = 0.5
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+u = { unit = "1/s", role = "input" }
+n = { unit = "1/s", role = "output" }
+"""
+
+
+def speeds(folder, *, unsigned):
+    """Return a speed sensor that may have lost its sign; the refit without that goes to a constant."""
+    text, frames = CASE, {}
+    for k in range(3):
+        t = np.arange(300) * 0.1
+        u = np.sin(0.7 * t + k) + 0.5 * np.sin(1.9 * t)
+        n = 1.05 * u
+        n = (np.abs(n) if unsigned else n) + np.random.default_rng(k).normal(0, 0.02, t.size)
+        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "u": u, "n": n})
+        text += f'[[recording.run]]\nfile = "r{k}.csv"\n'
+    return read_case(write_case(folder, text, simulator=SPEED, **frames))
+
+
+def looks(case):
+    problem = problem_of(case, model_of(case, None, None))
+    base = fit(problem)
+    view = look(problem, base, candidates(problem), turn=0, seed=1)
+    seen = from_declared(problem, base, view)
+    return [{trial.candidate.name for trial in each.significant} for each in (view, seen)], view, seen
+
+
+def test_a_lost_sign_is_seen_from_the_declared_values(tmp_path):
+    (from_refit, both), _, seen = looks(speeds(tmp_path, unsigned=True))
+    assert "rectification" not in from_refit
+    assert both >= from_refit | {"rectification"}
+    assert seen.p_of[id(seen.significant[0])] < 0.003
+
+
+def test_a_refit_that_stays_near_its_priors_is_looked_at_from_there_alone(tmp_path):
+    _, view, seen = looks(speeds(tmp_path, unsigned=False))
+    assert seen is view
+
+
+def test_an_unsigned_sensor_is_named(tmp_path):
+    answer = diagnose(speeds(tmp_path, unsigned=True), None).diagnosis
+    assert [effect.name for effect in answer.effects] == ["rectification"]
+    assert answer.held_out[0].augmented_rmse < 0.03

@@ -1,0 +1,65 @@
+"""What a reader must know of the refit: parameters at their bounds, rows that it makes worse."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.policy import PRIORS, VERDICT
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.search.search import Search
+
+
+def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
+    """Return what is told of parameters at the end of their priors, and of a refit that does harm."""
+    return (*_at_bounds(case, search), *_worse(case, search))
+
+
+def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:
+    findings = []
+    for parameter, refitted, augmented in zip(
+        search.problem.free, search.refitted.p, search.augmented.p, strict=True
+    ):
+        shifts = {
+            fit: (value - parameter.value) / (parameter.sd or 1.0)
+            for fit, value in (("refitted", refitted), ("with the effects", augmented))
+        }
+        ends = [f"{shift:+.1f} sd {fit}" for fit, shift in shifts.items() if abs(shift) > PRIORS.end]
+        if ends:
+            findings.append(
+                Finding(
+                    rule="parameter-at-bound",
+                    where=f"{case.path.name}: {parameter.name}",
+                    level="warning",
+                    message=f"{' and '.join(ends)}: the fit would go farther than its prior allows",
+                )
+            )
+    return tuple(findings)
+
+
+def _worse(case: Case, search: Search) -> tuple[Finding, ...]:
+    findings = []
+    for output in search.problem.model.outputs:
+        counted = search.problem.kept[output.name]
+        if not counted.any():
+            continue
+        observed = search.problem.observed[output.name][counted]
+        declared, refitted = (
+            float(np.sqrt(np.mean((observed - simulated[output.name][counted]) ** 2)))
+            for simulated in (search.nominal.simulated, search.held_refitted.simulated)
+        )
+        if refitted**2 > VERDICT.shown * declared**2:
+            findings.append(
+                Finding(
+                    rule="refit-worse",
+                    where=f"{case.path.name}: {output.name}",
+                    level="warning",
+                    message=f"on rows that no fit has seen the refit is off by {refitted:.4g} {output.unit}, "
+                    f"the simulation as declared by {declared:.4g} {output.unit}",
+                )
+            )
+    return tuple(findings)
