@@ -23,6 +23,7 @@ class _Budget:
     """What a budget of time allows beside the search."""
 
     quick_s: float = _set(2.0, "s of one simulation", "a slower one is not run twice to see that it repeats")
+    alarm_s: float = _set(0.5, "s after its end", "a worker that is late is told by itself before the alarm")
     grace: float = _set(0.25, "of the budget", "left for predictions after a search that has spent all of it")
 
 
@@ -49,6 +50,9 @@ class _Rows:
         8.0, "robust sd from the neighbours' median", "no physics does that in one row: it is an outlier"
     )
     outliers: float = _set(0.03, "of a run's rows", "more than that is no outlier but a pattern")
+    sharp: float = _set(
+        0.5, "of a run's outliers", "beside sharp moves of an input, fewer of all rows: they answer the move"
+    )
     fewest_for_outliers: int = _set(12, "rows of a run", "fewer have no scatter that a row could be far off")
     folds: int = _set(5, "parts", "each fit sees four fifths of the rows, at the price of five fits")
     fewest: int = _set(3, "rows of an output", "with as many nothing can be told apart from anything")

@@ -215,10 +215,14 @@ def _writable(out: Path) -> None:
 def diagnosis_text(answer: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
     from toolkit.diagnosis.answer.answer import cut_short
-    from toolkit.report.diagnosis.numbers import chance
+    from toolkit.report.diagnosis.numbers import chance, rounded
+    from toolkit.report.diagnosis.page import cause
 
     cut = answer.verdict == "unknown" and cut_short(answer.skipped)
-    lines = [f"{answer.title}: {_CUT if cut else _VERDICTS[answer.verdict]}"]
+    verdict = _CUT if cut else _VERDICTS[answer.verdict]
+    if answer.verdict == "untestable" and answer.skipped:
+        verdict = "the budget was spent before this recording could be judged"
+    lines = [f"{answer.title}: {' '.join(filter(None, (cause(answer), verdict)))}"]
     for effect in answer.effects:
         channel = f" on {effect.channel}" if effect.channel else ""
         lines += ["", f"{effect.name}{channel} ({effect.stage}): {effect.statement}", f"  {effect.equation}"]
@@ -226,10 +230,9 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
             if isinstance(parameter.value, str):
                 lines.append(f"  {parameter.name} = {parameter.value}")
                 continue
-            reach = (
-                "" if parameter.ci95 is None else f"  [{parameter.ci95[0]:.4g}, {parameter.ci95[1]:.4g}] 95 %"
-            )
-            lines.append(f"  {parameter.name} = {parameter.value:.4g} {parameter.unit}{reach}")
+            value, interval = rounded(parameter.value, parameter.ci95)
+            reach = f"  (95 %: {interval})" if interval else ""
+            lines.append(f"  {parameter.name} = {value} {parameter.unit}{reach}")
         runs = next((parameter.runs for parameter in effect.parameters if parameter.runs is not None), None)
         if runs is not None:
             lines.append(f"  in {', '.join(runs)} alone")

@@ -14,7 +14,7 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.maps import size_maps, variables
 from toolkit.report.diagnosis.numbers import chance, few, over
-from toolkit.report.diagnosis.page import HEADLINES, condition, headline, page
+from toolkit.report.diagnosis.page import HEADLINES, cause, condition, headline, page
 
 
 @pytest.fixture(scope="module")
@@ -195,3 +195,48 @@ def test_a_residual_that_is_only_too_large_depends_on_nothing(dragged):
     assert "over more than" not in html
     assert ": 0 %" not in html
     assert over("F", ("v", "dv/dt")) == "F over v and dv/dt"
+
+
+def test_the_first_line_has_the_cause_its_size_and_what_it_explains(dragged):
+    line = cause(dragged.diagnosis)
+    (effect,), (fit,) = dragged.diagnosis.effects, dragged.diagnosis.held_out
+    assert line is not None
+    assert line.startswith(effect.name)
+    # of the mean square above the noise
+    above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
+    share = 100 * (fit.refitted_rmse**2 - fit.augmented_rmse**2) / above
+    assert f"explains {share:.0f} % of the mean square by which F" in line
+    assert cause(dataclasses.replace(dragged.diagnosis, effects=())) is None
+    assert line.split("(")[0] in page(dragged)
+
+
+def test_a_spent_budget_is_not_the_recordings_fault(dragged):
+    late = dataclasses.replace(
+        dragged.diagnosis, verdict="untestable", effects=(), complete=False, skipped=("refit",)
+    )
+    assert "budget was spent" in headline(late)
+    assert "cannot tell" not in headline(late)
+
+
+def test_nothing_is_shown_beside_the_recording(dragged):
+    clean = dataclasses.replace(dragged.diagnosis, verdict="nothing", effects=(), mismatch=())
+    assert "nothing stands out of the noise" in page(dataclasses.replace(dragged, diagnosis=clean))
+
+
+def test_what_has_no_name_has_a_list_of_what_it_is_not(dragged):
+    unknown = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=())
+    assert "why it is not named" in page(dataclasses.replace(dragged, diagnosis=unknown))
+    assert "why it is not named" not in page(dragged)
+
+
+def test_a_long_curve_keeps_its_extremes():
+    t = np.arange(100_000.0)
+    y = np.sin(t / 5_000)
+    y[[31_415, 77_777]] = 7.0, -9.0
+    y[50_000:50_100] = np.nan
+    at, values = figures.drawn(t, y)
+    assert len(at) < 1500
+    assert (np.diff(at) > 0).all()
+    assert values.max() == 7.0
+    assert values.min() == -9.0
+    assert len(figures.drawn(t[:900], y[:900])[0]) == 900

@@ -29,6 +29,7 @@ def not_found(
     units : of the first parameter, by the identity of each scored
     """
     best: dict[str, tuple[float | None, str, bool]] = {}
+    beyond: set[str] = set()
     for trial in scored:
         name = trial.candidate.name
         if name in names:
@@ -37,6 +38,9 @@ def not_found(
         visible = share > VERDICT.observable and length > 0
         needed = _noncentrality(alpha, trial.dof)
         size = abs(amplitude) * needed / length if visible and amplitude else None
+        if size is not None and needed / length * _moved(screen, trial) > 1:
+            # A size at which the output would leave its own range has been seen by nobody.
+            visible, beyond = False, beyond | {name}
         smallest = best.get(name)
         if (
             smallest is None
@@ -61,8 +65,20 @@ def not_found(
             continue
         size, unit, visible = best[name]
         why = "" if visible else "its response vanishes here, or the free parameters take it all"
+        if not visible and name in beyond:
+            why = "it would not have been seen at any size that leaves the outputs within their own range"
         entries.append(NotFound(name=name, minimum_detectable=size, unit=unit, observable=visible, why=why))
     return tuple(entries)
+
+
+def _moved(screen: LinearisedFit, trial: Scored) -> float:
+    """Return by how much of an output's recorded range a response moves it, the output it moves most."""
+    shares = []
+    for name, kept in screen.problem.kept.items():
+        span = float(np.ptp(screen.problem.observed[name][kept])) if kept.any() else 0.0
+        if span > 0:
+            shares.append(float(np.abs(trial.directions[name][kept, 0]).max(initial=0.0)) / span)
+    return max(shares, default=0.0)
 
 
 def _distance(screen: LinearisedFit, trial: Scored) -> tuple[float, float, float]:

@@ -216,10 +216,31 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
             scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
             far = np.abs(away) > ROWS.isolated * max(scale, steps, 1e-300)
+            beside = _moved_sharply(problem, rows)[places - rows.start]
+            if far.any() and np.mean(beside[far]) > ROWS.sharp > np.mean(beside):
+                far &= ~beside
             if 0 < far.sum() <= max(1, ROWS.outliers * len(places)):
                 good[places[far]] = False
         counted[name] = good
     return replace(problem, kept=counted)
+
+
+def _moved_sharply(problem: Problem, rows: slice) -> NDArray[np.bool_]:
+    """Return which rows of a run stand beside a sharp move of an input: what follows it is no outlier."""
+    run = problem.runs[problem.slices.index(rows)]
+    sharp = np.zeros(run.rows, dtype=bool)
+    for driver in problem.case.drivers:
+        if driver.name not in run.columns or run.rows < ROWS.fewest_for_outliers:
+            continue
+        column = run.columns[driver.name]
+        bends = np.abs(np.diff(column, n=2, prepend=column[0], append=column[-1]))
+        least = max(1.4826 * float(np.median(bends)), 1e-6 * float(np.ptp(column)))
+        sharp |= bends > ROWS.isolated * least
+    beside = sharp.copy()
+    for shift in (1, 2):
+        beside[shift:] |= sharp[:-shift]
+        beside[:-shift] |= sharp[shift:]
+    return beside
 
 
 def _running_median(x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,12 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
+from toolkit.diagnosis.policy import BUDGET
 from toolkit.worker.worker import LateError
 
 T = TypeVar("T")
-
-
-_GRACE = 0.5  # s after the end, so that a worker that is late is told by itself
 
 
 class BudgetSpentError(BaseException):
@@ -81,7 +79,7 @@ class TimeBudget:
 
         before = signal.signal(signal.SIGALRM, ring)
         self._set = True
-        signal.setitimer(signal.ITIMER_REAL, max(self.until - time.monotonic(), 0.0) + _GRACE)
+        signal.setitimer(signal.ITIMER_REAL, max(self.until - time.monotonic(), 0.0) + BUDGET.alarm_s)
         try:
             yield
         finally:

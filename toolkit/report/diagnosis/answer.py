@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.report.content import Plot
-from toolkit.report.diagnosis.numbers import chance, few, over
+from toolkit.report.diagnosis.numbers import chance, few, over, rounded
 from toolkit.report.diagnosis.page import headline
 from toolkit.report.diagnosis.plots import errors_plot
 from toolkit.report.document import Document, Rows, finding_table
@@ -200,11 +200,12 @@ def found_parameters(source: Told, style: Style) -> Rows:
     """Return the parameters of the effects."""
     for effect in source.answer.effects:
         for parameter in effect.parameters:
-            value, interval = parameter.value, parameter.ci95
+            value = parameter.value
+            texts = (value, "") if isinstance(value, str) else rounded(value, parameter.ci95)
+            if style.decimal_comma and not isinstance(value, str):
+                texts = (texts[0].replace(".", ","), texts[1].replace(".", ","))
             yield (
-                effect.name, parameter.name, value if isinstance(value, str) else _n(value, style, 4),
-                _unit(parameter.unit) or "-",
-                "-" if interval is None else f"{_n(interval[0], style, 4)} to {_n(interval[1], style, 4)}",
+                effect.name, parameter.name, texts[0], _unit(parameter.unit) or "-", texts[1] or "-",
                 "all" if parameter.runs is None else ", ".join(parameter.runs),
             )  # fmt: skip
 

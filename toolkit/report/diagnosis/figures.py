@@ -30,7 +30,8 @@ _RC: Any = {
     "grid.linewidth": 0.6,
     "svg.hashsalt": "toolkit",
 }
-_MOST = 4000  # points of a scatter
+_MOST = 1200  # points of a scatter
+_PIXELS = 700  # of a curve's width; in each the least and the largest value are drawn
 _FEW = 300  # rows of a run whose points stand apart
 _BINS = 24
 _WIDE = 200.0  # errors over noise from which a chart goes by powers of ten
@@ -95,7 +96,7 @@ def mismatch_map(search: Search, channel: str, place: Place, *, after: bool) -> 
             series.append(("with the effect", BLUE, search.augmented.residual[channel]))
         for label, colour, residual in series:
             some = np.flatnonzero(kept)
-            some = some[:: max(1, len(some) // _MOST)]
+            some = some[np.linspace(0, len(some) - 1, min(len(some), _MOST)).astype(np.intp)]
             axes.plot(x[some], residual[some], ".", markersize=2.2, alpha=0.25, color=colour)
             centre, mean = binned(x[kept], residual[kept])
             axes.plot(centre, mean, "-", linewidth=2.0, color=colour, label=f"{label} (mean)")
@@ -129,13 +130,14 @@ def run_in_time(search: Search, channel: str, *, after: bool) -> bytes:
         t = run.t / second
         # Large enough to be seen under a line that goes through them.
         dots = 5.0 if run.rows < _FEW else 2.5
-        upper.plot(t, problem.observed[channel][rows], ".", markersize=dots, color=GREY, label="recorded")
+        observed = problem.observed[channel][rows]
+        upper.plot(*drawn(t, observed), ".", markersize=dots, color=GREY, label="recorded")
         fits = [("refitted", ORANGE, search.refitted)]
         if after:
             fits.append(("with the effect", BLUE, search.augmented))
         for label, colour, fit in fits:
-            upper.plot(t, fit.simulated[channel][rows], color=colour, linewidth=1.2, label=label)
-            lower.plot(t, fit.residual[channel][rows], color=colour, linewidth=0.8)
+            upper.plot(*drawn(t, fit.simulated[channel][rows]), color=colour, linewidth=1.2, label=label)
+            lower.plot(*drawn(t, fit.residual[channel][rows]), color=colour, linewidth=0.8)
         upper.set_ylabel(f"{channel} [{unit}]")
         # Outside: inside it would lie on the curves of a run that rises.
         figure.legend(loc="outside upper right", ncols=3, frameon=False, markerscale=2)
@@ -145,6 +147,19 @@ def run_in_time(search: Search, channel: str, *, after: bool) -> bytes:
         figure.align_ylabels()
 
     return draw_svg((8.6, 4.4), draw)
+
+
+def drawn(t: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the rows of a curve that show in print: of every pixel its least and its largest value."""
+    usable = np.flatnonzero(np.isfinite(y))
+    if len(usable) <= 2 * _PIXELS:
+        return t, y
+    pixel = np.minimum((usable * _PIXELS) // len(y), _PIXELS - 1)
+    order = np.lexsort((y[usable], pixel))
+    starts = np.flatnonzero(np.diff(pixel[order], prepend=-1))
+    ends = np.append(starts[1:], len(order)) - 1
+    rows = np.unique(usable[order[np.concatenate([starts, ends])]])
+    return t[rows], y[rows]
 
 
 def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:

@@ -19,6 +19,33 @@ def few(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
+def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, str]:
+    """Return a fitted value and its interval, to the digits that the interval knows; no interval is no text.
+
+    >>> rounded(0.158312, (0.15511, 0.16149)), rounded(1.667e-18, (-0.0034, 0.0034))
+    (('0.1583', '0.1551 to 0.1615'), ('0.0000', '-0.0034 to 0.0034'))
+    >>> rounded(5463.5, (5120.0, 5800.0)), rounded(0.2, None)
+    (('5460', '5120 to 5800'), ('0.2', ''))
+    """
+    if interval is None:
+        return few(value, 4), ""
+    low, high = interval
+    half = max(high - value, value - low)
+    if not (math.isfinite(half) and half > 0):
+        return few(value, 4), f"{few(low, 4)} to {few(high, 4)}"
+    place = math.floor(math.log10(half)) - 1  # the second digit of the interval's half
+    size = max(abs(number) for number in (value, low, high))
+    if size >= _PLAIN or (place < -6 and size < 1e-3):
+        digits = max(math.floor(math.log10(size)) - place + 1, 2)
+        return f"{value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"
+
+    def text(number: float) -> str:
+        at = round(number, -place)
+        return f"{at + 0.0:.{max(-place, 0)}f}"
+
+    return text(value), f"{text(low)} to {text(high)}"
+
+
 def over(channel: str, variables: Sequence[str]) -> str:
     """Return what an output's mismatch depends on; where only its size tells, that it is too large.
 

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.diagnosis.policy import SCREENING
+from toolkit.diagnosis.search.screen import best_of
 from toolkit.effects.catalogue import effects
 from toolkit.report.content import signature_text
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.maps import size_maps
-from toolkit.report.diagnosis.numbers import chance, few, over
+from toolkit.report.diagnosis.numbers import chance, few, over, rounded
 from toolkit.report.pages.kit import Figure, Table, number, page_parts, table
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, Mismatch
     from toolkit.diagnosis.diagnose import Result
 
+_NEAREST = 8  # candidates that are listed as rejected
 HEADLINES = {
     "named": "The missing physics has a name.",
     "equivalent": "A class of effects explains the mismatch; this recording cannot tell them apart.",
@@ -53,10 +56,38 @@ def headline(diagnosis: Diagnosis) -> str:
 
     if diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped):
         return "Something is missing; the budget was spent before every known effect was tried."
+    if diagnosis.verdict == "untestable" and diagnosis.skipped:
+        return "The budget was spent before this recording could be judged."
     if diagnosis.effects and diagnosis.remaining == "unknown":
         # Who reads the first line alone must not take a name for the whole of it.
         return f"{HEADLINES[diagnosis.verdict]} More is left that no known effect explains."
     return HEADLINES[diagnosis.verdict]
+
+
+def cause(diagnosis: Diagnosis) -> str | None:
+    """Return the effects with their sizes and the share that they explain; None where none was found."""
+    if not diagnosis.effects:
+        return None
+    names = []
+    for effect in diagnosis.effects:
+        sizes = [
+            f"{parameter.name} {value}{f' ({interval})' if interval else ''} {parameter.unit}".rstrip(" 1")
+            for parameter in effect.parameters[:1]
+            if not isinstance(parameter.value, str)
+            for value, interval in (rounded(parameter.value, parameter.ci95),)
+        ]
+        names.append(", ".join((_name(effect), *sizes)))
+    shares = []
+    for fit in diagnosis.held_out:
+        above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
+        taken = fit.refitted_rmse**2 - fit.augmented_rmse**2
+        if above > 0 and taken > 0:
+            shares.append((taken, above, fit.channel))
+    if not shares:
+        return "; ".join(names) + "."
+    taken, above, channel = max(shares, key=lambda share: share[0] / share[1])
+    much = f"{100 * taken / above:.0f} % of the mean square by which {channel} is off beyond its noise"
+    return f"{'; '.join(names)}: explains {much}, on rows that no fit has seen."
 
 
 def page(result: Result, use: CalibrationUse | None = None) -> str:
@@ -74,7 +105,7 @@ def page(result: Result, use: CalibrationUse | None = None) -> str:
             mark=None if use is None else use.mark,
             signature=signature_text(() if use is None else (use,)),
             diagnosis=diagnosis,
-            headline=headline(diagnosis),
+            headline=" ".join(filter(None, (cause(diagnosis), headline(diagnosis)))),
             lead=_lead(diagnosis),
             chart=chart,
             effects=[_effect(result, effect) for effect in diagnosis.effects],
@@ -83,6 +114,7 @@ def page(result: Result, use: CalibrationUse | None = None) -> str:
             held_out=_held_out(diagnosis),
             nominal_parameters=_nominal_parameters(diagnosis),
             remaining=_remaining(diagnosis),
+            rejected=_rejected(result),
             detectable=_detectable(diagnosis),
             unobservable=_unobservable(diagnosis),
             findings=table(
@@ -115,9 +147,11 @@ def _effect(result: Result, effect: FoundEffect) -> _Effect:
     rows = [
         (
             parameter.name,
-            parameter.value if isinstance(parameter.value, str) else f"{parameter.value:.4g}",
+            parameter.value
+            if isinstance(parameter.value, str)
+            else rounded(parameter.value, parameter.ci95)[0],
             parameter.unit,
-            "" if parameter.ci95 is None else f"{parameter.ci95[0]:.4g} to {parameter.ci95[1]:.4g}",
+            "" if isinstance(parameter.value, str) else rounded(parameter.value, parameter.ci95)[1],
             "all runs"
             if parameter.runs is None
             else ", ".join(parameter.runs) + condition(result, parameter.runs),
@@ -182,6 +216,14 @@ def _places(result: Result) -> Iterator[_Place]:
         in_time = figures.run_in_time(search, channel, after=after)
         drawn.append(Figure(svg=in_time, alt=f"{channel} in one run"))
         yield _Place(sentence=_place_sentence(mismatch), figures=drawn)
+    if not diagnosis.mismatch:
+        # "Nothing" is believed by whoever sees that the lines lie on each other.
+        for fit in diagnosis.held_out:
+            in_time = figures.run_in_time(search, fit.channel, after=after)
+            yield _Place(
+                sentence=f"{fit.channel}: nothing stands out of the noise. The run with the largest error:",
+                figures=[Figure(svg=in_time, alt=f"{fit.channel} in one run")],
+            )
 
 
 def _place_sentence(mismatch: Mismatch) -> str:
@@ -227,6 +269,27 @@ def _nominal_parameters(diagnosis: Diagnosis) -> Table:
 def _remaining(diagnosis: Diagnosis) -> Table:
     rows = [(channel, " and ".join(names)) for channel, names in diagnosis.depends_on[:8]]
     return table(("output", "depends on"), rows)
+
+
+def _rejected(result: Result) -> Table:
+    """Return the candidates that come nearest to what has no name, and why none of them is the name."""
+    from scipy.stats import chi2
+
+    search, rows = result.search, []
+    if search is not None and result.diagnosis.verdict == "unknown":
+        tests = max(len(search.scored), 1)
+        for trial in best_of(search.scored)[:_NEAREST]:
+            gain = trial.gain * trial.trust
+            if gain < float(chi2.isf(SCREENING.alpha / tests, trial.dof)):
+                why = "no more than chance gives in a search of this size"
+            elif search.skipped:
+                why = "the budget was spent before it was tried to the end"
+            else:
+                why = "it does not explain rows that no fit has seen, or not enough of them to matter"
+            rows.append((trial.candidate.key.label, f"{gain / 2:.1f}", why))
+    return table(
+        ("candidate", "log-likelihood gained, linearised", "why it is not named"), rows, numbers=(1,)
+    )
 
 
 def _detectable(diagnosis: Diagnosis) -> Table:
