@@ -10,7 +10,6 @@ SYSTEM := $(VENV)/.system
 JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
-TEST_PACKAGES := chromium
 
 .PHONY: demo test check golden house pages bench benchmarks crash coverage fuzz proof setup lock clean
 
@@ -88,6 +87,7 @@ $(SYSTEM): $(STAMP)
 	@touch $@
 
 # The browser in which tests look at the workbench. People open it in their own.
+TEST_PACKAGES := chromium
 $(BROWSER): $(STAMP)
 	@test -x /usr/bin/chromium || sh .ci/as-root apt-get-install $(TEST_PACKAGES)
 	@touch $@
