@@ -83,10 +83,11 @@ def _register() -> None:
     app.add_typer(machine.app, name="machine")
     app.add_typer(person.person, name="person")
     app.add_typer(person.ledger, name="ledger")
-    for module in (sign, audit, simulate, diagnose, verify, workbench):
+    for module in (sign, audit, simulate, diagnose, verify):
         app.command(module.NAME)(module.command)
     app.command("explain")(installation.explain)
     app.command("qualify")(installation.qualify)
+    app.command(workbench.NAME)(workbench.command)
 
 
 @cache
