@@ -86,10 +86,10 @@ $(SYSTEM): $(STAMP)
 	@$(BIN)/toolkit doctor --quiet || sh .ci/as-root apt-get-install $(APT_PACKAGES) || { $(BIN)/toolkit doctor; exit 1; }
 	@touch $@
 
-# What tests alone need: the browser in which they look at the workbench, and an independent check of seals.
-TEST_PACKAGES := chromium xmlsec1
+# What tests alone need: the browser in which they look at the workbench, and independent checks of seals and signatures.
+TEST_PACKAGES := chromium xmlsec1 openssh-client
 $(BROWSER): $(STAMP)
-	@{ test -x /usr/bin/chromium && test -x /usr/bin/xmlsec1; } || sh .ci/as-root apt-get-install $(TEST_PACKAGES)
+	@(for program in chromium xmlsec1 ssh-keygen; do test -x /usr/bin/$$program || exit 1; done) || sh .ci/as-root apt-get-install $(TEST_PACKAGES)
 	@touch $@
 
 # After a change of the dependencies: resolve again and pin every version with its hashes.
