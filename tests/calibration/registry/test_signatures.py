@@ -72,7 +72,8 @@ def _found(home: Path, policy: Policy | None = None) -> None:
 
 def _withdraw(home: Path, *signers: str) -> Registry:
     registry = _registry(home, *signers)
-    withdraw(registry, RECORD, on=date(2026, 11, 21), reason="the reference was not traceable", by="anna")
+    by = next(iter(signers), "anna")
+    withdraw(registry, RECORD, on=date(2026, 11, 21), reason="the reference was not traceable", by=by)
     return registry
 
 
