@@ -3,8 +3,10 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import openpyxl
@@ -302,3 +304,22 @@ def test_a_new_template_can_be_like_any_of_the_toolkits(tmp_path: Path, like: st
     assert answer(capsys)["findings"] == []
     with pytest.raises(typer.BadParameter):
         new(tmp_path / "other.docx", like="letter")
+
+
+@pytest.mark.parametrize(
+    ("words", "got"),
+    [({"issue": True, "draft": True}, "both"), ({"sign": ["anna"]}, "no --issue")],
+)
+def test_a_draft_is_never_issued_and_a_key_signs_an_issue(
+    tmp_path: Path, words: dict[str, Any], got: str
+) -> None:
+    if "sign" in words:
+        key = tmp_path / "anna"
+        command_line = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(key)]
+        subprocess.run(command_line, check=True)
+        words = {"sign": [key]}
+    (tmp_path / "calibrations").mkdir()
+    with pytest.raises(ConfigError) as refusal:
+        command([Path("any")], out=tmp_path / "out", home=tmp_path, **words)
+    assert (refusal.value.rule, refusal.value.got) == ("usage", got)
+    assert not (tmp_path / "out").exists()

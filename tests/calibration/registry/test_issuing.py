@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ from tests.calibration.registry.test_signatures import (
 )
 from toolkit.calibration.control.calibrate import rehearse
 from toolkit.calibration.registry import store
+from toolkit.calibration.registry.approval import withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.issuing import issue, issuers
 from toolkit.calibration.registry.people_log import enrol
@@ -96,7 +98,7 @@ def test_an_issue_changes_nothing_that_an_audit_rests_on_and_a_lost_key_does(hom
     enrol(home / "calibrations", people.with_person(lost), [KEYS["ben"]], by="ben", reason="lost", heads={})
     changed = _registry(home).digest("m15-virtual")
     assert changed != before
-    _withdraw(home, "ben")
+    withdraw(_registry(home, "ben"), RECORD, on=date(2026, 11, 21), reason="not traceable", by="ben")
     assert _registry(home).digest("m15-virtual") != changed
 
 
