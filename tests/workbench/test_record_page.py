@@ -149,17 +149,19 @@ def test_an_approval_that_lacks_something_says_what(own: Served, form: dict[str,
     assert own.registry.status("cell-r7").state == "candidate"
 
 
-def test_where_people_are_enrolled_the_page_shows_the_command_and_decides_nothing(own: Served) -> None:
+def test_where_people_are_enrolled_the_page_shows_the_command_and_decides_nothing(
+    own: Served, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     from toolkit.lab.people import enrol_person
     from toolkit.trust.keys import make_key, open_signer
 
-    signers = []
+    signers, keys = [], tmp_path_factory.mktemp("keys")
     for name in ("anna", "bert"):
-        make_key(own.home / name, "secret words", name)
-        signers.append(open_signer(own.home / name, lambda: "secret words"))
+        make_key(keys / name, "secret words", name)
+        signers.append(open_signer(keys / name, lambda: "secret words"))
     own.registry.signers = tuple(signers[:1])
     enrol_person(
-        own.registry, "anna", name="Anna", roles=("head",), key=own.home / "anna.pub", reason="first",
+        own.registry, "anna", name="Anna", roles=("head",), key=keys / "anna.pub", reason="first",
         recovery=signers[1],
     )  # fmt: skip
     page = own.page("/record/cell-r7")
