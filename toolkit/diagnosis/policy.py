@@ -269,6 +269,9 @@ class _Verdict:
     interval: float = _set(0.95, "probability", "of the confidence intervals that the contract promises")
     open_interval: float = _set(1e5, "times the value", "a wider interval is none: the data leave it open")
     power: float = _set(0.8, "probability", "with which the smallest detectable size would have been found")
+    far: float = _set(
+        1e3, "times the usual size", "a response is not in proportion over so many of its sizes"
+    )
     observable: float = _set(
         1e-3, "of a response", "left beside the nominal parameters, or nothing is seen of it"
     )

@@ -216,13 +216,15 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
     from toolkit.diagnosis.answer.answer import cut_short
     from toolkit.report.diagnosis.numbers import chance, rounded
-    from toolkit.report.diagnosis.page import cause
+    from toolkit.report.diagnosis.page import cause, simulated
 
     cut = answer.verdict == "unknown" and cut_short(answer.skipped)
     verdict = _CUT if cut else _VERDICTS[answer.verdict]
     if answer.verdict == "untestable" and answer.skipped:
         verdict = "the budget was spent before this recording could be judged"
-    lines = [f"{answer.title}: {' '.join(filter(None, (cause(answer), verdict)))}"]
+    mark = simulated(answer)
+    lines = [mark] if mark else []
+    lines.append(f"{answer.title}: {' '.join(filter(None, (cause(answer), verdict)))}")
     for effect in answer.effects:
         channel = f" on {effect.channel}" if effect.channel else ""
         lines += ["", f"{effect.name}{channel} ({effect.stage}): {effect.statement}", f"  {effect.equation}"]

@@ -112,7 +112,15 @@ def case_toml(
         lines.append('simulated = { FY = "FY_sim", MZ = "MZ_sim" }')
     for parameter in plan.case.parameters:
         lines += ["", f"[simulation.parameters.{parameter.name}]", *_parameter(parameter)]
-    lines += ["", "[recording]", 'time = "t"', 'axes = "machine"', "", "[recording.channels]"]
+    lines += [
+        "",
+        "[recording]",
+        'time = "t"',
+        'axes = "machine"',
+        "simulated = true",
+        "",
+        "[recording.channels]",
+    ]
     lines.append('t = { unit = "s", role = "time" }')
     lines += [f'{name} = {{ unit = {_text(unit_of(name))}, role = "{_role(name)}" }}' for name in inputs]
     judged = [*_judged(plan), *outputs]

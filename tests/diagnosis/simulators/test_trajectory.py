@@ -48,7 +48,7 @@ def solved(flow, starts):
         guess[:, :, at] = starts[:, :, i : i + 1]
     steps = np.ones(len(rows.t) - 1, dtype=np.intp)
     everyone = np.ones(starts.shape[1], dtype=bool)
-    return trajectories(flow, Path(guess, steps, None), np.ones(len(starts)), everyone)
+    return trajectories(flow, Path(guess, steps, None), np.full(len(starts), 20.0), everyone)
 
 
 def test_every_set_swings_at_its_own_frequency_in_every_run():
@@ -66,9 +66,9 @@ def test_every_set_swings_at_its_own_frequency_in_every_run():
 
 
 def test_energy_of_a_wide_pendulum_is_kept_over_many_swings():
-    t = np.linspace(0.0, 60.0, 3001)
-    flow = flow_of(wide, [run_of(t)], {"k": np.ones(1)})
-    path, reached = solved(flow, np.array([2.5, 0.0]).reshape(2, 1, 1))
+    t, sets = np.linspace(0.0, 60.0, 3001), 8
+    flow = flow_of(wide, [run_of(t)], {"k": np.ones(sets)})
+    path, reached = solved(flow, np.tile(np.array([2.5, 0.0]).reshape(2, 1, 1), (1, sets, 1)))
     assert reached.all()
     angle, rate = path.x[:, 0]
     np.testing.assert_allclose(rate**2 / 2 - np.cos(angle), -np.cos(2.5), atol=1e-5)

@@ -11,6 +11,8 @@ import pytest
 from tests.diagnosis.cases import carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.findings import Finding
+from toolkit.lab.diagnosis import diagnosis_text
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.maps import size_maps, variables
 from toolkit.report.diagnosis.numbers import chance, few, over
@@ -240,3 +242,11 @@ def test_a_long_curve_keeps_its_extremes():
     assert values.max() == 7.0
     assert values.min() == -9.0
     assert len(figures.drawn(t[:900], y[:900])[0]) == 900
+
+
+def test_simulated_recordings_are_marked_on_the_page_and_the_console(dragged, tmp_path):
+    note = Finding(rule="case-simulated", where="CASE.toml", level="note", message="simulated")
+    marked = dataclasses.replace(dragged.diagnosis, findings=(note,))
+    assert "SIMULATED DATA" in page(dataclasses.replace(dragged, diagnosis=marked))
+    assert diagnosis_text(marked, tmp_path).startswith("SIMULATED DATA")
+    assert "SIMULATED" not in page(dragged) + diagnosis_text(dragged.diagnosis, tmp_path)

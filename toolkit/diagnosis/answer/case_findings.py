@@ -24,6 +24,13 @@ def case_findings(problem: Problem) -> tuple[Finding, ...]:
     """Return notes on the recordings, one run only or inputs interpolated, and what the model has to tell."""
     case = problem.case
     findings: list[Finding] = list(problem.model.capability.findings)
+    if case.simulated:
+        findings.append(
+            Finding(
+                rule="case-simulated", where=case.path.name, level="note",
+                message="the recordings are simulated: no real machine was measured",
+            )
+        )  # fmt: skip
     if len(problem.runs) == 1:
         findings.append(
             Finding(

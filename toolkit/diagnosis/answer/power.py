@@ -38,8 +38,9 @@ def not_found(
         visible = share > VERDICT.observable and length > 0
         needed = _noncentrality(alpha, trial.dof)
         size = abs(amplitude) * needed / length if visible and amplitude else None
-        if size is not None and needed / length * _moved(screen, trial) > 1:
-            # A size at which the output would leave its own range has been seen by nobody.
+        times = needed / length if size is not None else 0.0
+        if times * _moved(screen, trial) > 1 or times > VERDICT.far:
+            # At such a size the output would leave its own range, or nothing is known of the response.
             visible, beyond = False, beyond | {name}
         smallest = best.get(name)
         if (
@@ -66,7 +67,7 @@ def not_found(
         size, unit, visible = best[name]
         why = "" if visible else "its response vanishes here, or the free parameters take it all"
         if not visible and name in beyond:
-            why = "it would not have been seen at any size that leaves the outputs within their own range"
+            why = "it would not have been seen at any usual size that leaves the outputs in their own range"
         entries.append(NotFound(name=name, minimum_detectable=size, unit=unit, observable=visible, why=why))
     return tuple(entries)
 

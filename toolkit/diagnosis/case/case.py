@@ -79,7 +79,7 @@ class Case:
 
     ``effects`` are those that its simulation has from the start, of a model file or a corrected machine;
     ``model`` is that file; ``nominal_load_N`` the load to which their parameters are counted, None for that
-    of the recordings.
+    of the recordings; ``simulated`` says that these are no recordings of a real machine.
     """
 
     path: Path
@@ -95,6 +95,7 @@ class Case:
     effects: tuple[FittedEffect, ...] = ()
     nominal_load_N: float | None = None
     model: Path | None = None
+    simulated: bool = False
 
     @property
     def outputs(self) -> tuple[CaseChannel, ...]:

@@ -34,6 +34,9 @@ class Recording:
 
     time: Annotated[str | None, Entry("channel of the time; default: that of role time", example="t")] = None
     axes: Annotated[Axes, Entry("of SA, FY and MZ; FZ is the load, positive, in all of them")] = "machine"
+    simulated: Annotated[
+        bool, Entry("the recordings are simulated as well: every answer says so", example=True)
+    ] = False
     channels: Annotated[
         tuple[CaseChannel, ...], Keyed(by="name"),
         Entry("every column that is used", example={

@@ -73,6 +73,7 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
         effects=(*(() if model_file is None else model_file.effects), *corrections_of(simulation)),
         nominal_load_N=None if model_file is None else model_file.nominal_load_N,
         model=model_path,
+        simulated=recording.simulated,
     )
 
 

@@ -385,11 +385,13 @@ class OdeModel:
         try:
             with silenced():
                 atol = self._tolerance(start, acting, acting.added)
-                return integrate(rate, run.t, begun, atol, acting.slides(len(self.states)))
+                x = integrate(rate, run.t, begun, atol, acting.slides(len(self.states)))
         except IntegrationError as error:
             raise failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+        self._near[run] = x[: len(self.states)]
+        return x
 
     def _tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
         """Return the absolute tolerance of every state, ``added`` ones among them."""

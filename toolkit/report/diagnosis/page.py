@@ -64,6 +64,12 @@ def headline(diagnosis: Diagnosis) -> str:
     return HEADLINES[diagnosis.verdict]
 
 
+def simulated(diagnosis: Diagnosis) -> str | None:
+    """Return the mark of an answer on recordings that are simulated, None on real ones."""
+    rules = {finding.rule for finding in diagnosis.findings}
+    return "SIMULATED DATA: no real machine was measured" if "case-simulated" in rules else None
+
+
 def cause(diagnosis: Diagnosis) -> str | None:
     """Return the effects with their sizes and the share that they explain; None where none was found."""
     if not diagnosis.effects:
@@ -102,7 +108,7 @@ def page(result: Result, use: CalibrationUse | None = None) -> str:
     return "".join(
         page_parts(
             Path(__file__).parent,
-            mark=None if use is None else use.mark,
+            mark=" - ".join(filter(None, (simulated(diagnosis), None if use is None else use.mark))) or None,
             signature=signature_text(() if use is None else (use,)),
             diagnosis=diagnosis,
             headline=" ".join(filter(None, (cause(diagnosis), headline(diagnosis)))),
