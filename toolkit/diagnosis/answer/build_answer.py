@@ -65,7 +65,10 @@ def answer_of(case: Case, search: Search, findings: tuple[Finding, ...]) -> Diag
         nominal_parameters=nominal,
         held_out=_held_out(search, unknown=unknown),
         held_out_by=search.folds.told(len(search.problem.runs)),
-        depends_on=tuple((structure.output, structure.variables) for structure in search.structure),
+        depends_on=tuple(
+            (structure.output, structure.variables)
+            for structure in search.structure or (search.structure_before if unknown else ())
+        ),
         not_found=not_found(search.screen, search.scored, names, alpha=SCREENING.alpha / tests, units=units),
         next_measurements=next_measurements(search, effects, verdict),
         findings=(*findings, *_outliers(case, search), *refit_findings(case, search)),
@@ -84,9 +87,11 @@ def mostly_unknown(search: Search) -> bool:
     """
     if search.steps and implausible(search):
         return True
+    shown = _taken(search)
+    if search.steps and not shown and _is_smooth(search):
+        return True
     if not search.structure:
         return False
-    shown = _taken(search)
     if any(removed > VERDICT.nearly * above for removed, above in shown):
         return False
     unexplained = max(
@@ -98,6 +103,25 @@ def mostly_unknown(search: Search) -> bool:
     if all(step.active.effect.from_digits for step in search.steps):
         return not search.steps  # read off the digits: it does not imitate anything
     return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
+
+
+def _is_smooth(search: Search) -> bool:
+    """Tell whether a smooth discrepancy without a name explains more than the effects, parameters counted.
+
+    A simulation is never exact: what it misses by a part in a thousand is smooth, and some effect imitates a
+    share of it. Asked of effects that show in no output above the noise; a larger one has a law of its own.
+    """
+    if all(step.active.effect.from_digits for step in search.steps):
+        return False
+    n = sum(int(counted.sum()) for counted in search.problem.kept.values())
+    cost = 0.5 * math.log(n)  # of a parameter (BIC)
+    named = sum(step.gain - cost * len(step.active.searched) for step in search.steps)
+    nameless = (
+        structure.gain / 2 - cost * structure.columns
+        for structure in search.structure_before
+        if structure.columns and not structure.rest
+    )
+    return max(nameless, default=-math.inf) > named + VERDICT.close
 
 
 def _taken(search: Search) -> list[tuple[float, float]]:

@@ -185,7 +185,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 if not _is_nuisance(step, steps):
                     steps.append(step)
                 continue
-            if turn + 2 > STEP.most_effects:
+            # Of a residual without structure no two effects explain what no single one does.
+            if not structure or turn + 2 > STEP.most_effects:
                 break
             budget.check(f"step {turn + 1}: pairs of candidates")
             least = STEP.later if turn else STEP.first
@@ -193,7 +194,9 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             if both is None:
                 break
             base, held_base, pair = both
-            steps += pair
+            for step in sorted(pair, key=lambda step: step.active.effect.is_zero):
+                if not _is_nuisance(step, steps):
+                    steps.append(step)
         base, held_base = refined(problem, folds, base, held_base, listed)
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:

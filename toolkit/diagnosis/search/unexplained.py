@@ -86,7 +86,8 @@ class StructureFound:
     """Structure that stays: where it is, and its p-value in the search.
 
     A ``rest`` is only larger than noise may be, or differs from run to run: it follows nothing that an effect
-    could imitate, and no effect beside it is withdrawn because of it.
+    could imitate, and no effect beside it is withdrawn because of it. ``columns`` are the parameters of a
+    smooth dependence; a line and a rest have none.
     """
 
     output: str
@@ -94,6 +95,7 @@ class StructureFound:
     gain: float
     p_value: float
     rest: bool = False
+    columns: int = 0
 
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -119,6 +121,7 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
             gain=gain,
             p_value=p,
             rest=dependence.variables == RUNS,
+            columns=dependence.columns.shape[1],
         )
         for dependence, gain, p in zip(listed, gains, p_values, strict=True)
         if p < STRUCTURE.alpha and _share(problem, base, dependence) > STEP.first

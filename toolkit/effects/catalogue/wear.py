@@ -39,6 +39,7 @@ EFFECT = Effect(
             unit="1/kJ",
             text="relative change of the slope for each kJ of slip work",
             typical=(1e-05, 0.001),
+            bounds=(0.0, float("inf")),  # a tread that wears thin is stiffer, never softer
         ),
     ),
     drive=_worn,
