@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -146,6 +147,16 @@ def test_an_answer_is_refused_once_the_ledger_has_moved_on(run: Run) -> None:
     code, _, error = run(*DECISION, "--answer", "../r.anna.json")
     assert (code, "new request" in error, "1 entry later" in error) == (2, True, True)
     assert Registry(Path("calibrations")).status(RECORD).state == "approved"
+
+
+def test_an_answer_is_refused_once_the_people_have_changed(run: Run) -> None:
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    assert run("sign", "../r.json", "--key", "../keys/anna", "--yes")[0] == 0
+    time.sleep(1.1)  # the log of people counts seconds
+    policy = ("person", "policy", "withdraw", "--role", "head", "--reason", "x", "--sign", "../keys/anna")
+    assert run(*policy, "--signatures", "2")[0] == 0
+    code, _, error = run(*DECISION, "--answer", "../r.anna.json")
+    assert (code, "the people of the laboratory changed" in error) == (2, True), error
 
 
 def test_a_request_and_its_answer_are_two_steps_of_a_laboratory_with_people(run: Run) -> None:

@@ -141,6 +141,8 @@ def test_a_ledger_that_became_another_is_told_of_every_document(
     assert issued.continuity(file) == continuity
     verdict = issued.verify(file)
     assert (verdict.ledger, verdict.code) == (continuity, 1)
+    # A ledger that was only cut off is sound in itself, and so is its record.
+    assert verdict.still_holds is (attack is _rolled_back)
     assert verdict.signature == ("valid" if kind == "sealed" else "unsigned")
 
 
@@ -231,6 +233,16 @@ def test_a_record_and_its_ledger_are_verified_too(issued: Issued) -> None:
     _rewritten(issued.home)
     assert issued.verify(folder / "ledger.jsonl").code == 2
     assert issued.verify(issued.home / "people/ledger.jsonl").signature == "valid"
+
+
+def test_a_manifest_that_was_not_issued_still_names_its_records(issued: Issued, tmp_path: Path) -> None:
+    sha256 = _registry(issued.home).load(RECORD).sha256
+    manifest = tmp_path / "manifest.json"
+    manifest.write_text(json.dumps({"outputs": [], "calibrations": [{"id": RECORD, "sha256": sha256}]}))
+    assert issued.verify(manifest).still_holds is True
+    withdraw(_registry(issued.home, "anna"), RECORD, on=date(2026, 11, 21), reason="sign", by="anna")
+    verdict = issued.verify(manifest)
+    assert (verdict.signature, verdict.still_holds, verdict.code) == ("unsigned", False, 1)
 
 
 def test_who_may_not_issue_leaves_nothing(issued: Issued) -> None:

@@ -240,19 +240,25 @@ def ledger_file_state(path: Path) -> LedgerState:
 
 
 def _standing(registry: Registry, name: Named) -> LedgerState:
+    from toolkit.calibration.registry.registry import instrument_of
+
+    try:
+        if name.record not in registry.ids(instrument_of(name.record)):
+            return LedgerState()
+    except ToolkitError:
+        return LedgerState()  # no name of a record
     try:
         record = registry.load(name.record)
-        status = registry.status(name.record)
-    except ToolkitError:
-        return LedgerState()
+        status, signed = registry.status(name.record), registry.signature(name.record)
+    except ToolkitError as error:
+        return LedgerState(
+            still_holds=False, why=f"record {name.record} fails here: {error.what}: {error.got}"
+        )
+    decided_by = None if signed == UNSIGNED else signed
     if record.sha256 != name.sha256:
         return LedgerState(still_holds=False, why=f"record {name.record} here is another one")
     if status.state in ("withdrawn", "discarded"):
         reason = f": {status.reason}" if status.reason else ""
-        return LedgerState(still_holds=False, why=f"record {name.record} was {status.state} since{reason}")
-    signed = registry.signature(name.record)
-    return LedgerState(
-        still_holds=True,
-        why=f"record {name.record} is {status.state}",
-        decided_by=None if signed == UNSIGNED else signed,
-    )
+        why = f"record {name.record} was {status.state} since{reason}"
+        return LedgerState(still_holds=False, why=why, decided_by=decided_by)
+    return LedgerState(still_holds=True, why=f"record {name.record} is {status.state}", decided_by=decided_by)

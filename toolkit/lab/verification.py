@@ -271,7 +271,8 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
         why = f"{name} does not list the other files"
         return Verdict(file=str(path), kind="manifest", signature="unsigned", why=why)
     check = SealCheck(signature="unsigned", why=f"{len(hashes)} files as listed; no sealed PDF proves it")
-    proof = carried({PROOF: json.dumps({"ledger": document.get("ledger")}).encode()}, where=path)
+    content = {"ledger": document.get("ledger"), "records": document.get("calibrations", [])}
+    proof = carried({PROOF: json.dumps(content).encode()}, where=path)
     if proof.anchor is not None and (broken := _manifested(proof.anchor, hashes)):
         return Verdict(file=str(path), kind="manifest", why=broken)
     return _verdict(path, "manifest", check, proof, document.get("report"), ledger)

@@ -184,8 +184,12 @@ def shown(value: object) -> str:
     )
 
 
-def check_standing(request: Request, *, seq: int, prev: str, now: datetime | None = None) -> None:
-    """Refuse an answer that no longer extends the ledger, or has waited too long.
+def check_standing(
+    request: Request, *, seq: int, prev: str, since: str = "", now: datetime | None = None
+) -> None:
+    """Refuse an answer that no longer extends the ledger, is of other people, or has waited too long.
+
+    ``since`` is the time of the newest version of the people.
 
     Raises
     ------
@@ -200,6 +204,11 @@ def check_standing(request: Request, *, seq: int, prev: str, now: datetime | Non
             "the ledger is no longer the one that was signed for", request.path,
             f"{what}: its next entry is {seq} after {prev[:12]}",
             f"entry {body['seq']} after {str(body['prev'])[:12]}", _AGAIN,
+        )  # fmt: skip
+    if request.time < since:
+        raise bad_request(
+            "the people of the laboratory changed since the request was made", request.path,
+            f"made at {request.time}", f"a time from {since} on", _AGAIN,
         )  # fmt: skip
     at, present = moment(request.time), now or datetime.now(tz=UTC)
     if at is None or not -timedelta(minutes=5) <= present - at <= HOLDS:

@@ -17,15 +17,19 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from toolkit.calibration.records.use import signature_of
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.clock import now
+from toolkit.calibration.registry.clock import day_of, now
+from toolkit.calibration.registry.issuing import issuers
 from toolkit.calibration.registry.ledger import START, head_bytes, next_line
 from toolkit.calibration.registry.people_log import enrol, place_of
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.lab.home import packaged_home
+from toolkit.lab.proofs import registry_ledger
+from toolkit.lab.verification import verify_file
 from toolkit.trust.keys import Signer
 from toolkit.trust.people import NAMESPACE, Demand, Key, People, Person, Policy, Role
+from toolkit.trust.seal.x509 import Trust
 from toolkit.trust.ssh import public_of, sign_with
 
 RECORD = "m15-virtual-r1"
@@ -81,6 +85,16 @@ def test_a_laboratory_without_people_works_unsigned(home: Path) -> None:
     registry = _withdraw(home)
     assert registry.status(RECORD).state == "withdrawn"
     assert registry.ledger("m15-virtual").entries[-1].signatures == ()
+
+
+def test_a_key_that_would_prove_nothing_is_refused(home: Path) -> None:
+    """Nobody is enrolled: who gives a key would take the entry for a signed one."""
+    with pytest.raises(TrustError, match="nobody is enrolled"):
+        _withdraw(home, "anna")
+    with pytest.raises(TrustError, match="nobody is enrolled"):
+        issuers(_registry(home, "anna"), RECORD)
+    assert _registry(home).status(RECORD).state != "withdrawn"
+    assert issuers(_registry(home), RECORD) == ()
 
 
 def test_a_signed_decision_is_proved_by_openssh_from_the_ledger_alone(home: Path, tmp_path: Path) -> None:
@@ -315,3 +329,18 @@ def test_the_people_who_signed_a_record_are_named(tmp_path: Path, make_session: 
         heads={},
     )
     assert _registry(tmp_path).signature("hub-r1") == "unsigned"
+
+
+def test_a_signed_record_stays_signed_once_it_is_withdrawn(
+    tmp_path: Path, make_session: Callable[..., Path]
+) -> None:
+    (tmp_path / "calibrations").mkdir()
+    _found(tmp_path)
+    calibrate(make_session(), _registry(tmp_path, "carl"))
+    approval = {"in_force_from": date(2026, 2, 1), "checked_by": "Dora"}
+    assert approve(_registry(tmp_path, "dora"), "hub-r1", **approval).done
+    path, ledger = tmp_path / "calibrations/hub/hub-r1.json", registry_ledger(lambda: _registry(tmp_path))
+    assert verify_file(path, Trust(), ledger=ledger).code == 0
+    withdraw(_registry(tmp_path, "anna"), "hub-r1", on=day_of(now()), reason="cell", by="anna")
+    verdict = verify_file(path, Trust(), ledger=ledger)
+    assert (verdict.signature, verdict.still_holds, verdict.code) == ("valid", False, 1)

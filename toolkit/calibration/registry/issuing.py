@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.ledger import Ledger
+from toolkit.calibration.registry.signatures import nobody
 from toolkit.calibration.registry.store import Change
 from toolkit.errors import RegistryError, TrustError
 from toolkit.trust.people import objections
@@ -32,6 +33,8 @@ def issuers(registry: Registry, record_id: str) -> tuple[str, ...]:
     """
     version = registry.people().history.now
     if version is None:
+        if registry.signers:
+            raise nobody(record_id)
         return ()
     publics = [signer.public for signer in registry.signers]
     reasons = objections(version, "issue", now(), publics)

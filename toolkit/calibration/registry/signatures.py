@@ -30,8 +30,10 @@ def timed_event(event: Mapping[str, Any], ledger: Ledger, signing: Signing | Non
         ``request``: an answer no longer extends this ledger, or has waited too long
     """
     answers = () if signing is None else signing.travel.answers
+    version = None if signing is None else signing.history.now
     for answer in answers:
-        check_standing(answer, seq=len(ledger.entries) + 1, prev=ledger.head)
+        since = "" if version is None else version.since
+        check_standing(answer, seq=len(ledger.entries) + 1, prev=ledger.head, since=since)
     if not answers:
         return {**event, "clock": clock_state()}
     return {**event, **{key: answers[0].body.get(key) for key in ("time", "clock")}}
@@ -59,8 +61,8 @@ def signed_event(
         the decision was written to a file to be signed elsewhere
     """
     if signing.history.now is None:
-        if signing.travel != HERE:
-            raise _nobody(event)
+        if signing.signers or signing.travel != HERE:
+            raise nobody(event["id"])
         return dict(event)
     event = {**event, **({"action": action} if action else {})}
     signing.demand_key(action_of(event), event["id"])
@@ -179,10 +181,11 @@ def _operators(ledger: Ledger, record_id: str) -> tuple[str, ...]:
     return () if entered is None else (*signers_of(entered), entered.by)
 
 
-def _nobody(event: Mapping[str, Any]) -> TrustError:
+def nobody(where: object) -> TrustError:
+    """Return the refusal of a signature where it would prove nothing."""
     return TrustError(
-        "nobody is enrolled who could sign", where=event["id"], got="a laboratory without people",
+        "nobody is enrolled who could sign", where=where, got="a laboratory without people",
         expected="people whose keys sign: toolkit person enrol",
-        next_step="decide without --request and --answer, or enrol people first; nothing was changed",
+        next_step="decide without --sign, --request and --answer, or enrol people first; nothing was changed",
         rule="request",
     )  # fmt: skip
