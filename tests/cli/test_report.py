@@ -318,8 +318,9 @@ def test_a_draft_is_never_issued_and_a_key_signs_an_issue(
         command_line = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(key)]
         subprocess.run(command_line, check=True)
         words = {"sign": [key]}
-    (tmp_path / "calibrations").mkdir()
+    home = tmp_path / "home"
+    (home / "calibrations").mkdir(parents=True)
     with pytest.raises(ConfigError) as refusal:
-        command([Path("any")], out=tmp_path / "out", home=tmp_path, **words)
+        command([Path("any")], out=tmp_path / "out", home=home, **words)
     assert (refusal.value.rule, refusal.value.got) == ("usage", got)
     assert not (tmp_path / "out").exists()

@@ -52,6 +52,8 @@ def test_no_template_holds_words_beside_the_catalogue() -> None:
             path.read_text(),
             flags=re.DOTALL,
         )
+        if path.name in ("refused.html.j2", "way_in.html.j2"):
+            continue  # before anybody is let in: no language is asked for
         words = [match[1].strip() for match in between.finditer(text)]
         assert [word for word in words if word != "sha256"] == [], path.name
 

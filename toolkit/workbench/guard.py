@@ -26,6 +26,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import HTMLResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from toolkit.workbench.page import bare_page
+
 LARGEST_FORM = 65_536
 """Bytes of a form: names, a date, a reason."""
 
@@ -166,13 +168,7 @@ class Guard:
             return _page(403, "This key is of another run of the workbench.")
         # No redirect: the browser would still count it as asked by whoever opened the address, and keep the
         # cookie back. The page that follows is asked by our own.
-        home = f"{self.keys.place}/"
-        response = HTMLResponse(
-            '<!doctype html><html lang="en"><meta charset="utf-8"><title>Workbench</title>'
-            '<link rel="icon" href="data:,">'
-            f'<meta http-equiv="refresh" content="0; url={home}">'
-            f'<p><a href="{home}">Open the workbench</a></p>'
-        )
+        response = HTMLResponse(bare_page("way_in", address=f"{self.keys.place}/"))
         response.set_cookie(
             COOKIE, self.keys.cookie, path=self.keys.place, httponly=True, samesite="strict",
             secure=self.origin.startswith("https:"),
@@ -189,10 +185,7 @@ def _cookie(headers: Headers) -> str:
 
 
 def _page(status: int, reason: str) -> HTMLResponse:
-    text = reason.replace("&", "&amp;").replace("<", "&lt;")
-    return HTMLResponse(
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Workbench</title><p>{text}</p>', status
-    )
+    return HTMLResponse(bare_page("refused", reason=reason), status)
 
 
 def _with_headers(send: Send) -> Send:

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, pass_context
 from jinja2.runtime import Context
-from markupsafe import Markup
 from starlette.responses import HTMLResponse
 
 from toolkit.lab.answers import one_line
-from toolkit.report.pages.kit import environment
+from toolkit.report.pages.kit import data, environment
 from toolkit.workbench.words import decimal_sign, preferred, translations
 
 if TYPE_CHECKING:
@@ -35,6 +34,11 @@ def templates(language: str) -> Environment:
     drawn.globals |= {"language": language, "number": _number}
     drawn.filters |= {"chart": _chart, "one_line": one_line}
     return drawn
+
+
+def bare_page(name: str, **context: object) -> str:
+    """Return a page that nobody has been let into yet: without layout, language or scripts."""
+    return environment(TEMPLATES).get_template(f"{name}.html.j2").render(context)
 
 
 def page(request: Request, name: str, *, status: int = 200, **context: object) -> HTMLResponse:
@@ -58,15 +62,15 @@ def is_part(request: Request) -> bool:
 
 
 @pass_context
-def _number(context: Context, value: float | None, form: str = ".4g", unit: str = "") -> Markup:
+def _number(context: Context, value: float | None, form: str = ".4g", unit: str = "") -> str:
     """Return a number with its unit; the element's ``value`` is the number itself, as the JSON has it."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return Markup("<span>–</span>")
+        return "–"
     digits = format(value, form).replace(".", decimal_sign(context["language"])).replace("-", "\u2212")
     text = f"{digits}\u00a0{unit}" if unit else digits
-    return Markup('<data value="{}">{}</data>').format(json.dumps(value), text)
+    return data(json.dumps(value), text)
 
 
-def _chart(content: Mapping[str, Any]) -> Markup:
+def _chart(content: Mapping[str, Any]) -> str:
     """Return a chart's content as the text of an attribute, from which the page's script draws it."""
-    return Markup("{}").format(json.dumps(content, allow_nan=False))
+    return json.dumps(content, allow_nan=False)

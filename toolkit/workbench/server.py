@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
 from toolkit.workbench.guard import Guard, Keys
+from toolkit.workbench.page import bare_page
 
 if TYPE_CHECKING:
     import uvicorn
@@ -142,10 +143,7 @@ def _way_in(folder: Path, address: str) -> Path:
     The command line of a browser is read by every user of the computer: the key must not stand in it.
     """
     page = folder / "workbench.html"
-    page.write_text(
-        f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={address}">',
-        encoding="utf-8",
-    )
+    page.write_text(bare_page("way_in", address=address), encoding="utf-8")
     return page
 
 

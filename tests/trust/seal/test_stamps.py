@@ -98,9 +98,8 @@ def test_a_server_that_gives_none_is_an_error_that_says_so() -> None:
 def test_a_sealed_document_takes_its_stamp_from_the_same_server(tmp_path: Path) -> None:
     root, _ = stamps()
     path = tmp_path / "report.pdf"
-    path.write_bytes(plain_pdf())
     with served() as url:
-        Sealing(key=key(), stamps=url).seal_file(path, (), document="report", records=())
+        path.write_bytes(Sealing(key=key(), stamps=url).seal_pdf(plain_pdf(), "report"))
     trust = Trust(certificates=(root.certificate, *key().chain))
     assert check_pdf(path.read_bytes(), trust).stamped
 

@@ -217,12 +217,20 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
             far = np.abs(away) > ROWS.isolated * max(scale, steps, 1e-300)
             beside = _moved_sharply(problem, rows)[places - rows.start]
-            if far.any() and np.mean(beside[far]) > ROWS.sharp > np.mean(beside):
+            if _answers(beside, far):
                 far &= ~beside
             if 0 < far.sum() <= max(1, ROWS.outliers * len(places)):
                 good[places[far]] = False
         counted[name] = good
     return replace(problem, kept=counted)
+
+
+def _answers(beside: NDArray[np.bool_], far: NDArray[np.bool_]) -> bool:
+    """Tell whether rows far off stand beside sharp moves more often than chance puts them there."""
+    from scipy.stats import binom
+
+    count, hit, share = int(far.sum()), int((far & beside).sum()), float(np.mean(beside))
+    return hit > ROWS.sharp * count and float(binom.sf(hit - 1, count, share)) < ROWS.coincidence
 
 
 def _moved_sharply(problem: Problem, rows: slice) -> NDArray[np.bool_]:

@@ -54,7 +54,8 @@ def ranked_pairs(screen: LinearisedFit, scored: Sequence[Scored]) -> list[Pair]:
     couples = [
         (i, j)
         for i, j in itertools.combinations(range(len(listed)), 2)
-        if listed[i].candidate.key != listed[j].candidate.key
+        # One effect in two groups of runs is one effect: single steps try its groups.
+        if listed[i].candidate.active.effect.name != listed[j].candidate.active.effect.name
     ]
     # The likeliest starts were chosen among all: as many pairs were looked at as all of them make.
     tests = math.comb(len(scored), 2)
@@ -119,7 +120,7 @@ def best_pair(
             continue
         if held_out.total - held_base.total < 2 * STEP.least_gain:
             continue
-        if not matters(problem, held_base, held_out, least):
+        if not matters(problem, held_base, held_out, max(least, PAIRS.least)):
             continue
         steps = tuple(
             _needed(problem, folds, joint, held_out, position, p_value, fitted) for position in (-2, -1)

@@ -100,6 +100,11 @@ def page_parts(folder: Path, *, signature: str = UNSIGNED, **context: object) ->
     return template.generate(policy=policy, style=style, script=script, signature=signature, **context)
 
 
+def data(value: str, text: str) -> Markup:
+    """Return a text whose element holds the value itself, unrounded."""
+    return Markup('<data value="{}">{}</data>').format(value, text)
+
+
 def facts(title: str, texts: Mapping[str, str]) -> Markup:
     """Return named texts as a small table for a notebook; a fact without a text is left out."""
     parts: Any = environment(KIT).get_template("parts.html.j2").module
