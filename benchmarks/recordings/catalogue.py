@@ -112,8 +112,9 @@ RECORDINGS: tuple[Recording, ...] = (
         names=("coulomb_friction",),
         files={"RobotArm.mat": "e1b3699b2ecf8dec54b33badb3a63160a6ce7c8cbf84e1616575b7901d688421"},
         runs=readers.robot_arm,
-        missing="dry friction of the motor, and two flexible links behind it (Wernholt and Gunnarsson, IFAC "
-        "SYSID 2006, of the same arm, recalled and not read again); simulated: one inertia with viscous friction",
+        missing="dry friction of the motor, and two flexible links behind it (Wernholt and Gunnarsson, "
+        "IFAC SYSID 2006, of the same arm, recalled and not read again); simulated: one inertia with "
+        "viscous friction",
     ),
     Recording(
         name="coasting_car", published_at=_COAST, licence=_CITE, kind="named",
