@@ -31,7 +31,9 @@ def answer_of(case: Path, out: Path, *, budget_s: float) -> tuple[dict[str, Any]
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if run.returncode not in (0, 1):
-        raise ToolkitError("the diagnosis ended with an error", where=case, got=run.stderr.strip()[-400:])
+        raise ToolkitError(
+            f"the diagnosis ended with exit code {run.returncode}", where=case, got=run.stderr.strip()[-400:]
+        )
     answer = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     return answer, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 

@@ -33,7 +33,7 @@ def table(answers: Iterable[Answer]) -> str:
             row.remark or said,
             row.outcome,
             row.errors,
-            f"{row.processor_s:.0f}",
+            f"{row.processor_s:.0f}" if row.verdict else "",
         )
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
