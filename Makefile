@@ -11,7 +11,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden house pages bench benchmarks crash coverage fuzz proof setup lock clean
+.PHONY: demo test check golden house pages bench benchmarks recordings crash coverage fuzz proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -52,6 +52,11 @@ crash: setup
 benchmarks: setup
 	@test -n "$(DATA)" || { echo "make benchmarks DATA=DIR: the folder of the publishers' files, see docs/benchmarks.md" >&2; exit 2; }
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks $(DATA)
+
+# The diagnosis on real recordings, failures first: DATA is the folder of the publishers' files (docs/recordings.md).
+recordings: setup
+	@test -n "$(DATA)" || { echo "make recordings DATA=DIR: the folder of the publishers' files, see docs/recordings.md" >&2; exit 2; }
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.recordings $(DATA)
 
 # How often printed intervals hold the truth: tables with exact binomial intervals, some minutes.
 REPETITIONS ?= 60

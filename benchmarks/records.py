@@ -118,7 +118,7 @@ def published(path: Path, sha256: str) -> Path:
     if not path.is_file():
         raise AbsentError(
             "a file of a public set is not there", where=path, expected=f"the file with SHA-256 {sha256}",
-            next_step="docs/benchmarks.md says where it is published",
+            next_step="docs/benchmarks.md or docs/recordings.md says where it is published",
         )  # fmt: skip
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     if digest != sha256:
@@ -127,6 +127,7 @@ def published(path: Path, sha256: str) -> Path:
             where=path,
             got=f"SHA-256 {digest}",
             expected=f"SHA-256 {sha256}",
-            next_step="take the publisher's own file, unconverted; docs/benchmarks.md says where it is",
+            next_step="take the publisher's own file, unconverted; docs/benchmarks.md or docs/recordings.md "
+            "says where it is",
         )
     return path

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import os
-import resource
 import shutil
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from benchmarks.command import answer_of, entry
 from benchmarks.records import PublicSet, Record, Split
-from toolkit.errors import ToolkitError
 
 CASES = Path(__file__).parent / "cases"
 STAGES = ("nominal", "refitted", "augmented")
@@ -81,29 +75,13 @@ def diagnose(public: PublicSet, split: Split, folder: Path, *, budget_s: float) 
     ToolkitError : where the command ends with an error
     """
     case, out = write_case(public, split, folder / "case"), folder / "answer"
-    command = [str(Path(sys.executable).with_name("toolkit")), "diagnose", str(case), "--out", str(out)]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    run = subprocess.run(
-        [*command, "--budget", str(budget_s), "--quiet"],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ,
-    )
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    if run.returncode not in (0, 1):
-        raise ToolkitError("the diagnosis ended with an error", where=case, got=run.stderr.strip()[-400:])
-    answer = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+    answer, processor_s = answer_of(case, out, budget_s=budget_s)
     return Answer(
         verdict=answer["verdict"], remaining=answer["remaining"], complete=bool(answer["complete"]),
         refitted=_REFIT not in answer["skipped"],
-        effects=tuple(_entry(effect) for effect in answer["effects"]), errors=_errors(public, split, out),
-        processor_s=after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+        effects=tuple(entry(effect) for effect in answer["effects"]), errors=_errors(public, split, out),
+        processor_s=processor_s,
     )  # fmt: skip
-
-
-def _entry(effect: dict[str, Any]) -> str:
-    return " = ".join([effect["name"], *effect["equivalent_to"]])
 
 
 def _errors(public: PublicSet, split: Split, out: Path) -> dict[str, tuple[float, ...]]:
