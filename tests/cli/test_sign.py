@@ -19,7 +19,7 @@ from toolkit.lab.home import packaged_home
 from toolkit.trust.keys import make_key
 
 Run = Callable[..., tuple[int, str, str]]
-RECORD = "m15-virtual-r1"
+RIG, RECORD = "m15-virtual", "m15-virtual-r1"
 DECISION = (
     "calibration",
     "withdraw",
@@ -297,3 +297,12 @@ def test_what_nobody_could_read_again_or_change_again_is_never_entered(run: Run)
         assert run(*words)[0] == 2, words
         assert Path("people/ledger.jsonl").read_bytes() == before
     assert run(*enrol, "--key", "../keys/emil.pub", "--name", "Emil")[0] == 0
+
+
+@pytest.mark.parametrize(
+    "words", [("m51",), ("m15-virtual", "--entry", "0"), ("m15-virtual", "--entry", "99")]
+)
+def test_a_proof_of_what_is_not_in_the_ledger_is_refused(run: Run, words: tuple[str, ...]) -> None:
+    code, out, error = run("ledger", "prove", *words)
+    assert (code, out) == (2, ""), error
+    assert "no such entry" in error

@@ -30,6 +30,7 @@ from toolkit.errors import (
 from toolkit.findings import Finding
 from toolkit.lab.home import packaged_home
 from toolkit.lab.reports import MadeReport
+from toolkit.lab.watch import alone
 from toolkit.lab.watching import BATCH, SET_ASIDE, STATE, Round, Watcher
 from toolkit.recording.marks import is_own_output
 
@@ -459,3 +460,19 @@ def test_a_test_that_arrives_bit_by_bit_is_reported_when_it_is_whole(
     )
     assert once.returncode == 0
     assert json.loads(once.stdout)["made"] == []
+
+
+def test_a_link_in_the_place_of_the_lock_loses_nothing(tmp_path: Path) -> None:
+    kept = tmp_path / "kept.txt"
+    kept.write_text("of somebody")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".watch.lock").symlink_to(kept)
+    with alone(tmp_path / "out"):
+        pass
+    assert kept.read_text() == "of somebody"
+
+
+def test_a_pipe_in_the_place_of_the_lock_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / ".watch.lock")
+    with pytest.raises(OutputError), alone(tmp_path):
+        pass

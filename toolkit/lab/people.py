@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.registry.people_log import PeopleLog, enrol
-from toolkit.errors import ToolkitError, TrustError
+from toolkit.errors import RegistryError, ToolkitError, TrustError
 from toolkit.files import write_atomic
 from toolkit.inputs import PDF_FILE, read_regular
 from toolkit.lab.proofs import ORIGIN, anchor_in, raw_lines
@@ -163,9 +163,22 @@ def checkpoint_of(registry: Registry, instrument: str) -> Checkpoint:
 
 
 def anchor_document(registry: Registry, instrument: str, seq: int | None, checkpoint: Checkpoint) -> str:
-    """Return the JSON that a document carries: a line (from 1; default: the last) and its proof."""
+    """Return the JSON that a document carries: a line (from 1; default: the last) and its proof.
+
+    Raises
+    ------
+    RegistryError
+        ``missing``: the ledger has no such line; the ledger is damaged
+    """
     texts = lines_of(registry, instrument)
     index = len(texts) - 1 if seq is None else seq - 1
+    if not 0 <= index < len(texts):
+        raise RegistryError(
+            "the ledger has no such entry", where=registry.folder / instrument,
+            got="the last one" if seq is None else f"entry {seq}",
+            expected=f"1 to {len(texts)}" if texts else "an instrument: " + ", ".join(registry.instruments()),
+            next_step="see 'toolkit calibration list' and 'toolkit calibration history'", rule="missing",
+        )  # fmt: skip
     return json.dumps({"schema": 1, **anchor_of(texts, index, checkpoint).as_dict()}, indent=2) + "\n"
 
 

@@ -89,10 +89,11 @@ class WatchAnswer:
 def alone(out: Path) -> Iterator[None]:
     """Hold the output folder for one watch."""
     from toolkit.errors import OutputError
+    from toolkit.inputs import open_regular_to_append
 
     try:
         out.mkdir(parents=True, exist_ok=True)
-        lock = (out / ".watch.lock").open("w")
+        lock = open_regular_to_append(out / ".watch.lock")
     except OSError as error:
         raise OutputError(
             "the output folder cannot be written", where=out, got=error.strerror,
