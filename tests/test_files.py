@@ -14,8 +14,11 @@ from toolkit.files import (
     atomic_path,
     check_keys,
     is_number,
+    number_expected,
     parse_toml,
     read_toml,
+    real_path,
+    same_file,
     sha256_bytes,
     sha256_file,
     write_atomic,
@@ -138,3 +141,23 @@ def test_what_a_flush_does_not_confirm_is_said(tmp_path: Path, monkeypatch: pyte
         write_atomic(tmp_path / "new.toml", "text")
     assert (tmp_path / "new.toml").read_text() == "text"
     assert "in its place" in (caught.value.next_step or "")
+
+
+def test_links_are_followed_as_far_as_they_lead(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to("other")
+    (tmp_path / "other").symlink_to("loop")
+    (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to("file")
+    assert real_path(tmp_path / "link") == real_path(tmp_path) / "file"
+    assert real_path(tmp_path / "loop").parent == real_path(tmp_path)
+    assert real_path(Path("a\0b")).name == "a\0b"
+    assert same_file(tmp_path / "link", tmp_path / "file")
+    assert same_file(tmp_path / "none", tmp_path / "x" / ".." / "none")
+    assert not same_file(tmp_path / "loop", tmp_path / "file")
+
+
+def test_a_number_out_of_reach_is_told_its_reach() -> None:
+    told = number_expected(-1e101, "a finite number")
+    assert told == number_expected(10**400, "a finite number") == "a number of at most 1e+100 in size"
+    for value in (1e100, math.inf, math.nan, "1e101", None, True):
+        assert number_expected(value, "a finite number") == "a finite number"

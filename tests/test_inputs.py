@@ -9,12 +9,12 @@ import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.cli.test_main_paths import commands
 from tests.conftest import EXAMPLES
-from toolkit.cli.main import _command, run
+from toolkit.cli.main import run
 from toolkit.errors import ConfigError, TemplateError, ToolkitError, UnreadableError
 from toolkit.files import read_toml, sha256_bytes, sha256_file
 from toolkit.inputs import (
@@ -145,34 +145,6 @@ def test_sizes_are_read_as_they_are_written() -> None:
     ]  # fmt: skip
 
 
-COMMANDS = (
-    "inspect {file}",
-    "inspect --machine {file}.toml recording.csv",
-    "calibrate {file}",
-    "calibration import {file}",
-    "calibration certificate m15-r2 --template {file} --out out",
-    "calibration verify --calibrations {file}",
-    "process {file}",
-    "process . --protocol {file}",
-    "fit {file}",
-    "fit {file}.tdx",
-    "evaluate {file} grid.csv",
-    "evaluate {tir} {file}",
-    "convert {file}.tdx out.csv",
-    "convert {file}.tir out.tir",
-    "convert {file}.csv out.tdx",
-    "compare {file} {file}",
-    "report . --template {file} --out out",
-    "template check {file}",
-    "audit {file}",
-    "audit . --reports {file}",
-    "simulate {file} --out out",
-    "diagnose {file} --out out",
-    "machine show {file}.toml",
-    "machine correct {file} --out out.toml",
-)
-
-
 def _ran(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[object, str]:
     """Run a command in this process, which a signal ends where it waits; return its code and what it said."""
     signal.setitimer(signal.ITIMER_REAL, 60)
@@ -184,20 +156,6 @@ def _ran(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[object, 
     return ended.value.code, capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_no_command_waits_for_a_special_file(
-    special: Path, command: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name in ("pipe", "endless"):
-        for ending in ("tir", "toml", "tdx", "csv"):
-            (special / f"{name}.{ending}").symlink_to(name)
-    tir = next(EXAMPLES.rglob("*.tir"))
-    for name in ("pipe", "endless"):
-        code, errors = _ran(command.format(file=name, tir=tir).split(), capsys)
-        assert code == 2, errors
-        assert "next:" in errors
-
-
 def test_the_flag_of_every_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "x.toml"
     path.write_bytes(b"#" * (SETTINGS_FILE.limit + 1))
@@ -207,18 +165,7 @@ def test_the_flag_of_every_command(tmp_path: Path, capsys: pytest.CaptureFixture
     code, errors = _ran([*command, "--max-size", "20MB"], capsys)
     assert (code, "too large" in errors) == (2, False)
     assert _ran([*command, "--max-size", "much"], capsys)[0] == 2
-    commands = list(_commands())
-    assert len(commands) > 20
-    assert [c.name for c in commands if "max_size" not in [option.name for option in c.params]] == []
-
-
-def _commands() -> Iterator[Any]:
-    waiting = [_command()]
-    while waiting:
-        command = waiting.pop()
-        waiting += getattr(command, "commands", {}).values()
-        if not hasattr(command, "commands"):
-            yield command
+    assert [name for name, c in commands() if "max_size" not in [option.name for option in c.params]] == []
 
 
 def test_a_template_beyond_its_limit_is_a_fault_of_the_template(tmp_path: Path) -> None:

@@ -16,7 +16,15 @@ from tests.crash.calls import contents, counted, failing, killed
 from toolkit import publication as module
 from toolkit.errors import OutputError
 from toolkit.files import write_atomic
-from toolkit.publication import ENTERING, PENDING, publication, settle, write_result
+from toolkit.publication import (
+    ENTERING,
+    PENDING,
+    check_file,
+    check_folder,
+    publication,
+    settle,
+    write_result,
+)
 from toolkit.staging import supersede
 
 OLD = {
@@ -270,3 +278,67 @@ def test_the_staging_of_the_living_is_not_swept(tmp_path: Path) -> None:
         publish(tmp_path / "out")
         assert contents(first) == {"a": b"1"}
     assert contents(tmp_path / "out") == NEW | {"a": b"1"}
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [("a.pdf", "A.pdf"), ("part/x", "Part/y"), ("stra\u00dfe", "STRASSE"), ("e\u0301", "\u00c9")],
+)
+@pytest.mark.parametrize("kind", KINDS)
+def test_results_that_some_file_systems_take_for_one_are_refused(
+    tmp_path: Path, one: str, other: str, kind: str
+) -> None:
+    out, others = prepared(tmp_path, kind)
+    before = contents(out) if out.exists() else {}
+    with pytest.raises(OutputError, match="case alone") as caught:
+        publish(out, {one: b"1", other: b"2"})
+    assert caught.value.rule == "not-writable"
+    assert (contents(out) if out.exists() else {}) == before
+    assert others.items() <= before.items()
+
+
+def test_where_case_is_told_another_name_is_another_file(tmp_path: Path) -> None:
+    (tmp_path / "A.PDF").write_bytes(b"a person's own")
+    write_result(tmp_path / "a.pdf", b"new")
+    assert contents(tmp_path) == {"A.PDF": b"a person's own", "a.pdf": b"new"}
+
+
+def test_where_case_is_not_told_another_s_file_is_not_replaced(tmp_path: Path) -> None:
+    # A second name of one file, as such a file system has it.
+    (tmp_path / "A.PDF").write_bytes(b"a person's own")
+    (tmp_path / "a.pdf").hardlink_to(tmp_path / "A.PDF")
+    with pytest.raises(OutputError, match="would replace it"):
+        write_result(tmp_path / "a.pdf", b"new")
+    assert (tmp_path / "A.PDF").read_bytes() == b"a person's own"
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "loop"])
+def test_a_result_takes_the_place_of_no_pipe_and_no_device(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "a.pdf"
+    match kind:
+        case "pipe":
+            os.mkfifo(path)
+        case "device":
+            path.symlink_to("/dev/null")
+        case "loop":
+            path.symlink_to(path.name)
+    before = path.lstat()
+    for write in (check_file, lambda path: write_result(path, b"new")):
+        with pytest.raises(OutputError) as caught:
+            write(path)
+        assert caught.value.rule == "not-writable"
+        assert path.lstat() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.pdf"]
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for folder in (tmp_path / "file", tmp_path / "file" / "below", tmp_path / ("n" * 300), Path("a\0b")):
+        with pytest.raises(OutputError):
+            check_folder(folder)
+    for path in (tmp_path, tmp_path / "file" / "below", tmp_path / ("n" * 300)):
+        with pytest.raises(OutputError):
+            check_file(path)
+    check_folder(tmp_path / "new" / "deep")
+    check_file(tmp_path / "new" / "deep" / "file")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import hashlib
+import math
 import os
 import stat
 import tomllib
@@ -14,6 +15,7 @@ from typing import Any, TypeGuard
 
 from toolkit.errors import ConfigError, OutputError
 from toolkit.inputs import SETTINGS_FILE, open_regular, read_input
+from toolkit.system import sync_file, sync_folder
 
 _AT_ONCE = 2**20
 LARGEST = 1e100
@@ -55,8 +57,7 @@ def atomic_path(target: Path) -> Iterator[Path]:
         mode = _mode(target)
         temporary = _new_part(target, 0o666 if mode is None else mode)
         yield temporary
-        with temporary.open("rb") as stream:
-            os.fsync(stream.fileno())
+        sync_file(temporary)
         if mode is not None:
             temporary.chmod(mode)
         temporary.replace(target)
@@ -85,7 +86,7 @@ def _new_part(target: Path, mode: int) -> Path:
     while True:
         path = target.parent / f".{target.name[:60]}.{os.urandom(4).hex()}.part"
         with contextlib.suppress(FileExistsError):
-            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode & 0o666 | 0o600))
+            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode & 0o666 | 0o600))
             return path
 
 
@@ -101,15 +102,6 @@ def write_atomic(target: Path, data: bytes | str) -> None:
     """Write a whole file or nothing (see `atomic_path`)."""
     with atomic_path(target) as temporary:
         temporary.write_bytes(data.encode() if isinstance(data, str) else data)
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush a folder's entries to the disk, so that a rename survives a power cut."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -145,6 +137,26 @@ def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
         ) from error
 
 
+def real_path(path: Path) -> Path:
+    """Return where a path leads when links are followed; a loop of links is followed no further.
+
+    What cannot be reached is a matter for whoever opens it: `Path.resolve` fails on a loop by an error that
+    is no `OSError`.
+    """
+    try:
+        return Path(os.path.realpath(path))
+    except ValueError:  # a name that no file can have
+        return path.absolute()
+
+
+def same_file(one: Path, other: Path) -> bool:
+    """Tell whether two paths lead to one place, by links or where a file system takes A for a."""
+    with contextlib.suppress(OSError, ValueError):
+        if one.samefile(other):
+            return True
+    return real_path(one) == real_path(other)
+
+
 def is_number(value: object) -> TypeGuard[int | float]:
     """Tell whether an entry of a settings file is a number that can be computed with: at most 1e100.
 
@@ -156,6 +168,17 @@ def is_number(value: object) -> TypeGuard[int | float]:
     """
     # Not math.isfinite: TOML has whole numbers of any length, and one past a float's reach raises there.
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
+
+
+def number_expected(got: object, expected: str) -> str:
+    """Return what is expected in place of a value: where it is a number out of reach, the reach.
+
+    >>> number_expected(1e101, "a finite number"), number_expected("1", "a finite number")
+    ('a number of at most 1e+100 in size', 'a finite number')
+    """
+    if isinstance(got, int | float) and LARGEST < abs(got) < math.inf:
+        return f"a number of at most {LARGEST:g} in size"
+    return expected
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str], *, where: object) -> None:

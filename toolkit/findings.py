@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal, TypedDict
 
 Level = Literal["error", "warning", "note"]
+
+
+class FindingEntry(TypedDict):
+    """A finding in an answer; ``toolkit explain RULE`` tells more."""
+
+    rule: Annotated[str, "id of the rule"]
+    where: Annotated[str, "file, condition, load or record"]
+    message: Annotated[str, "in words"]
+    level: Annotated[Level, "a note leaves the exit code at 0"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +30,6 @@ class Finding:
     message: str
     level: Level = "warning"
 
-    def as_dict(self) -> dict[str, str]:
-        """Return the finding as a JSON-ready dict."""
+    def as_dict(self) -> FindingEntry:
+        """Return the finding as an answer has it."""
         return {"rule": self.rule, "where": self.where, "message": self.message, "level": self.level}

@@ -27,6 +27,7 @@ from toolkit.errors import (
     TrustError,
     UnreadableError,
 )
+from toolkit.system import WITHOUT_WAITING
 
 MIB = 2**20
 
@@ -184,7 +185,6 @@ _KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-_WITHOUT_WAITING = os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY
 _raised = 0  # of the process: readers in threads have it too; workers are given it
 
 
@@ -246,9 +246,9 @@ def open_regular(path: Path) -> Iterator[BinaryIO]:
     OSError
         it cannot be opened, or is no regular file
     """
-    _demand_regular(os.stat(path).st_mode, path)  # noqa: PTH116  a str is taken too
+    demand_regular(path)
     # It may have been exchanged since: a pipe must not block here, nor a terminal become this process's.
-    handle = os.open(path, os.O_RDONLY | _WITHOUT_WAITING)
+    handle = os.open(path, os.O_RDONLY | WITHOUT_WAITING)
     with os.fdopen(handle, "rb") as stream:
         _demand_regular(os.fstat(handle).st_mode, path)
         yield stream
@@ -300,6 +300,19 @@ def read_input(path: Path, form: Form) -> bytes:
         raise unreadable(path, form, error) from error
 
 
+def check_size(data: bytes, form: Form, where: str) -> None:
+    """Refuse an input that came otherwise than from a file, beyond the limit of its form.
+
+    Raises
+    ------
+    ToolkitError
+        the error of the form, ``too-large``
+    """
+    if len(data) > limit_of(form):
+        size = size_text(len(data))
+        raise unreadable(Path(where), form, TooLargeError(errno.EFBIG, size, where, None, size))
+
+
 def unreadable(path: Path, form: Form, error: OSError | ValueError) -> ToolkitError:
     """Return the error of an input that `read_regular` could not read."""
     if isinstance(error, TooLargeError):
@@ -330,14 +343,25 @@ def open_regular_to_append(path: Path) -> BinaryIO:
         it cannot be opened, or is no regular file
     """
     with contextlib.suppress(FileNotFoundError):
-        _demand_regular(path.stat().st_mode, path)
-    handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | _WITHOUT_WAITING, 0o666)
+        demand_regular(path)
+    handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | WITHOUT_WAITING, 0o666)
     try:
         _demand_regular(os.fstat(handle).st_mode, path)
         return os.fdopen(handle, "a+b")
     except OSError:
         os.close(handle)
         raise
+
+
+def demand_regular(path: Path) -> None:
+    """Demand that a path leads to a regular file.
+
+    Raises
+    ------
+    OSError
+        it leads to something else, or nowhere
+    """
+    _demand_regular(os.stat(path).st_mode, path)  # noqa: PTH116  a str is taken too
 
 
 def _demand_regular(mode: int, path: Path) -> None:

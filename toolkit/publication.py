@@ -27,12 +27,14 @@ import errno
 import os
 import shutil
 import stat
+import unicodedata
 from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
 from typing import Literal
 
 from toolkit.errors import OutputError
-from toolkit.files import sync_folder
+from toolkit.files import real_path, same_file
+from toolkit.inputs import demand_regular
 from toolkit.staging import (
     PASSING,
     STAGED,
@@ -42,11 +44,11 @@ from toolkit.staging import (
     flush,
     is_folder,
     locked,
-    release,
     result_files,
     supersede,
     sweep,
 )
+from toolkit.system import sync_folder, unlock_folder
 
 PENDING, ENTERING = f"{PASSING}results", f"{PASSING}entering"
 _DESCRIBING = (".json", ".toml")
@@ -70,7 +72,7 @@ def publication(folder: Path) -> Iterator[Path]:
         ``not-writable``: no permission, no space, or another obstacle. Nothing was changed, unless the
         message says that the results are whole and enter with the next command
     """
-    target = Path(os.path.realpath(folder))
+    target = real_path(folder)
     if any(part.startswith(STAGED) for part in target.parts):
         target.mkdir(parents=True, exist_ok=True)
         yield target
@@ -98,7 +100,7 @@ def publication(folder: Path) -> Iterator[Path]:
             raise _unwritable(folder, error) from error
     finally:
         shutil.rmtree(stage, ignore_errors=True)
-        release(handle)
+        unlock_folder(handle)
         _remove_empty(absent)
 
 
@@ -135,6 +137,45 @@ def settle(folder: Path) -> None:
         raise _not_in_place(folder, error) from error
 
 
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that no results can enter, before they are worked out.
+
+    Raises
+    ------
+    OutputError
+        ``not-writable``
+    """
+    try:
+        with contextlib.suppress(FileNotFoundError):
+            folder.lstat()
+        target = real_path(folder)
+        place = next(path for path in (target, *target.parents) if os.path.lexists(path))
+        if not place.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{place} is no folder")
+        if not os.access(place, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, f"{place} cannot be written to")
+    except (OSError, ValueError) as error:
+        raise _unwritable(folder, error) from error
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that cannot be a result, before it is worked out; errors as `check_folder`."""
+    check_folder(path.parent)
+    try:
+        _check_replaced(path)
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from error
+
+
+def _check_replaced(path: Path) -> None:
+    """Refuse to put a result in the place of a pipe, a device, or a loop of links."""
+    with contextlib.suppress(FileNotFoundError):
+        if not stat.S_ISDIR(path.stat().st_mode):
+            demand_regular(path)
+
+
 def _staging(target: Path) -> tuple[Path, int]:
     """Make a staging folder, and lock it: in the target, beside one that does not exist yet."""
     sweep(target.parent)
@@ -152,6 +193,7 @@ def _staging(target: Path) -> tuple[Path, int]:
 def _publish(stage: Path, target: Path) -> None:
     if not result_files(stage) and not (stage / SUPERSEDED).exists():
         return
+    _check_names(stage, target)
     flush(stage)
     if not target.exists():
         drop_marks(stage)
@@ -246,11 +288,32 @@ def _check_ways(stage: Path, target: Path) -> None:
             raise IsADirectoryError(errno.EISDIR, f"a folder has the name of the result {path}")
         if is_folder(stage / path) and os.path.lexists(target / path) and not (target / path).is_dir():
             raise NotADirectoryError(errno.ENOTDIR, f"a file has the name of the folder {path}")
+        _check_replaced(target / path)
     for path in (*result_files(stage), *result_files(stage / SUPERSEDED)):
         for parent in path.parents[:-1]:
             place = target / parent
             if os.path.lexists(place) and not (is_folder(place) and place.stat().st_dev == device):
                 raise NotADirectoryError(errno.ENOTDIR, f"{parent} is no plain folder of it")
+
+
+def _check_names(stage: Path, target: Path) -> None:
+    """Refuse names that are one where a file system tells no case: of two results, or of another's file."""
+    names: dict[str, Path] = {}
+    for result in result_files(stage):
+        for path in (result, *result.parents[:-1]):
+            other = names.setdefault(_caseless(path), path)
+            if other != path:
+                raise FileExistsError(errno.EEXIST, f"{other} and {path} differ by case alone")
+    for folder in {path.parent for path in names.values()}:
+        for entry in (target / folder).iterdir() if (target / folder).is_dir() else ():
+            path = folder / entry.name
+            other = names.get(_caseless(path), path)
+            if other != path and same_file(target / other, entry):
+                raise FileExistsError(errno.EEXIST, f"{path} is there, and {other} would replace it")
+
+
+def _caseless(path: Path) -> str:
+    return unicodedata.normalize("NFC", str(path)).casefold()
 
 
 def _exchanged(stage: Path, target: Path) -> bool:
@@ -292,7 +355,7 @@ def _marked_again(stage: Path, superseded: Iterable[Path]) -> Literal[False]:
 
 def _holds_only(target: Path, names: Container[Path], stage: Path) -> bool:
     """Tell whether a folder holds plain files of these names alone, and nobody works in it."""
-    here = Path(os.path.realpath(Path.cwd()))
+    here = real_path(Path.cwd())
     if stage.parent != target or target in (here, *here.parents):
         return False
     earlier = [path for path in result_files(target) if path.parts[0] != stage.name]
@@ -324,11 +387,11 @@ def _remove_empty(folders: list[Path]) -> None:
             folder.rmdir()
 
 
-def _unwritable(folder: Path, error: OSError) -> OutputError:
+def _unwritable(folder: Path, error: OSError | ValueError) -> OutputError:
     return OutputError(
         "the results cannot be written",
         where=folder,
-        got=error.strerror or str(error),
+        got=getattr(error, "strerror", None) or str(error),
         expected="a folder with write permission and free space",
         next_step="free space there, or choose another folder with --out; nothing was changed",
         rule="not-writable",

@@ -8,23 +8,27 @@ order, and no staging is swept on it.
 from __future__ import annotations
 
 import contextlib
-import errno
-import fcntl
 import os
 import secrets
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from toolkit.files import sync_folder
+from toolkit.system import (
+    close_folder,
+    is_open_at,
+    lock_if_any,
+    open_folder,
+    sync_file,
+    sync_folder,
+    unlock_folder,
+)
 
 PASSING = ".toolkit-"
 """What the folders of a publication are named by: nothing of them is a result yet."""
 STAGED = f"{PASSING}staged-"
 SUPERSEDED = ".superseded"
 """Of a staging folder: empty files, named as results that go with the old ones."""
-
-_NO_LOCKS = frozenset((errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS))
 
 
 def claim(place: Path) -> tuple[Path, int]:
@@ -33,22 +37,22 @@ def claim(place: Path) -> tuple[Path, int]:
         stage = place / f"{STAGED}{secrets.token_hex(8)}"
         stage.mkdir()
         with contextlib.suppress(FileNotFoundError):  # swept before it was locked
-            handle = os.open(stage, os.O_RDONLY | os.O_DIRECTORY)
-            if _lock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB) is not False and _is(handle, stage):
+            handle = open_folder(stage)
+            if lock_if_any(handle, wait=False) is not False and is_open_at(handle, stage):
                 return stage, handle
-            os.close(handle)
+            close_folder(handle)
 
 
 def sweep(place: Path) -> None:
     """Remove staging folders whose makers are dead."""
     with contextlib.suppress(OSError):
         for stage in place.glob(f"{STAGED}*"):
-            handle = os.open(stage, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            handle = open_folder(stage, links=False)
             try:
-                if _lock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB):
+                if lock_if_any(handle, wait=False):
                     shutil.rmtree(stage, ignore_errors=True)
             finally:
-                os.close(handle)
+                close_folder(handle)
 
 
 def supersede(stage: Path, name: str | Path) -> None:
@@ -82,11 +86,7 @@ def flush(stage: Path) -> None:
     """Flush a staging folder to the disk, with all that it holds."""
     for base, _, names in os.walk(stage):
         for name in names:
-            handle = os.open(Path(base) / name, os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+            sync_file(Path(base) / name)
         sync_folder(Path(base))
 
 
@@ -94,43 +94,15 @@ def flush(stage: Path) -> None:
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock on a folder; one that was exchanged while it was waited for is another folder."""
     while True:
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        _lock(handle, fcntl.LOCK_EX)
-        if _is(handle, folder):
+        handle = open_folder(folder)
+        lock_if_any(handle)
+        if is_open_at(handle, folder):
             break
-        os.close(handle)
+        close_folder(handle)
     try:
         yield
     finally:
-        release(handle)
-
-
-def _lock(handle: int, mode: int) -> bool | None:
-    """Lock; return whether that was done, None on a file system without locks."""
-    try:
-        fcntl.flock(handle, mode)
-    except BlockingIOError:
-        return False
-    except OSError as error:
-        if error.errno in _NO_LOCKS:
-            return None
-        raise
-    return True
-
-
-def release(handle: int) -> None:
-    """Undo a lock and close its handle."""
-    # A worker that was forked meanwhile holds the same lock: it is undone, not only let go.
-    with contextlib.suppress(OSError):
-        fcntl.flock(handle, fcntl.LOCK_UN)
-    os.close(handle)
-
-
-def _is(handle: int, folder: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(handle), folder.stat())
-    except FileNotFoundError:
-        return False
+        unlock_folder(handle)
 
 
 def is_folder(path: Path) -> bool:

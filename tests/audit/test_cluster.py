@@ -289,7 +289,7 @@ def test_an_absent_library_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     error = refused(lambda: list(run_on_cluster(make, ["a"], address="tcp://127.0.0.1:1")))
     assert error.rule == "missing-extra"
-    assert error.next_step == 'pip install "toolkit[cluster]"'
+    assert error.next_step == 'pip install "tire-lab-toolkit[cluster]"'
 
 
 def test_workers_are_here_or_of_a_cluster(archive):

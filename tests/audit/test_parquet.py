@@ -138,4 +138,4 @@ def test_an_absent_library_is_named_with_its_extra(tmp_path, monkeypatch):
     with pytest.raises(ConfigError) as caught:
         check_parquet(tmp_path / "audit.parquet")
     assert caught.value.rule == "missing-extra"
-    assert caught.value.next_step == 'pip install "toolkit[parquet]"'
+    assert caught.value.next_step == 'pip install "tire-lab-toolkit[parquet]"'

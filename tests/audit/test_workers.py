@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,18 @@ def test_nothing_to_do_starts_nothing():
 
 def stillborn():
     os._exit(3)
+
+
+def only_one_starts(path):
+    if not _first(path):
+        os._exit(3)
+    return lambda name: time.sleep(0.05) or name.upper()
+
+
+def test_workers_that_cannot_start_beside_one_that_works_leave_the_work_to_it(tmp_path):
+    names = [f"file {i}" for i in range(60)]
+    found = dict(run_isolated(partial(only_one_starts, str(tmp_path / "first")), names, workers=3))
+    assert found == {name: name.upper() for name in names}
 
 
 def test_workers_that_never_start_end_the_run_with_an_error():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 
 from toolkit.cli.main import _register, app
 from toolkit.examples.fig4_4 import write_fig4_4
+from toolkit.lab.audit_headline import headline_of
 
 HOME = Path(__file__).resolve().parents[2]
 CALIBRATIONS = ("--calibrations", str(HOME / "calibrations"))
@@ -161,8 +163,24 @@ def _sha(path):
     return sha256_file(path)
 
 
-def test_a_file_name_with_a_line_break_stays_in_its_row_and_moves_no_cursor(archive):
+def test_a_file_name_with_a_line_break_stays_in_its_row_and_moves_no_cursor(archive, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")  # room for the whole name
     (archive / "2019" / "run" / "a\nb\x1b[2J\u2028c.csv").write_text("nothing,of,use\n")
     lines = run(archive).stdout.split("\n")
     assert sum("a\\nb\\x1b[2J\\u2028c.csv" in line for line in lines) == 1
     assert not any("\x1b" in line or line.startswith("b") for line in lines)
+
+
+def test_the_first_line_answers_in_console_page_and_json_and_tables_fit_80_columns(
+    archive, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("COLUMNS", "80")
+    answer = json.loads(run(archive, "--out", tmp_path / "out", "--json").stdout)
+    sentence = answer["headline"]["sentence"]
+    assert answer["headline"] == headline_of(answer["files"]).as_dict()
+    page = (tmp_path / "out" / "audit.html").read_text(encoding="utf-8")
+    assert f'<p class="headline">{html.escape(sentence)}.</p>' in page
+    lines = run(archive).stdout.splitlines()
+    head = lines[: lines.index("")]
+    assert " ".join(head) == f"{sentence}."
+    assert all(len(line) <= 80 for line in lines[: lines.index("", len(head) + 1)])

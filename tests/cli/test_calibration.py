@@ -92,7 +92,7 @@ def test_the_life_of_a_record(run: Run, session: Path) -> None:
     code, approved = run(
         "calibration", "approve", "pair-r1", "--in-force-from", "2026-02-01", "--checked-by", "B"
     )
-    assert (code, approved["approved"]) == (0, True)
+    assert (code, approved["approved"], approved["signature"]) == (0, True, "unsigned")
     code, listed = run("calibration", "list")
     assert (code, listed["records"][0]["status"]) == (0, "approved")
     assert approved["note"].endswith("before the decision")

@@ -13,6 +13,7 @@ import typer
 
 from toolkit.cli import calibration_results
 from toolkit.errors import ToolkitError
+from toolkit.lab.proofs import anchor_in
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 TEMPLATE = CHECKOUT / "report_templates" / "certificate.docx"
@@ -67,6 +68,37 @@ def test_a_certificate_is_delivered_whole(run: Run, tmp_path: Path) -> None:
     assert {one["rule"] for one in answer["findings"]} == {"certificate-gap", "certificate-budget"}
     assert len(answer["figures"]) == 3
     assert answer["issued"] == "2026-04-01"
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@office_needed
+def test_where_nobody_is_enrolled_an_issue_is_entered_only_where_it_was_asked_for(
+    run: Run, calibrations: Path, tmp_path: Path
+) -> None:
+    before = _files(calibrations)
+    code, answer = run("m15-virtual-r1")
+    assert (code, answer["verified"], answer["signature"]) == (1, True, "unsigned")
+    assert _files(calibrations) == before
+    assert anchor_in(Path(answer["pdf"]).read_bytes()) is None
+    code, answer = run("m15-virtual-r1", "--issue")
+    assert (code, answer["signature"]) == (1, "unsigned")
+    lines = (calibrations / "m15-virtual" / "ledger.jsonl").read_bytes().splitlines()
+    assert len(lines) == 3
+    assert json.loads(lines[-1])["event"] == "issued"
+    anchor = anchor_in(Path(answer["pdf"]).read_bytes())
+    assert anchor is not None
+    assert anchor.proved
+
+
+def test_a_draft_is_never_issued(run: Run, calibrations: Path, tmp_path: Path) -> None:
+    before = _files(calibrations)
+    code, answer = run("m15-virtual-r1", "--draft", "--issue")
+    assert (code, answer["error"]["rule"]) == (2, "usage")
+    assert _files(calibrations) == before
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_digital_certificate_without_a_country_is_refused_and_nothing_is_left(

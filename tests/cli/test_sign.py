@@ -86,6 +86,24 @@ def test_what_is_signed_is_shown_in_words_and_entered_by_the_same_command(run: R
     assert run("calibration", "verify")[0] == 0
 
 
+def test_who_wants_quiet_and_consents_beforehand_reads_nothing(run: Run) -> None:
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    assert run("sign", "../r.json", "--key", "../keys/anna", "--quiet")[0] == 2
+    assert run("sign", "../r.json", "--key", "../keys/anna", "--yes", "--quiet") == (0, "", "")
+
+
+def test_who_enters_and_who_approves_is_said_at_once(run: Run) -> None:
+    plan = packaged_home() / "toolkit/examples/virtual/session_plan.toml"
+    assert run("simulate", plan, "--out", "../session", "--seed", "7", "--quiet")[0] == 0
+    code, out, error = run("calibrate", "../session/SESSION.toml", "--sign", "../keys/carl")
+    entered = "signature: entered by Carl Example on "
+    assert (code, entered in out) == (0, True), error
+    who = ("--in-force-from", "2026-11-23", "--checked-by", "dora", "--sign", "../keys/dora")
+    code, out, error = run("calibration", "approve", "m15-virtual-r2", *who, "--reason", "a new session")
+    assert (code, ", approved by Dora Example on " in out) == (0, True), out + error
+    assert entered in out
+
+
 def test_a_policy_of_two_takes_two_people_from_two_computers(run: Run) -> None:
     assert run(*DECISION, "--request", "../r.json")[0] == 0
     for name, words in (("carl", "operator"), ("dora", "checker")):
@@ -305,4 +323,4 @@ def test_what_nobody_could_read_again_or_change_again_is_never_entered(run: Run)
 def test_a_proof_of_what_is_not_in_the_ledger_is_refused(run: Run, words: tuple[str, ...]) -> None:
     code, out, error = run("ledger", "prove", *words)
     assert (code, out) == (2, ""), error
-    assert "no such entry" in error
+    assert "there is no such instrument" in error or "no such entry" in error

@@ -86,7 +86,8 @@ def readings(cell: Cell, seed: int) -> tuple[Reading, ...]:
     bare = dataclasses.replace(_plan(), seed=int(rng.integers(2**31)))
     plan = with_effects(bare, list(cell.effects))
     machine = MACHINE if cell.stated else dataclasses.replace(MACHINE, type_b=())
-    reduced, record = _reduced(plan, _record(int(rng.integers(2**31))), machine, rng)
+    record = session_record(int(rng.integers(2**31)))
+    reduced = drawn_test(plan, record, machine, rng)
     found = characterise(reduced, machine=machine, record=record)
     tire = settled(bare, {})
     made: list[Reading] = []
@@ -114,7 +115,8 @@ def _plan() -> Plan:
 
 
 @functools.lru_cache(maxsize=2)
-def _record(seed: int) -> CalibrationRecord:
+def session_record(seed: int) -> CalibrationRecord:
+    """Return the record of a reference-load session that is drawn."""
     plan = dataclasses.replace(read_plan(_EXAMPLES / "session_plan.toml"), seed=seed)
     with tempfile.TemporaryDirectory() as folder:
         session = write_session(simulate_session(plan), Path(folder) / "session")
@@ -122,9 +124,10 @@ def _record(seed: int) -> CalibrationRecord:
         return calibrate(session[0], Registry(Path(folder) / "calibrations")).record
 
 
-def _reduced(
+def drawn_test(
     plan: Plan, record: CalibrationRecord, machine: Machine, rng: np.random.Generator
-) -> tuple[ReducedTest, CalibrationRecord]:
+) -> ReducedTest:
+    """Return a test of a plan with every error drawn that the machine's instruments are stated to have."""
     test = simulate(plan)
     drawn = _Drawn.of(machine, plan.pressure_Pa, rng)
     tare = Tare(source="test.toml", values=test.tare, unit=test.tare_unit)
@@ -134,7 +137,7 @@ def _reduced(
         record=record,
         recordings=list(_recordings(test, drawn)),
         tare=tare,
-    ), record
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

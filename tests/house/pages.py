@@ -18,10 +18,12 @@ from typing import get_args
 from tests.house.source import ROOT, read_package
 from toolkit.characteristics.catalogue import characteristics
 from toolkit.declared import Format, reference, starter, table_of
+from toolkit.declared.answers import answer_reference
 from toolkit.declared.declaration import form_of
 from toolkit.declared.describe import _sections
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, Stage
+from toolkit.lab.answer_types import ANSWERS
 from toolkit.lab.rules import effect_keys, rules_catalogue
 from toolkit.report.kinds import write_manual
 
@@ -73,6 +75,7 @@ def generated(root: Path = ROOT) -> dict[str, tuple[str, str]]:
         "effects.md": ("Effects that a simulation may leave out", _effects_text()),
         "characteristics.md": ("Characteristics of a test", _characteristics_text()),
         "rules.md": ("Rules of findings and errors", _rules_text()),
+        "answers.md": ("Answers of the commands", _answers_text()),
     }
     for cls in formats(root):
         title = _title(cls)
@@ -128,6 +131,14 @@ def _characteristics_text() -> str:
         lines += [f"- **{fact}**: {text}" for fact, text in declared.facts().items() if text]
         lines += [""]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _answers_text() -> str:
+    parts = []
+    for command, declared in ANSWERS.items():
+        text = answer_reference(declared).replace("\n## ", f"\n### {command}: ")
+        parts.append(f"## toolkit {command} --json\n\n{text}")
+    return "\n".join(parts).rstrip() + "\n"
 
 
 def _rules_text() -> str:

@@ -1,6 +1,7 @@
 """Machine definitions: the source document's figures, and what is refused."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.machine import load_machine, machine_names
+from toolkit.machine.definition import machine_file
 from toolkit.units import from_si
 
 
@@ -40,6 +42,33 @@ def test_levers_of_the_drawing() -> None:
     assert lever["E5"] == pytest.approx(-radius)
     assert lever["D51"] == pytest.approx(radius * math.sin(math.pi / 6))
     assert sum(lever.values()) == pytest.approx(0.0)
+
+
+def _belt(folder: Path, *, revolutions_of: str = "tire") -> Path:
+    """A flat belt with two cells of which no drawing is known, loads in kN."""
+    text = machine_file("m15").read_text(encoding="utf-8")
+    text = text.replace('circumference = { value = 8.5, unit = "m" }\n', "")
+    text = text.replace('"convex"', '"flat belt"')
+    text = re.sub(r"(?ms)^\[cells\].*?(?=^\[\[cell\]\])", "", text)
+    text = text.replace('header = "FZ load"\nunit = "lbf"', 'header = "FZ load"\nunit = "kN"')
+    text = text.replace('revolutions_of = "tire"', f'revolutions_of = "{revolutions_of}"')
+    (folder / "belt.toml").write_text(text.replace('name = "m15"', 'name = "belt"'), encoding="utf-8")
+    return folder / "belt.toml"
+
+
+def test_a_flat_belt_has_no_circumference_and_needs_no_drawing_of_its_cells(tmp_path: Path) -> None:
+    belt = load_machine(str(_belt(tmp_path)))
+    assert belt.drum.circumference_m is None
+    assert math.isinf(belt.drum.radius_m)  # a road without curvature
+    assert (belt.layout.pitch_diameter_m, belt.layout.overturning_lever_m) == (None, ())
+    assert belt.column("FZ").unit == "kN"
+
+
+def test_turns_of_a_drum_need_its_circumference(tmp_path: Path) -> None:
+    with pytest.raises(
+        ConfigError, match=r"drum\.circumference is not stated|drum\.circumference: is not stated"
+    ):
+        load_machine(str(_belt(tmp_path, revolutions_of="drum")))
 
 
 def test_unknown_machine_lists_the_known() -> None:

@@ -52,7 +52,7 @@ def test_the_default_template_becomes_a_verified_report(plain_report: Delivered)
     assert len(done.filled.figures) == 11
     page = pdf_text(done.pdf)
     # The title page of the source document's Figure 5.3, the record's hash, and the mark on every page.
-    for words in ("M-15 Tire Test", "265/35 ZR 18", "34 psi, 2.34 bar", "c0ffee" + "0" * 58):
+    for words in ("Tire force and moment test", "265/35 ZR 18", "34 psi, 2.34 bar", "c0ffee" + "0" * 58):
         assert words in page
     assert page.count("SIMULATED DATA") >= done.pages
     assert f"page 1 of {done.pages}" in page

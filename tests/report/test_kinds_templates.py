@@ -7,10 +7,14 @@ import re
 import shutil
 import subprocess
 import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lxml import etree
+from pyhanko.pdf_utils.reader import PdfFileReader
 
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
@@ -32,11 +36,11 @@ from toolkit.report.audit.content import build_audit_content
 from toolkit.report.audit.page import AuditView
 from toolkit.report.certificate.collect import collect
 from toolkit.report.certificate.content import build_content as certified
-from toolkit.report.content import ReportContent, say
+from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.kinds import check as check_template
-from toolkit.report.style import Style, read_style, style_file
+from toolkit.report.style import Style, read_style, replace_terms, style_file
 from toolkit.report.test.content import build_content, report_id
 from toolkit.report.word.contents_pages import pdf_outline, pdf_text
 from toolkit.report.word.package import read_template
@@ -45,6 +49,7 @@ from toolkit.report.word.xml import q
 DAY = dt.date(2026, 11, 21)
 DETAILS = {
     "customer": "Example Tyres",
+    "method": "angelehnt an SAE J1987",
     "customer_contact": "1 Rubber Road",
     "received": dt.date(2019, 5, 28),
     "condition": "new",
@@ -119,6 +124,54 @@ def test_each_prints_all_that_it_asks_for(printed: dict[str, Delivered], name: s
     assert name in ("audit", "diagnosis") or report.filled.figures
 
 
+@dataclass(frozen=True)
+class Element:
+    """An element of a PDF's structure tree: its type, whether it has alternative text, what is below it."""
+
+    type: str
+    alt: bool
+    below: tuple[str, ...]
+
+
+def structure(node: Any) -> Iterator[Element]:
+    """Yield the elements of a structure tree, each after those below it."""
+    node = node.get_object()
+    if isinstance(node, list):
+        for one in node:
+            yield from structure(one)
+    elif hasattr(node, "get"):
+        below = list(structure(node["/K"])) if "/K" in node else []
+        yield from below
+        if "/S" in node:
+            types = tuple(element.type for element in below)
+            yield Element(type=str(node["/S"])[1:], alt=bool(str(node.get("/Alt", "")).strip()), below=types)
+
+
+@office_needed
+@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.docx")))
+def test_each_can_be_heard(printed: dict[str, Delivered], name: str) -> None:
+    """ISO 14289-1 (PDF/UA-1): 5 identification, 7.1 title, 7.2 language, 7.3 figures, 7.5 tables."""
+    with printed[name].pdf.open("rb") as stream:
+        root = PdfFileReader(stream).root
+        metadata = root["/Metadata"].data.decode()
+        assert re.search(r"<pdfuaid:part>1</pdfuaid:part>", metadata)
+        assert re.search(r"<pdfaid:part>2</pdfaid:part>", metadata)
+        assert str(root["/Lang"]) == ("de-DE" if name == "pruefbericht" else "en-US")
+        assert root["/MarkInfo"]["/Marked"]
+        assert root["/ViewerPreferences"]["/DisplayDocTitle"]
+        elements = list(structure(root["/StructTreeRoot"]["/K"]))
+        roles = {str(key)[1:] for key in root["/StructTreeRoot"].get("/RoleMap", {})}
+    figures = [element for element in elements if element.type == "Figure"]
+    assert len(figures) >= len(printed[name].filled.figures)
+    assert all(figure.alt for figure in figures)
+    tables = [element for element in elements if element.type == "Table"]
+    assert tables
+    # What only sets figures side by side has nothing to head.
+    assert all("TH" in table.below or "Figure" in table.below for table in tables)
+    # A standard type keeps its meaning: 7.1, last paragraph.
+    assert roles & {"Figure", "Table", "TH", "TD", "TR", "Link", "TOC"} == set()
+
+
 @pytest.mark.parametrize(("like", "style"), [("summary", "org"), ("pruefbericht", "pruefbericht")])
 def test_a_new_template_is_a_copy_with_the_style_file_that_serves_it(
     like: str, style: str, tmp_path: Path
@@ -180,7 +233,7 @@ def test_the_german_report_has_its_own_look(printed: dict[str, Delivered]) -> No
     done = printed["pruefbericht"]
     text = " ".join(pdf_text(done.pdf).split())
     for words in (
-        "Reifenprüfstelle Musterstadt",
+        "Reifenprüfstelle",
         "Eingang 28.05.2019",
         "Seite 1 von",
         "Abbildung 1. Seitenkraft",
@@ -249,7 +302,7 @@ def test_details_with_a_slip_are_refused(table: object, rule: str) -> None:
 
 def test_own_words_are_whole_words_of_the_toolkit_and_never_of_people() -> None:
     words = {"load": "Radlast", "forward": "vorwärts", "none": "keine"}
-    assert say("load FZ, reload, payload", words) == "Radlast FZ, reload, payload"
+    assert replace_terms("load FZ, reload, payload", words) == "Radlast FZ, reload, payload"
     style = Style(words=tuple(words.items()))
     made = build_content(make_result(special="load forward"), make_record(), style=style, issued=DAY)
     assert made.values["test.special"].value == "load forward"
@@ -258,32 +311,39 @@ def test_own_words_are_whole_words_of_the_toolkit_and_never_of_people() -> None:
     assert made.plots["fy_vs_load"].x_label == "Radlast FZ [N]"
 
 
-def test_the_german_report_speaks_german_to_those_who_hear_it() -> None:
+# Units, quantities and names that are the same in the languages.
+SAME = {
+    "de": "deg fy mz sae gough plus plysteer crat prat in minus",
+    "fr": "deg fy mz sae gough plus plysteer crat prat angle angles charge constant force moment minus",
+}
+
+
+@pytest.mark.parametrize("language", sorted(SAME))
+def test_a_report_speaks_its_language_to_those_who_hear_it(language: str) -> None:
     """Alternative texts: no English word is left, and every number is that of the English text."""
-    style = read_style(FOLDER / "pruefbericht.toml")
+    style = Style(language=language, decimal_comma=True)
     for more in ({}, {"simulated": True}):
         english = build_content(make_result(**more), make_record(), issued=DAY).plots
-        german = build_content(make_result(**more), make_record(), style=style, issued=DAY).plots
-        assert len(german) == len(english) >= 11
-        for name, plot in german.items():
-            words = set(re.findall(r"[a-zäöüß]{2,}", plot.alt.lower()))
+        spoken = build_content(make_result(**more), make_record(), style=style, issued=DAY).plots
+        assert len(spoken) == len(english) >= 11
+        for name, plot in spoken.items():
+            words = set(re.findall(r"[a-zäöüßéèà]{2,}", plot.alt.lower()))
             left = words & set(re.findall(r"[a-z]{2,}", english[name].alt.lower()))
-            # units, quantities and names that are the same in both languages
-            assert left <= {
-                "deg",
-                "fy",
-                "mz",
-                "sae",
-                "gough",
-                "plus",
-                "plysteer",
-                "crat",
-                "prat",
-                "in",
-                "minus",
-            }, left
+            assert left <= set(SAME[language].split()), left
             assert re.findall(r"\d+", plot.alt) == re.findall(r"\d+", english[name].alt)
             assert "." not in re.sub(r"\.( |$)", "", plot.alt)  # decimal commas
+
+
+def test_what_the_toolkit_says_in_a_report_is_in_its_language_and_what_people_wrote_is_not() -> None:
+    made = build_content(
+        make_result(special="the load of the test", tire_company="forward"), make_record(),
+        style=Style(language="de", decimal_comma=True), issued=DAY,
+    )  # fmt: skip
+    assert made.values["test.special"].value == "the load of the test"
+    assert made.values["tire.company"].value == "forward"
+    assert made.values["report.title"].value == "Reifenprüfung, Kräfte und Momente, 265/35 ZR 18"
+    assert made.values["test.directions"].value == "vorwärts und rückwärts"
+    assert made.title == made.values["report.title"].value
 
 
 def test_any_result_can_be_a_condition(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import shutil
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from pathlib import Path
@@ -83,7 +83,9 @@ class Served:
     def place(self) -> str:
         return self.guard.keys.place
 
-    def ask(self, path: str, method: str = "GET", body: str | None = None, **headers: str | None) -> Answer:
+    def ask(
+        self, path: str, method: str = "GET", body: str | bytes | None = None, **headers: str | None
+    ) -> Answer:
         """Send a request; a header of None is left out. The path is sent as it stands."""
         stated: dict[str, str | None] = {"Host": self.guard.authority, "Cookie": self.cookie}
         if method == "POST":
@@ -95,9 +97,10 @@ class Served:
             for name, value in stated.items():
                 if value is not None:
                     connection.putheader(name, value)
-            if body is not None:
-                connection.putheader("Content-Length", str(len(body.encode())))
-            connection.endheaders(body.encode() if body is not None else None)
+            content = body.encode() if isinstance(body, str) else body
+            if content is not None:
+                connection.putheader("Content-Length", str(len(content)))
+            connection.endheaders(content)
             response = connection.getresponse()
             text = response.read().decode()
             return Answer(response.status, {k.lower(): v for k, v in response.getheaders()}, text)
@@ -110,6 +113,22 @@ class Served:
         """Send a form with its key."""
         body = urlencode({"form_key": self.guard.keys.form, **form})
         return self.ask(self.place + path, "POST", body, **headers)
+
+    def upload(self, path: str, files: Iterable[tuple[str, str, bytes]], **fields: str) -> Answer:
+        """Send a form with files (field, name, content) as a browser does."""
+        boundary = "----WebKitFormBoundary7MA4YWxkTrZu0gW"
+        head = f"--{boundary}\r\nContent-Disposition: form-data; name="
+        parts = [
+            f'{head}"{key}"\r\n\r\n{text}\r\n'.encode()
+            for key, text in {"form_key": self.guard.keys.form, **fields}.items()
+        ]
+        for key, name, data in files:
+            stated = f'{head}"{key}"; filename="{name}"\r\nContent-Type: application/octet-stream\r\n\r\n'
+            parts.append(stated.encode() + data + b"\r\n")
+        body = b"".join(parts) + f"--{boundary}--\r\n".encode()
+        return self.ask(
+            self.place + path, "POST", body, Content_Type=f"multipart/form-data; boundary={boundary}"
+        )
 
 
 @contextlib.contextmanager

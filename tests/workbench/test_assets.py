@@ -8,7 +8,7 @@ from pathlib import Path
 
 from toolkit.workbench.assets import STATIC
 
-OWN = {"workbench.css", "workbench.js", "vendored.toml"}
+OWN = {"curves.js", "session.js", "vendored.toml", "work.css", "workbench.css", "workbench.js"}
 
 
 def test_every_file_of_others_is_declared_with_its_hash_and_licence() -> None:
@@ -25,7 +25,7 @@ def test_no_template_or_style_names_another_host() -> None:
     folder = STATIC.parent
     for path in [
         *folder.glob("templates/*.j2"),
-        *(STATIC / name for name in ("workbench.css", "workbench.js")),
+        *(STATIC / name for name in ("session.js", "workbench.css", "workbench.js")),
     ]:
         text = path.read_text()
         assert "http:" not in text, path.name

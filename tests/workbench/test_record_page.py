@@ -149,32 +149,6 @@ def test_an_approval_that_lacks_something_says_what(own: Served, form: dict[str,
     assert own.registry.status("cell-r7").state == "candidate"
 
 
-def test_where_people_are_enrolled_the_page_shows_the_command_and_decides_nothing(
-    own: Served, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    from toolkit.lab.people import enrol_person
-    from toolkit.trust.keys import make_key, open_signer
-
-    signers, keys = [], tmp_path_factory.mktemp("keys")
-    for name in ("anna", "bert"):
-        make_key(keys / name, "secret words", name)
-        signers.append(open_signer(keys / name, lambda: "secret words"))
-    own.registry.signers = tuple(signers[:1])
-    enrol_person(
-        own.registry, "anna", name="Anna", roles=("head",), key=keys / "anna.pub", reason="first",
-        recovery=signers[1],
-    )  # fmt: skip
-    page = own.page("/record/cell-r7")
-    assert (
-        "toolkit calibration approve cell-r7 --in-force-from 2024-03-01 --checked-by NAME --sign KEY"
-        in page.body
-    )
-    assert "<form" not in page.body
-    answer = own.send("/record/cell-r7/decide/approve", {"in_force_from": "2024-03-01", "checked_by": "B"})
-    assert answer.status == 400
-    assert own.registry.status("cell-r7").state == "candidate"
-
-
 def test_hostile_words_of_a_session_stay_text(own: Served) -> None:
     from tests.cli.test_calibration_control import session
     from toolkit.calibration.control.calibrate import calibrate

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toolkit.errors import ConfigError
-from toolkit.files import read_toml
+from toolkit.files import read_toml, same_file
 from toolkit.inputs import is_regular
 from toolkit.machine import Machine, load_machine
 from toolkit.recording.folder import nearest_test_toml
@@ -80,7 +80,7 @@ def _is_tare(path: Path, tare: object, folder: Path) -> bool:
     if not isinstance(name, str):
         return False
     tare_file = folder / name
-    return is_regular(tare_file) and is_regular(path) and tare_file.samefile(path)
+    return is_regular(tare_file) and is_regular(path) and same_file(tare_file, path)
 
 
 def _date(value: object, toml: Path) -> dt.date:

@@ -26,7 +26,7 @@ from toolkit.audit.model import CLEAN
 from toolkit.calibration.registry.registry import instrument_of
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import OutputError, ToolkitError
-from toolkit.files import sha256_file
+from toolkit.files import real_path, sha256_file
 from toolkit.inputs import SETTINGS_FILE, read_input
 from toolkit.publication import publication, settle
 from toolkit.recording.folder import TEST_FILE, nearest_test_toml
@@ -84,7 +84,7 @@ def check_target(archive: Path, target: Path) -> None:
     OutputError
         ``repair-target``: the folder is the archive, inside it, or around it; or it holds other files
     """
-    source_folder, target_folder = archive.resolve(), target.resolve()
+    source_folder, target_folder = real_path(archive), real_path(target)
     if (
         source_folder == target_folder
         or source_folder in target_folder.parents
@@ -127,7 +127,7 @@ def write_copies(
             if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
                 continue
             folder = (target / plain["path"]).parent
-            if not folder.resolve().is_relative_to(target.resolve()):
+            if not real_path(folder).is_relative_to(real_path(target)):
                 raise _refused(folder, "a link that leads outside", "a plain folder")
             key = (plain["in_force"], plain["date"])
             if key not in standings:
@@ -235,7 +235,7 @@ def _csv(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> str:
 def _keep_test(path: Path, archive: Path, stage: Path) -> None:
     # The test's own test.toml goes along, as it is: without it a copy has no date and no machine.
     toml = nearest_test_toml(path.parent)
-    root = Path(os.path.abspath(archive))  # noqa: PTH100  resolve() would follow links
+    root = Path(os.path.abspath(archive))  # noqa: PTH100  links are not followed
     if toml is None or root not in toml.parents:
         return
     place = stage / toml.parent.relative_to(root) / TEST_FILE

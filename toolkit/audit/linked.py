@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys
+from toolkit.files import check_keys, real_path
 from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
 from toolkit.publication import ENTERING, PENDING, settle
 from toolkit.recording.marks import GENERATOR
@@ -148,7 +148,7 @@ def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tup
     """Return the reports without the archive's own recordings, which may stand in the same folder."""
     if all(report.path is None for report in reports):
         return reports
-    archive = audit.archive.resolve()
+    archive = real_path(audit.archive)
     recordings = {archive / plain["path"] for plain in audit.files.plain() if plain["grade"] != "unreadable"}
     return tuple(report for report in reports if report.path is None or report.path not in recordings)
 
@@ -220,7 +220,7 @@ def _of_folder(folder: Path) -> Iterator[PastReport]:
                 shown = path.relative_to(folder)
                 yield PastReport(
                     report=shown.as_posix(),
-                    path=path.resolve(),
+                    path=real_path(path),
                     words=_words(shown.with_suffix("").as_posix()),
                 )
 

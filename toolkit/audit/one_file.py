@@ -86,7 +86,7 @@ class Auditor:
 
     def __init__(self, archive: Path, registry: Registry, known_at: dt.date | None) -> None:
         self.archive = archive
-        self._root = Path(os.path.abspath(archive))  # noqa: PTH100  resolve() would follow links
+        self._root = Path(os.path.abspath(archive))  # noqa: PTH100  links are not followed
         self.choices = Choices(registry=registry, known_at=known_at)
         self._toml = functools.lru_cache(maxsize=64)(read_toml)
         nearest = functools.lru_cache(maxsize=64)(nearest_test_toml)

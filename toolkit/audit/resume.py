@@ -31,6 +31,7 @@ from toolkit.files import sha256_bytes, sha256_file
 from toolkit.inputs import SETTINGS_FILE, open_regular_to_append, raised_to, read_regular
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
+from toolkit.system import WITHOUT_WAITING, lock_file
 from toolkit.version import __version__
 
 RESULTS = "results.jsonl"
@@ -229,7 +230,7 @@ class Results:
 def _content_hash(path: str) -> str | None:
     try:
         # One read and no buffer, nor a Path: most files are small, and there are very many.
-        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        handle = os.open(path, os.O_RDONLY | WITHOUT_WAITING)
         try:
             size = os.fstat(handle).st_size
             data = os.read(handle, size + 1) if size <= _SMALL else b""
@@ -256,15 +257,13 @@ def _words(toml: Path | None) -> str:
 
 
 def _opened(path: Path) -> IO[bytes]:
-    import fcntl
-
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = open_regular_to_append(path)
     except OSError as error:
         raise _refused(path, error.strerror or "an error", "a folder that can be written to") from error
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock_file(file.fileno())
     except OSError as error:
         file.close()
         raise _refused(path, "another audit writes here", "a folder of its own", rule="in-use") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import heapq
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,8 @@ from toolkit.errors import ToolkitError
 from toolkit.recording.read import read_recording
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -49,11 +51,13 @@ class Timeline:
     last: dt.date
 
 
-def timelines(audit: ArchiveAudit, registry: Registry) -> tuple[Timeline, ...]:
-    """Return the timeline of every instrument that the archive has dated files of."""
+def timelines(
+    files: Iterable[Mapping[str, Any]], registry: Registry, known_at: dt.date
+) -> tuple[Timeline, ...]:
+    """Return the timeline of every instrument that plain answers have dated files of."""
     counts: dict[str, Counter[tuple[str, str, str]]] = {}
     days: dict[str, tuple[str, str]] = {}
-    for line in audit.files.plain():
+    for line in files:
         instrument, date = line["instrument"], line["date"]
         if instrument is None or date is None:
             continue
@@ -61,7 +65,7 @@ def timelines(audit: ArchiveAudit, registry: Registry) -> tuple[Timeline, ...]:
         counts.setdefault(instrument, Counter())[who, date[:7], line["grade"]] += 1
         first, last = days.get(instrument, (date, date))
         days[instrument] = (min(first, date), max(last, date))
-    choices = Choices(registry=registry, known_at=audit.known_at)
+    choices = Choices(registry=registry, known_at=known_at)
     return tuple(
         Timeline(
             instrument=name,
@@ -98,11 +102,15 @@ def _stretches(choices: Choices, instrument: str) -> tuple[Stretch, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trace:
-    """One file, row by row: FY [N] and MZ [N·m] as it has them (``old``) and by the record (``new``)."""
+    """One file, row by row: FY [N] and MZ [N·m] as it has them (``old``) and by the record (``new``).
+
+    ``sha256`` is the hash of the file as it is now.
+    """
 
     plain: dict[str, Any]
     old: dict[str, NDArray[np.float64]]
     new: dict[str, NDArray[np.float64]]
+    sha256: str
 
 
 def worst_files(audit: ArchiveAudit, count: int) -> list[dict[str, Any]]:
@@ -120,15 +128,26 @@ def worst_files(audit: ArchiveAudit, count: int) -> list[dict[str, Any]]:
 def traces(audit: ArchiveAudit, registry: Registry, count: int) -> Iterator[Trace]:
     """Yield the rows of the worst files; one that can no longer be read is left out."""
     for plain in worst_files(audit, count):
-        path = audit.archive / plain["path"]
         try:
-            recording = read_recording(path, context_of(path).machine)
-            record = registry.load(plain["in_force"])
+            yield trace_of(audit.archive, plain, registry)
         except ToolkitError:
             continue
-        columns = columns_of(recording)
-        yield Trace(
-            plain=plain,
-            old={load: recording[load].si for load in columns.loads},
-            new=recompute(columns, record),
-        )
+
+
+def trace_of(archive: Path, plain: dict[str, Any], registry: Registry) -> Trace:
+    """Return the rows of one file of an archive by its plain answer, which names a record in force.
+
+    Raises
+    ------
+    ToolkitError
+        the file can no longer be read, or its record fails a gate
+    """
+    path = archive / plain["path"]
+    recording = read_recording(path, context_of(path).machine)
+    columns = columns_of(recording)
+    return Trace(
+        plain=plain,
+        old={load: recording[load].si for load in columns.loads},
+        new=recompute(columns, registry.load(plain["in_force"])),
+        sha256=recording.sha256,
+    )

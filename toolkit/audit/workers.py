@@ -88,7 +88,7 @@ def run_isolated(
     Raises
     ------
     ConfigError
-        ``workers``: three processes in a row ended before they were ready
+        ``workers``: three processes in a row ended before they were ready, and no other one works
 
     A name whose worker died is given to a fresh worker, alone, once more: where several were in its pipe,
     the dead one is the first, but a machine that ran short of memory may have killed the wrong one.
@@ -98,6 +98,7 @@ def run_isolated(
     todo = deque(names)
     doubtful: set[str] = set()
     stillborn = 0  # workers that ended before they were ready, one after the other
+    limit = workers
     pool: list[_Worker[Result]] = []
 
     def start() -> _Worker[Result]:
@@ -141,7 +142,7 @@ def run_isolated(
 
     try:
         while todo or any(worker.waiting for worker in pool):
-            while len(pool) < min(workers, len(todo) + len(pool)) and todo:
+            while len(pool) < min(limit, len(todo) + len(pool)) and todo:
                 pool.append(start())
             for worker in pool:
                 feed(worker)
@@ -155,8 +156,10 @@ def run_isolated(
                         if not worker.ready:
                             bury(worker, "")
                             stillborn += 1
-                            if stillborn == _TRIES:
+                            if stillborn == _TRIES and not any(living.ready for living in pool):
                                 raise _no_workers() from None
+                            if stillborn == _TRIES:
+                                limit, stillborn = len(pool), 0  # those that live go on alone
                             continue
                         name = worker.waiting[0]
                         lost = bury(worker, DIED)
@@ -165,7 +168,7 @@ def run_isolated(
                         continue
                     worker.since = time.monotonic()
                     if not worker.ready:
-                        worker.ready, stillborn = True, 0
+                        worker.ready, stillborn, limit = True, 0, workers
                         continue
                     yield worker.waiting.popleft(), result
                 elif worker.waiting and time.monotonic() - worker.since > timeout_s(worker.waiting[0]):
@@ -213,13 +216,12 @@ def _no_workers() -> ConfigError:
 
 
 def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> None:
-    import resource
     import signal
 
-    from toolkit.worker.posix import lower_limit
+    from toolkit.system import limit_memory
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends its workers
-    lower_limit(resource.RLIMIT_AS, MEMORY_BYTES)
+    limit_memory(MEMORY_BYTES)
     work = make()
     # What is there now stays, and a file leaves hardly any cycles that would have to be looked for.
     gc.freeze()

@@ -72,7 +72,7 @@ class Characteristic:
     Attributes
     ----------
     name : key in rows, sheets and answers
-    symbol, title, title_de : as equations and people call it
+    symbol, title : as equations and people call it
     definition, formula : in words, in text; SAE axes that follow the travel
     term, source : what a standard or the source document calls it, and which
     channel : FY or MZ, what it is read off
@@ -97,7 +97,6 @@ class Characteristic:
     name: str
     symbol: str
     title: str
-    title_de: str
     definition: str
     formula: str
     term: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,28 +24,41 @@ _REACH_RAD = math.radians(0.5)
 _Key = tuple[Characteristic, float, str, float | None]
 
 
-def rows_of(directions: Sequence[Direction], *, shared: SharedErrors) -> tuple[Row, ...]:
+def rows_of(
+    directions: Sequence[Direction],
+    *,
+    shared: SharedErrors,
+    scatter: Scatter | None = None,
+    wanted: Callable[[Characteristic, float | None], bool] = lambda _declared, _SA: True,
+) -> tuple[Row, ...]:
     """Return every characteristic of a test, with parts: of its loads, its directions, its slip angle steps.
 
     What the test cannot give is a row without an estimate that says what lacks.
+
+    Parameters
+    ----------
+    scatter : of the conditions about the curves; by default what the residuals show
+    wanted : which characteristics are read, and at which slip angles [rad]; by default all
     """
     steps = sorted({
         c.step_SA for direction in directions for c in direction.group.conditions if c.step_SA is not None
     })  # fmt: skip
-    scatter = scatter_of(directions)
+    scatter = scatter_of(directions) if scatter is None else scatter
     readers = [Reader(direction, shared=shared, scatter=scatter) for direction in directions]
     numbers: dict[_Key, Uncertain | None] = {}
     for load in sorted({direction.group.load_N for direction in directions}):
         runs = {reader.group.rotation: reader for reader in readers if reader.group.load_N == load}
-        for declared in of_scope("load"):
+        for declared in (d for d in of_scope("load") if wanted(d, None)):
             complete = all(rotation in runs for rotation in declared.runs)
             number = declared.read(declared, *(runs[r] for r in declared.runs)) if complete else None
             numbers[declared, load, BOTH, None] = number
     for reader in readers:
         load, rotation = reader.group.load_N, reader.group.rotation
-        for declared in of_scope("direction"):
+        for declared in (d for d in of_scope("direction") if wanted(d, None)):
             numbers[declared, load, rotation, None] = declared.read(declared, reader)
-        numbers |= at_angles(reader, steps)
+        at = [SA for SA in steps if any(wanted(declared, SA) for declared in of_scope("angle"))]
+        listed = [declared for declared in of_scope("angle") if any(wanted(declared, SA) for SA in at)]
+        numbers |= {key: n for key, n in at_angles(reader, at, listed).items() if wanted(key[0], key[3])}
     by_load: dict[float, list[Direction]] = {}
     for direction in directions:
         by_load.setdefault(direction.group.load_N, []).append(direction)

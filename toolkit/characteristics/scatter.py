@@ -18,7 +18,7 @@ What a curve's form misses stands among the residuals too and widens ``a``.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -95,8 +95,14 @@ def weights_of(direction: Direction, channel: Channel) -> Array:
     return np.asarray(scale[:, None] * pseudo)
 
 
-def scatter_of(directions: Sequence[Direction]) -> Scatter:
-    """Return the scatter of the conditions of a test about all its curves."""
+def scatter_of(directions: Sequence[Direction], *, expected: Array | None = None) -> Scatter:
+    """Return the scatter of the conditions of a test about all its curves.
+
+    Parameters
+    ----------
+    expected : variances of the sources (4,) of a test that is yet to be made: what it will say of them, on
+        average, in place of what the residuals say
+    """
     sensitivities = _sensitivities(directions)
     scale = _scale(directions, sensitivities)
     curves = [
@@ -104,10 +110,13 @@ def scatter_of(directions: Sequence[Direction]) -> Scatter:
         for direction in directions
         if direction.fit.FY is not None or direction.fit.MZ is not None
     ]
-    freedoms = sum(len(curve.z) for curve in curves)
+    if expected is not None:
+        curves = [curve.expecting(expected / scale**2) for curve in curves]
+    freedoms = sum(len(curve.rows) for curve in curves)
     free = np.array([True, True, freedoms >= _ENOUGH, freedoms >= _ENOUGH])
     free &= np.array([
-        any(float(np.trace(curve.parts[k])) > _SETTLED * len(curve.z) for curve in curves) for k in range(4)
+        any(float(np.trace(curve.parts[k])) > _SETTLED * len(curve.rows) for curve in curves)
+        for k in range(4)
     ]) if curves else False  # fmt: skip
     variances, covariance = _restricted(curves, free)
     return Scatter(
@@ -166,9 +175,10 @@ def _scale(directions: Sequence[Direction], sensitivities: Mapping[tuple[float, 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Residuals:
-    # Of one direction, in the space that its curves leave: residuals z (f,), what its rows and the way to the
-    # common load explain (f, f), and what each source would (4, f, f); values in parts of max|y|.
-    z: Array
+    # Of one direction, in the space that its curves leave: residuals (f,), what its rows and the way to the
+    # common load explain (f, f), and what each source would (4, f, f); values in parts of max|y|. Of a test
+    # that is yet to be made the columns of z are those of a root of the residuals' covariance.
+    z: tuple[Array, ...]
     rows: Array
     parts: Array
 
@@ -203,7 +213,12 @@ class _Residuals:
             through = K @ columns
             parts.append(through @ through.T)
         rows = (K * np.concatenate(variances)) @ K.T
-        return cls(z=K @ np.concatenate(residuals), rows=rows, parts=np.array(parts))
+        return cls(z=(K @ np.concatenate(residuals),), rows=rows, parts=np.array(parts))
+
+    def expecting(self, variances: Array) -> _Residuals:
+        """Return what the residuals are on average where the sources have these variances."""
+        values, vectors = np.linalg.eigh(self.rows + np.einsum("k,kij->ij", variances, self.parts))
+        return replace(self, z=tuple((vectors * np.sqrt(np.maximum(values, 0.0))).T))
 
 
 def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -214,7 +229,8 @@ def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[
     chosen = np.flatnonzero(free)
     if not len(curves) or not len(chosen):
         return variances, covariance
-    total = sum(float(curve.z @ curve.z) for curve in curves) / sum(len(curve.z) for curve in curves)
+    squares = sum(float(z @ z) for curve in curves for z in curve.z)
+    total = squares / sum(len(curve.rows) for curve in curves)
     variances[chosen] = total / len(chosen)
     for _ in range(_STEPS):
         information, right = _score(curves, variances, chosen)
@@ -241,8 +257,9 @@ def _score(curves: Sequence[_Residuals], variances: Array, chosen: NDArray[np.in
         V = curve.rows + np.einsum("k,kij->ij", variances, curve.parts)
         inverse = np.linalg.inv(V)
         through = inverse @ curve.parts[chosen]
-        weighted = inverse @ curve.z
         information += 0.5 * np.einsum("kij,lji->kl", through, through)
-        right += 0.5 * np.einsum("i,kij,j->k", weighted, curve.parts[chosen], weighted)
+        for z in curve.z:
+            weighted = inverse @ z
+            right += 0.5 * np.einsum("i,kij,j->k", weighted, curve.parts[chosen], weighted)
         right -= 0.5 * np.einsum("kij,ji->k", through, inverse @ curve.rows)
     return information, right

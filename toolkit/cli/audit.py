@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, KnownAt, Quiet, day, progress, stream
+from toolkit.cli.console import (
+    Calibrations,
+    Draft,
+    Home,
+    Json,
+    KnownAt,
+    Quiet,
+    day,
+    into_file,
+    into_folder,
+    progress,
+    stream,
+)
 
 NAME = "audit"
 
@@ -28,7 +41,11 @@ def command(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder that keeps the results: an audit goes on where it was ended."),
+        typer.Option(
+            "--out",
+            callback=into_folder,
+            help="Folder that keeps the results: an audit goes on where it was ended.",
+        ),
     ] = None,
     reports: Annotated[
         Path | None,
@@ -40,7 +57,11 @@ def command(
     ] = None,
     repair: Annotated[
         Path | None,
-        typer.Option("--repair", help="Folder for corrected copies; the originals are never touched."),
+        typer.Option(
+            "--repair",
+            callback=into_folder,
+            help="Folder for corrected copies; the originals are never touched.",
+        ),
     ] = None,
     template: Annotated[
         Path | None,
@@ -48,7 +69,11 @@ def command(
     ] = None,
     parquet: Annotated[
         Path | None,
-        typer.Option("--parquet", help="Also the results of all files as a Parquet table (.parquet)."),
+        typer.Option(
+            "--parquet",
+            callback=into_file,
+            help="Also the results of all files as a Parquet table (.parquet).",
+        ),
     ] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
@@ -87,5 +112,6 @@ def command(
         timing = {"seconds": seconds, "files_per_second": rate, "reused": result.made.reused}
         stream({**payload_of(result), "written": [str(path) for path in written], "timing": timing})
     elif not quiet:
-        typer.echo("\n".join([text_of(result), *(str(path) for path in written)]))
+        width = shutil.get_terminal_size().columns
+        typer.echo("\n".join([text_of(result, width=width), *(str(path) for path in written)]))
     return 0 if result.made.clean else 1

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from toolkit.cli.console import (
     Answers,
-    Calibrations,
     Home,
     Json,
     LockFile,
     Machine,
+    NewCalibrations,
     Quiet,
     RequestFile,
     Sign,
     answer,
     exit_code,
+    into_folder,
+    new_registry,
     open_signers,
     open_travel,
 )
@@ -27,14 +29,20 @@ from toolkit.errors import ConfigError
 NAME = "calibrate"
 Full = Annotated[bool, typer.Option("--full", help="Print the whole report of the fit; rows in the JSON.")]
 Figures = Annotated[
-    Path | None, typer.Option("--figures", help="Folder for the fit's figures, PNG and SVG of each.")
+    Path | None,
+    typer.Option(
+        "--figures", callback=into_folder, help="Folder for the fit's figures, PNG and SVG of each."
+    ),
 ]
 
 
 def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
-    calibrations: Calibrations = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Another name for --calibrations.")] = None,
+    calibrations: NewCalibrations = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", callback=new_registry, help="Another name for --calibrations."),
+    ] = None,
     machine: Machine = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Compute and judge everything, and make nothing.")
@@ -60,6 +68,7 @@ def command(
     Example: toolkit calibrate sessions/2026-03.toml --figures fit
     """
     from toolkit.calibration.control.calibrate import calibrate, rehearse
+    from toolkit.calibration.records.use import UNSIGNED
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.answers import refuse_unwritable
     from toolkit.lab.home import registry_to_write
@@ -99,10 +108,12 @@ def command(
         session, registry, machine=machine, again=again, standards=standards_of(registry.folder.parent)
     )
     status = NOT_ENTERED if dry_run and not candidate.existing else registry.status(candidate.record.id).state
-    payload, text = candidate_payload(candidate, status), candidate_text(candidate, status)
+    signature = UNSIGNED if status == NOT_ENTERED else registry.signature(candidate.record.id)
+    fitted = candidate_payload(candidate, status, signature)
+    text = candidate_text(candidate, status, signature)
     if status == "candidate":
         text += f"\n\nnext: {next_step(registry, candidate.record, machine)}"
-    payload["dry_run"] = dry_run
+    payload: dict[str, Any] = {**fitted, "dry_run": dry_run}
     if full or as_json or figures is not None:
         from toolkit.calibration.standards.evaluation import evaluations
 

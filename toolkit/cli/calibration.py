@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     Json,
     LockFile,
     Machine,
+    NewCalibrations,
     Quiet,
     RequestFile,
     Sign,
@@ -138,7 +139,7 @@ def import_record(
     again: Annotated[
         bool, typer.Option("--again", help="Enter a file anew whose record was discarded.")
     ] = False,
-    calibrations: Calibrations = None,
+    calibrations: NewCalibrations = None,
     lock_file: LockFile = False,
     sign: Sign = None,
     request: RequestFile = None,
@@ -167,10 +168,11 @@ def import_record(
         "existing": existing,
         "path": str(path),
     }
+    entered = "  (already entered)" if existing else ""
     text = (
-        f"{record.id}  unverified legacy import" + ("  (already entered)" if existing else "") + f"\n"
-        f"sha256 {record.sha256}\nnext: toolkit calibration approve {record.id} --in-force-from DATE "
-        "--checked-by NAME --reason TEXT"
+        f"{record.id}  unverified legacy import{entered}\nsha256 {record.sha256}\n"
+        f"signature: {payload['signature']}\n"
+        f"next: toolkit calibration approve {record.id} --in-force-from DATE --checked-by NAME --reason TEXT"
     )
     answer({"ok": True, "verified": False, "record": payload}, text, as_json=as_json, quiet=quiet)
     return 0
@@ -232,6 +234,8 @@ def approve(
     lines += ["evidence:", *(f"  {text}" for text in decision.evidence)] if decision.evidence else []
     if decision.unverifiable:
         lines += ["terms that the check loads cannot verify:", *(f"  {t}" for t in decision.unverifiable)]
+    signature = registry.signature(record_id)
+    lines.append(f"signature: {signature}")
     payload = {
         "id": record_id,
         "approved": decision.done,
@@ -241,6 +245,7 @@ def approve(
         "note": decision.note,
         "evidence": list(decision.evidence),
         "recall": registry.status(record_id).recall,
+        "signature": signature,
         "head": registry.head(_instrument_of(record_id)),
     }
     answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
@@ -377,6 +382,7 @@ def report(
 
 
 app.command(results.CERTIFICATE)(results.certificate)
+app.command("apply")(results.apply)
 app.command("budget")(results.budget)
 app.command("diff")(diff)
 app.command("discard")(discard)

@@ -11,6 +11,7 @@ import typer
 
 from toolkit.cli.console import (
     Calibrations,
+    Draft,
     Home,
     Id,
     Json,
@@ -24,6 +25,8 @@ from toolkit.cli.console import (
     ask_passphrase,
     day,
     exit_code,
+    into_file,
+    into_folder,
     open_signers,
     progress,
 )
@@ -56,7 +59,10 @@ def budget(
     seed: Annotated[int, typer.Option("--seed", help="Of the trials.")] = 0,
     digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Digits of u that count.")] = 2,
     figure: Annotated[
-        Path | None, typer.Option("--figure", help="Draw shares and U over the range: .png, .svg or .pdf.")
+        Path | None,
+        typer.Option(
+            "--figure", callback=into_file, help="Draw shares and U over the range: .png, .svg or .pdf."
+        ),
     ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
@@ -79,6 +85,47 @@ def budget(
     return exit_code(findings)
 
 
+def apply(
+    record_id: Id,
+    data: Annotated[
+        Path,
+        typer.Argument(metavar="DATA", help="Indications: CSV, .xlsx, TDMS, LVM, MDF 4, MAT or Parquet."),
+    ],
+    out: Annotated[Path, typer.Option("--out", help="A new file: .csv, .xlsx, .tdms, .mf4 or .parquet.")],
+    tare: Annotated[
+        str | None,
+        typer.Option("--tare", help="Unloaded indications, A=..,B=.., in the units of the file."),
+    ] = None,
+    on: Annotated[
+        datetime | None,
+        typer.Option("--on", formats=["%Y-%m-%d"], help="Day of the measurement; default: today."),
+    ] = None,
+    known_at: KnownAt = None,
+    draft: Draft = False,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Compute the loads of a file of indications by a record, each value with its expanded uncertainty.
+
+    Headers state units, 'A [mV/V]'; other columns of numbers go through. It needs no tire and no machine.
+
+    Example: toolkit calibration apply rig-r1 data.csv --out loads.csv
+    """
+    from toolkit.lab.applied import apply_answer
+    from toolkit.lab.budget import values_of
+    from toolkit.lab.home import open_registry
+    from toolkit.lab.record import Record
+
+    registry = open_registry(calibrations, home)
+    record = Record(result=registry.load(record_id), registry=registry, on=day(on), known_at=day(known_at))
+    zero = None if tare is None else values_of(tare, "--tare")
+    payload, text, loads = apply_answer(record, data, out, tare=zero, draft=draft)
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return exit_code(loads.findings)
+
+
 def certificate(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
     template: Annotated[
@@ -86,7 +133,8 @@ def certificate(
         typer.Option("--template", help="Word template; default: report_templates/certificate.docx."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Output folder; default: certificate-<ID> here.")
+        Path | None,
+        typer.Option("--out", callback=into_folder, help="Output folder; default: certificate-<ID> here."),
     ] = None,
     dcc: Annotated[bool, typer.Option("--dcc", help="Also write the DCC 3.3.0 file (XML).")] = False,
     replaces: Annotated[
@@ -97,6 +145,14 @@ def certificate(
     ] = None,
     draft: Annotated[
         bool, typer.Option("--draft", help="Allow a record that is not approved: every page says DRAFT.")
+    ] = False,
+    issue: Annotated[
+        bool,
+        typer.Option(
+            "--issue",
+            help="Enter it in the ledger, its PDF carries the proof; always where people are enrolled, or "
+            "with --seal.",
+        ),
     ] = False,
     sign: Sign = None,
     lock_file: LockFile = False,
@@ -113,7 +169,7 @@ def certificate(
 ) -> int:
     """Issue the calibration certificate of a record: Word, verified PDF, and with --dcc the XML.
 
-    It is an entry of the ledger, signed where people are enrolled; a draft is none. A legacy import, a
+    Where people are enrolled it is an entry of the ledger that they sign; a draft is none. A legacy import, a
     candidate and a withdrawn record have none. What nobody stated is a visible gap (exit 1). --known-at is
     the day of issue, and of what was known.
 
@@ -132,7 +188,8 @@ def certificate(
         issued, delivered = deliver_certificate(
             registry, record_id, opened,
             out or Path.cwd() / f"certificate-{record_id}", issued=day(known_at), draft=draft,
-            replaces=replaces, amendment=amendment_reason, dcc=dcc, sealing=sealing, keep=keep, step=step,
+            replaces=replaces, amendment=amendment_reason, dcc=dcc, sealing=sealing, asked=issue,
+            keep=keep, step=step,
         )  # fmt: skip
     payload = certificate_payload(issued, delivered, sealing) | {
         "timing": {"seconds": time.perf_counter() - started}
@@ -193,7 +250,9 @@ def standard(
 
 def chart(
     instrument: Annotated[str, typer.Argument(help="The instrument.")],
-    out: Annotated[Path | None, typer.Option("--out", help="A picture: FILE.png or FILE.svg.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", callback=into_file, help="A picture: FILE.png or FILE.svg.")
+    ] = None,
     load: Annotated[str | None, typer.Option("--load", help="One load only.")] = None,
     baseline: Annotated[
         int | None,

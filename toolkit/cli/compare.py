@@ -20,9 +20,11 @@ from toolkit.cli.console import (
     answer,
     day,
     exit_code,
+    into_folder,
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
+from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Mode
@@ -32,12 +34,12 @@ NAME = "compare"
 
 def command(
     sources: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="A B ...",
             help="Tests (folders or reduced .xlsx) and makers' tables (.csv); A is the reference.",
         ),
-    ],
+    ] = None,
     mode: Annotated[
         str | None,
         typer.Option("--mode", help="table, surfaces, tires or repeats; default: by what the tests state."),
@@ -45,6 +47,24 @@ def command(
     axes: Annotated[
         str, typer.Option("--axes", help="Axes of the tables: SAE, adapted-SAE, ISO-W, machine.")
     ] = "SAE",
+    laboratories: Annotated[
+        Path | None,
+        typer.Option(
+            "--laboratories",
+            metavar="FILE",
+            help="Interlaboratory comparison (.csv): measurand,laboratory,value [N],U [N],k; a row a result.",
+        ),
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            "--reference", help="Laboratory whose values are the assigned ones; default: consensus."
+        ),
+    ] = None,
+    sigma: Annotated[
+        float | None,
+        typer.Option("--sigma", help="sigma_pt of --laboratories, in the results' unit; default: robust."),
+    ] = None,
     level: Annotated[
         float, typer.Option("--level", help="Chance of even one false decision in a table (Holm).")
     ] = 0.05,
@@ -62,10 +82,17 @@ def command(
     ] = None,
     figures: Annotated[
         Path | None,
-        typer.Option("--figures", help="Folder for the figures (PNG), as the thesis's 6.6 to 6.29."),
+        typer.Option(
+            "--figures",
+            callback=into_folder,
+            help="Folder for the figures (PNG), as the thesis's 6.6 to 6.29.",
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for comparison.docx and its verified comparison.pdf.")
+        Path | None,
+        typer.Option(
+            "--out", callback=into_folder, help="Folder for comparison.docx and its verified comparison.pdf."
+        ),
     ] = None,
     template: Annotated[
         Path | None,
@@ -89,6 +116,9 @@ def command(
     A maker's table holds forces (SA [deg],FZ [N],FY [N],MZ [N*m]) or characteristics (FZ [N],conicity [N],
     U_conicity [N],plysteer [N],secant_cornering [N/deg],...).
 
+    --laboratories takes an interlaboratory comparison instead: scores z', zeta and E_n by ISO 13528, and
+    repeatability and reproducibility by ISO 5725-2, for laboratories with different numbers of results too.
+
     Ends with 0 whether or not there are differences: they are results. 1: the data has findings.
 
     Example: toolkit compare tests/steel tests/sandpaper --figures figures
@@ -98,6 +128,15 @@ def command(
     from toolkit.lab.compare import comparison_template, read_entries, write_comparison
     from toolkit.lab.compare_answer import comparison_payload, comparison_text
 
+    if laboratories is not None:
+        return _laboratories(laboratories, sources, reference, sigma, figures, out, json=json, quiet=quiet)
+    if not sources or reference is not None or sigma is not None:
+        raise ConfigError(
+            "there is nothing to compare" if not sources else "an option of --laboratories alone",
+            where="compare", got="no tests" if not sources else "--reference or --sigma",
+            expected="two tests or more, or --laboratories FILE", next_step="see 'toolkit compare --help'",
+            rule="usage",
+        )  # fmt: skip
     chosen = choose_reader(reader)
     style = unit_choice(units or "SI")
     started = time.perf_counter()
@@ -127,3 +166,30 @@ def command(
         text += "".join(f"\n  warning {warning}" for warning in document.warnings)
     answer(payload, text, as_json=json, quiet=quiet)
     return 1 if document is not None and document.warnings else exit_code(attention)
+
+
+def _laboratories(
+    path: Path,
+    sources: list[Path] | None,
+    reference: str | None,
+    sigma: float | None,
+    figures: Path | None,
+    out: Path | None,
+    *,
+    json: bool,
+    quiet: bool,
+) -> int:
+    from toolkit.lab.laboratories import laboratories_answer
+
+    if sources or out is not None:
+        raise ConfigError(
+            "a comparison of laboratories takes neither tests nor a document", where="--laboratories",
+            got=", ".join(map(str, sources)) if sources else "--out",
+            expected="--laboratories FILE, with --figures DIR",
+            next_step="leave them out", rule="usage",
+        )  # fmt: skip
+    started = time.perf_counter()
+    payload, text, findings = laboratories_answer(path, reference=reference, sigma=sigma, figures=figures)
+    payload["timing"] = {"seconds": time.perf_counter() - started}
+    answer(payload, text, as_json=json, quiet=quiet)
+    return exit_code(findings)

@@ -6,7 +6,7 @@ import contextlib
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -19,11 +19,68 @@ if TYPE_CHECKING:
     from toolkit.trust.keys import Signer
     from toolkit.trust.signing import Travel
 
+
+def into_folder(folder: Path | None) -> Path | None:
+    """Refuse a folder that results cannot enter: the callback of an option, before anything is worked out."""
+    if folder is not None:
+        from toolkit.publication import check_folder
+
+        check_folder(folder)
+    return folder
+
+
+def into_file(path: Path | None) -> Path | None:
+    """Refuse a file that cannot be a result, as `into_folder` does."""
+    if path is not None:
+        from toolkit.publication import check_file
+
+        check_file(path)
+    return path
+
+
+def _home(folder: Path | None) -> Path | None:
+    """Refuse a home that is none: what is named is never passed over, whether it is needed or not."""
+    if folder is not None:
+        from toolkit.lab.home import find_home
+
+        find_home(folder)
+    return folder
+
+
+def _registry(folder: Path | None) -> Path | None:
+    if folder is not None:
+        from toolkit.lab.home import calibrations_folder
+
+        calibrations_folder(folder)
+    return folder
+
+
+def new_registry(folder: Path | None) -> Path | None:
+    """Refuse a registry folder that is none and cannot be made."""
+    if folder is not None:
+        from toolkit.lab.home import registry_to_write
+
+        registry_to_write(folder)
+    return folder
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Calibrations = Annotated[
     Path | None,
-    typer.Option("--calibrations", help="Registry folder; default: calibrations/ of the laboratory's home."),
+    typer.Option(
+        "--calibrations",
+        callback=_registry,
+        help="Registry folder; default: calibrations/ of the laboratory's home.",
+    ),
+]
+NewCalibrations = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibrations",
+        callback=new_registry,
+        help="Registry folder, made where there is none; default: calibrations/ of the laboratory's home.",
+    ),
 ]
 LockFile = Annotated[
     bool,
@@ -45,6 +102,7 @@ RequestFile = Annotated[
     typer.Option(
         "--request",
         metavar="FILE",
+        callback=into_file,
         help="Write what is to be signed to FILE, for 'toolkit sign' on another computer; enter nothing.",
     ),
 ]
@@ -66,7 +124,11 @@ Machine = Annotated[
 ]
 Home = Annotated[
     Path | None,
-    typer.Option("--home", help="Laboratory's home; default: the nearest folder upward with calibrations/."),
+    typer.Option(
+        "--home",
+        callback=_home,
+        help="Laboratory's home; default: the nearest folder upward with calibrations/.",
+    ),
 ]
 Id = Annotated[str, typer.Argument(help="Record id, such as m15-r2.")]
 CalibrationId = Annotated[
@@ -127,11 +189,37 @@ Reader = Annotated[
 ]
 
 
-def ask_passphrase() -> bytes:
-    """Ask for the passphrase of a key: at the terminal, unseen, or as the first line of the input."""
-    if sys.stdin.isatty():
-        return str(typer.prompt("passphrase of the key", hide_input=True, err=True)).encode()
-    return sys.stdin.readline().rstrip("\n").encode()
+def ask_passphrase(key: Path, *, twice: bool = False) -> str:
+    """Ask for the passphrase of a key: at the terminal, unseen, or as the first line of the input.
+
+    ``twice``: of a new key, whose passphrase is typed a second time at a terminal.
+
+    Raises
+    ------
+    TrustError
+        ``signing-key``: the input has ended, or the two differ
+    """
+    from getpass import getpass
+
+    from toolkit.errors import TrustError
+
+    text = f"passphrase of {key}: "
+    got = "the end of the input"
+    with contextlib.suppress(EOFError):
+        if not sys.stdin.isatty():
+            if line := sys.stdin.readline():
+                return line.rstrip("\r\n")
+        else:
+            passphrase = getpass(text)
+            if not twice or passphrase == getpass(f"{text}once more: "):
+                return passphrase
+            got = "two that differ"
+    raise TrustError(
+        "a key takes a passphrase", where=key, got=got,
+        expected="the passphrase at a terminal, or as the first line of the input",
+        next_step="run it at a terminal; without one, name the public half of a key that the SSH agent holds",
+        rule="signing-key",
+    )  # fmt: skip
 
 
 def day(moment: datetime | None) -> date | None:
@@ -155,11 +243,10 @@ def open_signers(keys: Sequence[Path] | None) -> tuple[Signer, ...]:
         ``signing-key``, ``weak-key``
     """
     from functools import partial
-    from getpass import getpass
 
     from toolkit.trust.keys import open_signer
 
-    return tuple(open_signer(key, partial(getpass, f"passphrase of {key}: ")) for key in keys or ())
+    return tuple(open_signer(key, partial(ask_passphrase, key)) for key in keys or ())
 
 
 def open_travel(request: Path | None, answers: Sequence[Path] | None) -> Travel:
@@ -187,7 +274,7 @@ def open_travel(request: Path | None, answers: Sequence[Path] | None) -> Travel:
     return Travel(request=request, answers=tuple(map(read_request, answers or ())))
 
 
-def answer(payload: dict[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:
+def answer(payload: Mapping[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:
     """Print a command's result: the JSON document, or the text for people, or nothing."""
     with _printing():
         if as_json:
@@ -283,7 +370,12 @@ def print_usage_error(error: Exception, *, as_json: bool) -> None:
 
 @contextlib.contextmanager
 def progress(total: int | None, title: str, *, show: bool = True) -> Iterator[Callable[[str], None]]:
-    """Yield ``step(text)``: advances a bar on stderr, drawn only on a terminal."""
+    """Yield ``step(text)``: advances a bar on stderr, drawn only on a terminal, or the note of a job."""
+    from toolkit.lab.progress_note import note_of
+
+    if (note := note_of(title, total)) is not None:
+        yield note.step
+        return
     if not (show and sys.stderr.isatty()):
         yield lambda _text: None
         return

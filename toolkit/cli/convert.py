@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     answer,
     day,
     exit_code,
+    into_file,
 )
 
 NAME = "convert"
@@ -25,7 +26,7 @@ NAME = "convert"
 
 def command(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A .tir, .tdx, .csv or reduced .xlsx.")],
-    target: Annotated[Path, typer.Argument(metavar="OUT", help="A .tir, .tdx or .csv.")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", callback=into_file, help="A .tir, .tdx or .csv.")],
     axes: Annotated[
         str, typer.Option("--axes", help="Axes of the .csv: SAE, adapted-SAE, ISO-W, machine.")
     ] = "SAE",

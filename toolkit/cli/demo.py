@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer
+from toolkit.cli.console import Json, Quiet, answer, into_folder
 from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
@@ -39,7 +39,10 @@ class Step:
 def command(
     context: typer.Context,
     out: Annotated[
-        Path, typer.Option("--out", help="Output folder; one that an earlier demo made is replaced.")
+        Path,
+        typer.Option(
+            "--out", callback=into_folder, help="Output folder; one that an earlier demo made is replaced."
+        ),
     ] = Path("demo-out"),
     json: Json = False,
     quiet: Quiet = False,

@@ -8,14 +8,29 @@ from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Isolated, Json, Memory, Processes, Quiet, answer
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Isolated,
+    Json,
+    Memory,
+    Processes,
+    Quiet,
+    answer,
+    into_folder,
+)
 
 NAME = "diagnose"
 
 
 def command(
     case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Simulation and recordings.")],
-    out: Annotated[Path, typer.Option("--out", help="Folder for diagnosis.json, the page and predictions.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", callback=into_folder, help="Folder for diagnosis.json, the page and predictions."
+        ),
+    ],
     budget: Annotated[
         float, typer.Option("--budget", min=1.0, help="Seconds after which a partial answer is given.")
     ] = 600.0,
@@ -105,6 +120,10 @@ def _one_thread() -> None:
 def _teller(*, show: bool) -> Any:
     import sys
 
+    from toolkit.lab.progress_note import note_of
+
+    if (note := note_of("diagnosis", None)) is not None:
+        return note.step
     started = time.monotonic()
 
     def tell(step: str) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, exit_code
+from toolkit.cli.console import Json, Quiet, answer, exit_code, into_file
 
 NAME = "evaluate"
 
@@ -25,7 +25,8 @@ def command(
         str, typer.Option("--angles", help="star: tan(alpha), sin(gamma); raw: the angles, as MF-Tyre.")
     ] = "star",
     out: Annotated[
-        Path | None, typer.Option("--out", help="Write the grid with FX, FY, MZ to a .csv.")
+        Path | None,
+        typer.Option("--out", callback=into_file, help="Write the grid with FX, FY, MZ to a .csv."),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,

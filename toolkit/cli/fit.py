@@ -20,6 +20,8 @@ from toolkit.cli.console import (
     answer,
     day,
     exit_code,
+    into_file,
+    into_folder,
 )
 
 NAME = "fit"
@@ -27,7 +29,11 @@ NAME = "fit"
 
 def command(
     source: Annotated[
-        Path, typer.Argument(metavar="TEST|TABLE.csv", help="A test (folder or reduced .xlsx) or a table.")
+        Path,
+        typer.Argument(
+            metavar="TEST|TABLE",
+            help="A test (folder or reduced .xlsx), a table (.csv), a continuous belt test (.mat, .dat).",
+        ),
     ],
     model: Annotated[
         list[str] | None,
@@ -38,14 +44,23 @@ def command(
         ),
     ] = None,
     tir: Annotated[
-        Path | None, typer.Option("--tir", help="Write a tire file of mf52, mf61 or mf62.")
+        Path | None,
+        typer.Option("--tir", callback=into_file, help="Write a tire file of mf52, mf61 or mf62."),
     ] = None,
     figures: Annotated[
-        Path | None, typer.Option("--figures", help="Folder for figures: curves, residuals, comparison.")
+        Path | None,
+        typer.Option(
+            "--figures", callback=into_folder, help="Folder for figures: curves, residuals, comparison."
+        ),
     ] = None,
     axes: Annotated[
-        str, typer.Option("--axes", help="Axes of the table: SAE, adapted-SAE, ISO-W, machine.")
-    ] = "SAE",
+        str | None,
+        typer.Option(
+            "--axes",
+            help="Axes of the table: SAE (its default), adapted-SAE, ISO-W, machine; a belt test says them "
+            "by the sign of its load.",
+        ),
+    ] = None,
     loss: Annotated[str, typer.Option("--loss", help="linear (least squares) or robust.")] = "linear",
     weights: Annotated[
         str,
@@ -70,6 +85,9 @@ def command(
 ) -> int:
     """Fit tire models to a test or a table, every load by itself or all of them at once; no start values.
 
+    A continuous belt test, a Tire Test Consortium .mat or a Calspan .dat, is split by
+    inclination, pressure, load and direction of its sweeps; with --tir alone mf61 is fitted to it.
+
     Example: toolkit fit tire.csv --model magic_formula --model mf61 --model brush --figures figures
     """
     from toolkit.lab.answers import refuse_unwritable
@@ -83,13 +101,15 @@ def command(
     )
     from toolkit.lab.tire_files import check_tir, write_fit
     from toolkit.publication import publication
+    from toolkit.tires.field_file import is_field_file
 
     started = time.perf_counter()
-    names = model_choice(model or ["magic_formula"])
+    in_field_form = is_field_file(source)
+    names = model_choice(model or ["mf61" if tir is not None and in_field_form else "magic_formula"])
     chosen = fit_options(loss, weights, rated_load, radius)
     into = check_tir(tir, source, names) if tir is not None else None
     refuse_unwritable(figures)
-    if source.is_dir() or source.suffix.lower() != ".csv":
+    if source.suffix.lower() != ".csv" and not in_field_form:
         fitted = fit_test_models(
             source, names, axes=axes, loss=chosen, weights=weights, rated_load_N=rated_load, radius_m=radius,
             calibration=calibration, calibrations=calibrations, home=home, known_at=day(known_at),

@@ -20,6 +20,7 @@ from toolkit.cli.console import (
 
 if TYPE_CHECKING:
     from toolkit.findings import Finding
+    from toolkit.lab.record_answer_types import Inspected, UnreadFile
 
 NAME = "inspect"
 
@@ -52,7 +53,8 @@ def command(
     from toolkit.lab.inspection_answer import inspection_payload, inspection_text, intervals_of
 
     registry = registry_if_any(calibrations, home)
-    payloads, texts = [], []
+    payloads: list[Inspected | UnreadFile] = []
+    texts = []
     findings: list[Finding] = []
     failed = False
     for path in files:

@@ -9,11 +9,11 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer
+from toolkit.cli.console import Json, Quiet, answer, into_file, into_folder
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The home to make.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", callback=into_folder, help="The home to make.")],
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
@@ -23,6 +23,7 @@ def init(
 
     Example: toolkit init lab
     """
+    from toolkit.files import real_path
     from toolkit.lab.home import TEMPLATES, make_home
 
     written = make_home(folder)
@@ -31,7 +32,7 @@ def init(
         f"  calibrations/       fill it with: toolkit calibrate SESSION.toml --home {folder}\n"
         f"  report_templates/   {', '.join(p.name for p in sorted((folder / TEMPLATES).glob('*.docx')))}"
     )
-    answer({"home": folder.resolve(), "written": list(written)}, text, as_json=json, quiet=quiet)
+    answer({"home": real_path(folder), "written": list(written)}, text, as_json=json, quiet=quiet)
     return 0
 
 
@@ -60,7 +61,8 @@ def doctor(json: Json = False, quiet: Quiet = False) -> int:
 
 def qualify(
     out: Annotated[
-        Path | None, typer.Option("--out", help="Write the record here: .json, else as text.")
+        Path | None,
+        typer.Option("--out", callback=into_file, help="Write the record here: .json, else as text."),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -92,13 +94,22 @@ def explain(
             help="Rule id, or the name of an effect or of a characteristic; without it, all of them.",
         ),
     ] = None,
+    answer_of: Annotated[
+        str | None,
+        typer.Option("--answer", metavar="COMMAND", help="Print the JSON schema of a command's answer."),
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
     """Explain a finding's rule and what to do, an effect that a diagnosis names, or a characteristic.
 
-    Examples: toolkit explain no-tare, toolkit explain relaxation, toolkit explain PRAT
+    Examples: toolkit explain no-tare, toolkit explain relaxation, toolkit explain --answer process
     """
+    if answer_of is not None:
+        from toolkit.lab.answer_types import schema_text
+
+        typer.echo(schema_text(answer_of))
+        return 0
     from toolkit.lab.rules import explained
 
     payload, text = explained(rule)

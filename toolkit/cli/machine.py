@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer
+from toolkit.cli.console import Json, Quiet, answer, into_file
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
@@ -47,7 +47,10 @@ def correct(
     ],
     reason: Annotated[str, typer.Option("--reason", help="Why it is taken for the machine's own.")],
     by: Annotated[str, typer.Option("--by", help="Who decides it.")],
-    out: Annotated[Path, typer.Option("--out", help="The new definition (.toml); it must not exist yet.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", callback=into_file, help="The new definition (.toml); it must not exist yet."),
+    ],
     machine: Annotated[
         str, typer.Option("--machine", help="Machine that is corrected: a packaged name, or a definition.")
     ] = "m15",
@@ -77,10 +80,11 @@ def correct(
     from toolkit.simulation.model_file import read_model
 
     _refuse_existing(out)
+    corrected = load_machine(machine)
     model = read_model(source / "model.toml" if source.is_dir() else source)
     day = on.date() if on else date.today()  # noqa: DTZ011
     correction = correction_of(model, effect, reason=reason, by=by, date=day.isoformat())
-    fitted = machine_of(model, load_machine(machine).name)
+    fitted = machine_of(model, corrected.name)
     text, definition = next_version(machine, correction, out=out, diagnosed_with=fitted)
     write_result(out, text)
     payload = {"path": out} | _payload(definition)

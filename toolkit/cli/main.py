@@ -61,10 +61,13 @@ def _register() -> None:
         installation,
         machine,
         person,
+        plan,
+        plan_runs,  # noqa: F401  its commands stand in the group of plans
         process,
         report,
         sign,
         simulate,
+        starters,
         template,
         verify,
         watch,
@@ -80,7 +83,12 @@ def _register() -> None:
     for module in (process, fit, evaluate, convert, compare, report, watch):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
+    machine.app.command(starters.NEW)(starters.new_machine)
     app.add_typer(machine.app, name="machine")
+    for name in ("session", "test", "case"):
+        app.add_typer(getattr(starters, name), name=name)
+    plan.app.command(starters.NEW)(starters.new_plan)
+    app.add_typer(plan.app, name="plan")
     app.add_typer(person.person, name="person")
     app.add_typer(person.ledger, name="ledger")
     for module in (sign, audit, simulate, diagnose, verify):
@@ -92,11 +100,13 @@ def _register() -> None:
 
 @cache
 def _command() -> Any:
-    # Built once: whoever calls `run` many times in a process would wait for all options every time.
+    # Built once: whoever calls `run` many times in a process would wait for the options every time.
+    from toolkit.cli.groups import build_group
+
     _register()
-    command = typer.main.get_command(app)
-    _take_sizes(command, typer.main.get_command(_options).params[0])
-    return command
+    sizes = typer.main.get_command(_options).params[0]
+    # What a command reads is opened by one opener: each takes --max-size.
+    return build_group(app, lambda command: command.params.append(sizes))
 
 
 def _raise_limits(size: str | None) -> None:
@@ -120,15 +130,6 @@ def _of_every_command(
     ] = None,
 ) -> None:  # fmt: skip
     pass
-
-
-def _take_sizes(command: Any, option: Any) -> None:
-    """Let every command take ``--max-size``: what it reads is opened by one opener."""
-    if hasattr(command, "commands"):
-        for below in command.commands.values():
-            _take_sizes(below, option)
-    else:
-        command.params.append(option)
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:

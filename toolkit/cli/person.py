@@ -17,6 +17,9 @@ from toolkit.cli.console import (
     RequestFile,
     Sign,
     answer,
+    ask_passphrase,
+    into_file,
+    into_folder,
     open_signers,
     open_travel,
 )
@@ -38,7 +41,9 @@ Instrument = Annotated[str, typer.Argument(help="Instrument, such as m15.")]
 
 @person.command()
 def key(
-    file: Annotated[Path, typer.Argument(help="New private key; its public half is FILE.pub.")],
+    file: Annotated[
+        Path, typer.Argument(callback=into_file, help="New private key; its public half is FILE.pub.")
+    ],
     comment: Annotated[str, typer.Option("--comment", help="Whose it is.")] = "",
     as_json: Json = False,
     quiet: Quiet = False,
@@ -49,8 +54,7 @@ def key(
     """
     from toolkit.trust.keys import make_key
 
-    passphrase = typer.prompt("passphrase", hide_input=True, confirmation_prompt=True, err=True)
-    public = make_key(file, passphrase, comment)
+    public = make_key(file, ask_passphrase(file, twice=True), comment)
     payload = {"key": str(file), "public": public.line, "fingerprint": public.fingerprint}
     answer(payload, f"{file}.pub  {public.fingerprint}", as_json=as_json, quiet=quiet)
     return 0
@@ -245,7 +249,9 @@ def check(
 @ledger.command()
 def witness(
     instrument: Instrument,
-    folder: Annotated[Path, typer.Argument(help="The witness's folder: a share, a stick.")],
+    folder: Annotated[
+        Path, typer.Argument(callback=into_folder, help="The witness's folder: a share, a stick.")
+    ],
     name: Annotated[str, typer.Option("--name", help="Of the witness.")],
     key: Annotated[Path, typer.Option("--key", help="The witness's private key.")],
     sign: Sign = None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,9 +22,13 @@ from toolkit.cli.console import (
     answer,
     day,
     exit_code,
+    into_file,
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
+
+if TYPE_CHECKING:
+    from toolkit.lab.tire_answer_types import ProcessAnswer
 
 NAME = "process"
 
@@ -33,7 +37,10 @@ def command(
     test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
     calibration: CalibrationId = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Write the reduced test (.xlsx: the whole test in one file).")
+        Path | None,
+        typer.Option(
+            "--out", callback=into_file, help="Write the reduced test (.xlsx: the whole test in one file)."
+        ),
     ] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
@@ -74,8 +81,8 @@ def command(
             step=step,
         )
     digest = write_test_file(out, resolved.result, dict(resolved.recordings)) if out else None
-    payload = process_payload(resolved)
-    payload |= {
+    payload: ProcessAnswer = {
+        **process_payload(resolved),
         "out": out,
         "content_sha256": digest,
         "timing": {"seconds": time.perf_counter() - started},

@@ -26,6 +26,7 @@ from toolkit.cli.console import (
     answer,
     ask_passphrase,
     day,
+    into_folder,
     open_signers,
     progress,
 )
@@ -47,6 +48,7 @@ def command(
         Path | None,
         typer.Option(
             "--out",
+            callback=into_folder,
             help="Output folder; of several tests, each has its own in it. Default: report-<test name> here.",
         ),
     ] = None,

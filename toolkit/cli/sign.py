@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer
+from toolkit.cli.console import Json, Quiet, answer, ask_passphrase, into_file
 from toolkit.errors import ConfigError
 
 NAME = "sign"
@@ -23,7 +23,8 @@ def command(
         bool, typer.Option("--agent", help="The key of the SSH agent that may sign it.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Answer; default: beside the request, by who signs.")
+        Path | None,
+        typer.Option("--out", callback=into_file, help="Answer; default: beside the request, by who signs."),
     ] = None,
     passphrase_fd: Annotated[
         int | None, typer.Option("--passphrase-fd", help="File descriptor that gives the key's passphrase.")
@@ -40,8 +41,6 @@ def command(
 
     Example: toolkit sign request.json --key ~/.ssh/anna
     """
-    from getpass import getpass
-
     from toolkit.lab.signing import agent_signer_of, passphrase_of, request_text, sign_request
     from toolkit.trust.keys import open_signer
     from toolkit.trust.requests import read_request
@@ -49,13 +48,14 @@ def command(
     if agent == (key is not None):
         raise _usage("--key, --agent", "both" if agent else "neither", "one of the two")
     opened = read_request(request)
-    typer.echo(request_text(opened), err=True)
+    if not (yes and quiet):  # consent is to what was shown
+        typer.echo(request_text(opened), err=True)
     if key is None:
         signer = agent_signer_of(opened)
     elif passphrase_fd is not None:
         signer = open_signer(key, lambda: passphrase_of(passphrase_fd))
     else:
-        signer = open_signer(key, lambda: getpass(f"passphrase of {key}: "))
+        signer = open_signer(key, lambda: ask_passphrase(key))
     if not yes:
         if not sys.stdin.isatty():
             raise _usage("--yes", "no terminal to ask at", "consent: a terminal, or --yes")

@@ -17,6 +17,7 @@ from toolkit.cli.console import (
     Quiet,
     answer,
     exit_code,
+    into_folder,
 )
 
 NAME = "simulate"
@@ -24,7 +25,9 @@ NAME = "simulate"
 
 def command(
     plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="What the machine does, and what it is.")],
-    out: Annotated[Path, typer.Option("--out", help="Folder for the files; new or empty.")],
+    out: Annotated[
+        Path, typer.Option("--out", callback=into_folder, help="Folder for the files; new or empty.")
+    ],
     seed: Annotated[int | None, typer.Option("--seed", help="Replaces the plan's seed.")] = None,
     effect: Annotated[
         list[str] | None,
@@ -35,11 +38,16 @@ def command(
         ),
     ] = None,
     csv: Annotated[
-        Path | None, typer.Option("--csv", help="Folder for the recordings as CSV, every column.")
+        Path | None,
+        typer.Option("--csv", callback=into_folder, help="Folder for the recordings as CSV, every column."),
     ] = None,
     case: Annotated[
         Path | None,
-        typer.Option("--case", help="Folder for a case that `toolkit diagnose` reads; it names no effect."),
+        typer.Option(
+            "--case",
+            callback=into_folder,
+            help="Folder for a case that `toolkit diagnose` reads; it names no effect.",
+        ),
     ] = None,
     inputs: Annotated[
         list[Path] | None,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer
+from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, into_file
 
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -18,7 +18,7 @@ def check(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Tell what is wrong with a template: 0 clean, 1 findings, 2 not a Word file or not safe to open.
+    """Tell what is wrong with a template: 0 clean or mere advice, 1 findings, 2 not a safe Word file.
 
     Example: toolkit template check report_templates/org.docx
     """
@@ -42,7 +42,7 @@ def check(
     }
     # Their number tells a template that another program has robbed of its controls.
     answer(payload, text or f"{file}: no findings; {tags} different tags", as_json=json, quiet=quiet)
-    return 1 if findings else 0
+    return 1 if any(finding.level != "note" for finding in findings) else 0
 
 
 @app.command("tags")
@@ -61,6 +61,10 @@ def tags(
             "--kind", help="report, certificate, comparison, diagnosis or audit: tags of that document."
         ),
     ] = "report",
+    for_print: Annotated[
+        Path | None,
+        typer.Option("--for-print", metavar="FILE.docx", help="Also a Word file of them, to copy from."),
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -68,16 +72,21 @@ def tags(
 ) -> int:
     """List every tag that a template may use.
 
-    Example: toolkit template tags --test tests/2019-06-04
+    Example: toolkit template tags --test tests/2019-06-04 --for-print tags.docx
     """
+    from datetime import UTC, datetime
+
     from toolkit.lab.answers import table
-    from toolkit.report.kinds import VOCABULARIES, list_tags
+    from toolkit.publication import write_result
+    from toolkit.report.kinds import TITLES, VOCABULARIES, list_tags
     from toolkit.report.style import read_style, style_file
     from toolkit.report.test.content import build_content
+    from toolkit.report.word.package import read_template
+    from toolkit.report.word.tag_sheet import tag_sheet
 
     if kind not in VOCABULARIES or (kind != "report" and test is not None):
         raise typer.BadParameter(f"{', '.join(VOCABULARIES)}; only report with --test", param_hint="--kind")
-    style = read_style(style_file(template)) if template else read_style(None)
+    style = read_style(None if template is None else style_file(read_template(template).path))
     content = None
     if test is not None:
         from toolkit.lab.resolve import resolve_test
@@ -87,18 +96,79 @@ def tags(
         )
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
     listed = list_tags(content, style, VOCABULARIES[kind])
+    if for_print is not None:
+        examples = {tag["tag"]: tag["value"] for tag in listed if tag["value"] is not None}
+        today = datetime.now(tz=UTC).date()
+        sheet = tag_sheet(VOCABULARIES[kind], style, title=TITLES[kind], values=examples, day=today)
+        write_result(_word_file(for_print), sheet)
     rows = [
         [tag["tag"], tag["kind"], tag["unit"] or "", str(tag["value"] or "")[:40], tag["description"]]
         for tag in listed
     ]
     text = table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")
-    answer({"tags": listed}, text, as_json=json, quiet=quiet)
+    written = {} if for_print is None else {"written": [str(for_print)]}
+    text = text if for_print is None else str(for_print)
+    answer({"tags": listed, **written}, text, as_json=json, quiet=quiet)
     return 0
+
+
+@app.command("words")
+def words(
+    language: Annotated[
+        str | None, typer.Option("--language", help="This language alone; default: all but English.")
+    ] = None,
+    template: Annotated[
+        Path | None, typer.Option("--template", help="Only the texts that stand in this template.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """List the phrases that documents print, with their translations: 0 whole, 1 where one is missing.
+
+    Example: toolkit template words --language fr
+    """
+    from toolkit.report.word.language import fixed_texts, phrase_of
+    from toolkit.report.word.package import open_package, read_template
+    from toolkit.report.word.xml import stories
+    from toolkit.words.catalogue import SOURCE, languages, phrases
+    from toolkit.words.phrasebook import phrasebook
+
+    others = [name for name in languages() if name != SOURCE]
+    if language is not None and language not in others:
+        raise typer.BadParameter(", ".join(others), param_hint="--language")
+    chosen = others if language is None else [language]
+    listed: list[str] = list(phrases(SOURCE))
+    if template is not None:
+        texts = fixed_texts(stories(open_package(read_template(template))))
+        listed = list(dict.fromkeys(phrase_of(text.text or "") for text in texts))
+    books = {name: phrasebook(name) for name in chosen}
+    rows = [
+        {"phrase": phrase} | {name: book.say(phrase) for name, book in books.items() if book.knows(phrase)}
+        for phrase in listed
+    ]
+    missing = [
+        {"language": name, "phrase": row["phrase"]} for row in rows for name in chosen if name not in row
+    ]
+    lines = [
+        f"{'' if name == 'phrase' else f'  {name}  '}{row.get(name, 'MISSING')}"
+        for row in rows
+        for name in ("phrase", *chosen)
+    ]
+    lines.append(f"{len(rows)} phrases, {len(missing)} translations missing")
+    answer(
+        {"languages": chosen, "phrases": rows, "missing": missing},
+        "\n".join(lines),
+        as_json=json,
+        quiet=quiet,
+    )
+    return 1 if missing else 0
 
 
 @app.command("new")
 def new(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.docx.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", callback=into_file, help="Where to write it: NAME.docx.")
+    ],
     like: Annotated[
         str,
         typer.Option(
@@ -106,33 +176,32 @@ def new(
             help="Which to copy: org, summary, pruefbericht, certificate, comparison, diagnosis, audit.",
         ),
     ] = "org",
+    language: Annotated[
+        str, typer.Option("--language", help="Its texts in this language: en, de or fr.")
+    ] = "en",
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
     """Write a fresh copy of one of the toolkit's templates and its style file, to be changed in Word.
 
-    Example: toolkit template new report_templates/ours.docx --like summary
+    Example: toolkit template new report_templates/ours.docx --like summary --language fr
     """
     from toolkit.errors import OutputError
     from toolkit.lab.home import packaged_home
     from toolkit.publication import publication
-    from toolkit.report.style import style_file
+    from toolkit.report.style import style_file, style_in_language
+    from toolkit.report.word.language import in_language
+    from toolkit.report.word.package import read_template
+    from toolkit.words.catalogue import SOURCE, languages
 
     sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
     if like not in sources:
         raise typer.BadParameter(", ".join(sources), param_hint="--like")
+    if language not in languages():
+        raise typer.BadParameter(", ".join(languages()), param_hint="--language")
 
-    if file.suffix.lower() != ".docx":
-        raise OutputError(
-            "a template is a Word file",
-            where=file,
-            got=file.suffix or "no suffix",
-            expected=".docx",
-            next_step="name it NAME.docx",
-            rule="not-word",
-        )
-    style = file.with_suffix(".toml")
+    style = _word_file(file).with_suffix(".toml")
     for target in (file, style):
         if target.exists() and not force:
             raise OutputError(
@@ -145,7 +214,25 @@ def new(
             )
     source = sources[like]
     with publication(file.parent) as stage:
-        (stage / file.name).write_bytes(source.read_bytes())
-        (stage / style.name).write_bytes((style_file(source) or source.with_name("org.toml")).read_bytes())
+        words = source.read_bytes() if language == SOURCE else in_language(read_template(source), language)
+        toml = (style_file(source) or source.with_name("org.toml")).read_text(encoding="utf-8")
+        toml = toml if language == SOURCE else style_in_language(toml, language)
+        (stage / file.name).write_bytes(words)
+        (stage / style.name).write_text(toml, encoding="utf-8")
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0
+
+
+def _word_file(file: Path) -> Path:
+    from toolkit.errors import OutputError
+
+    if file.suffix.lower() != ".docx":
+        raise OutputError(
+            "what is to be opened in Word needs its suffix",
+            where=file,
+            got=file.suffix or "no suffix",
+            expected=".docx",
+            next_step="name it NAME.docx",
+            rule="not-word",
+        )
+    return file

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, into_folder
 
 NAME = "watch"
 
@@ -25,7 +25,10 @@ def command(
         typer.Option("--template", help="Word template; default: report_templates/org.docx of the home."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where reports and the state go; default: FOLDER/reports.")
+        Path | None,
+        typer.Option(
+            "--out", callback=into_folder, help="Where reports and the state go; default: FOLDER/reports."
+        ),
     ] = None,
     once: Annotated[bool, typer.Option("--once", help="Look until nothing more arrives, then end.")] = False,
     interval: Annotated[float, typer.Option("--interval", min=0.05, help="Seconds between looks.")] = 2.0,

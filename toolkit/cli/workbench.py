@@ -35,22 +35,26 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Open the workbench: what needs a decision, records with their gates, decisions.
+    """Open the workbench: what needs a decision, sessions, records with their gates, decisions.
 
     It serves this computer alone, asks no other host for anything, and ends with Ctrl-C. Whoever has the
-    address that is printed is let in.
+    address that is printed is let in; with --host each person who is enrolled has another.
 
     Example: toolkit open laboratory --no-browser
     """
     from toolkit.lab.home import find_home, open_registry
-    from toolkit.workbench.server import LOOPBACK, Listening, serve
+    from toolkit.workbench.server import LOOPBACK, Addresses, Listening, serve
 
     folder = find_home(home)
     listening = Listening(host=host or LOOPBACK, port=port, certificate=certificate, key=key)
 
-    def say(address: str, folder: Path) -> None:
-        payload = {"address": address, "home": folder}
-        text = f"workbench of {folder}\n{address}\nend it with Ctrl-C"
+    def say(addresses: Addresses) -> None:
+        people = {person: address for person, address in addresses.items() if person is not None}
+        payload = {"address": addresses.get(None), "home": folder, **({"people": people} if people else {})}
+        lines = [
+            address if person is None else f"{person} {address}" for person, address in addresses.items()
+        ]
+        text = "\n".join([f"workbench of {folder}", *lines, "end it with Ctrl-C"])
         answer(payload, text, as_json=json, quiet=quiet)
 
     serve(folder, open_registry(home=folder), listening, browser=not no_browser, say=say)

@@ -44,7 +44,8 @@ toolkit.errors.ConfigError: 2 entries cannot be used
 **Types.** ``bool``, ``int``, ``float`` (finite), ``str`` (not empty unless `Text` says so),
 ``datetime.date``, ``pathlib.Path``, ``Literal[...]``, ``X | None``, ``tuple[X, ...]``, ``tuple[X, Y]`` of
 a fixed length, ``Mapping[str, X]``, a dataclass (a table), ``tuple[Dataclass, ...]`` (``[[name]]``), ``A
-| B`` (told apart by shape: "a text or a table"; two dataclasses by a ``Literal`` field that both have),
+| B`` (told apart by shape: "a text or a table"; two dataclasses by a ``Literal`` field that both have, else
+by their keys),
 ``Any`` (judged elsewhere). Annotations are evaluated: import what they name, not under ``TYPE_CHECKING``.
 
 **Marks** stand in ``Annotated``; those of a list are meant for its elements, but for `Size` and
@@ -69,9 +70,10 @@ expected=..., rule=...)``.
 
 **Files**: `read` and `read_text`; `build` for entries that were parsed or merged elsewhere (``Source``
 names file and text, and what was taken from another file); `attempt` where faults are wanted and no
-error. `plain` and `toml_text` write; what is read again is equal. **Answers**: `answer` makes the JSON
-document of a dataclass, ``"schema": 1`` first; field names are the keys, ``Entry(key="FY_max_abs_N")``
-renames, ``Entry(output=False)`` leaves out. **Pages**: `starter`, `reference`, `json_schema`.
+error. `plain` and `toml_text` write; what is read again is equal.
+**Answers**: `answer` makes the JSON document of a dataclass, ``"schema": 1`` first; those that a
+function builds key by key are typed dictionaries (`declared.answers`). **Pages**: `starter`, `reference`,
+`json_schema`.
 
 **To convert a format**: (1) write its malformed files as a parametrised test; (2) declare the classes
 with the field names that the code uses; (3) give ``FORMAT`` the rule ids of today; (4) turn checks

@@ -198,15 +198,13 @@ def _form(annotation: Any, marks: Marks) -> Kind:
 
 
 def _tag(kinds: tuple[Kind, ...]) -> str | None:
-    """Return the field whose word tells tables apart: a choice in each of them."""
+    """Return the field whose word tells tables apart: a choice in each of them; None: their keys must."""
     tables = [kind for kind in kinds if isinstance(kind, TableKind)]
     if len(tables) < 2:
         return None
     names = [{field.name for field in table.fields if isinstance(field.kind, ChoiceKind)} for table in tables]
     shared = sorted(set.intersection(*names))
-    if not shared:
-        raise TypeError("tables that may stand in one place need a Literal field that tells them apart")
-    return shared[0]
+    return shared[0] if shared else None
 
 
 def _bare(annotation: Any) -> tuple[Any, Marks]:

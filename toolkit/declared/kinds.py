@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from toolkit.declared.faults import Fault, display, nearest
 from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Path, Text
-from toolkit.files import is_number
+from toolkit.files import is_number, number_expected
 
 
 class _Refused(enum.Enum):
@@ -43,6 +43,7 @@ class Place:
         self, got: Any, expected: str, *, what: str | None = None, rule: str | None = None, **more: Any
     ) -> _Refused:
         """Tell a fault, and return what a refused entry is read as."""
+        expected = number_expected(got, expected)
         self.faults.append(
             Fault(key=self.path, got=got, expected=expected, what=what, rule=rule, form=self.form, **more)
         )

@@ -57,6 +57,9 @@ class QuantityKind(Kind):
                 return value["value"], value["unit"]
         elif self.unit.plain and self.number.suits(value):
             return value, self.name
+        if self.unit.plain and not isinstance(value, dict):
+            self.wrong(value, place)  # a unit is not what it lacks
+            return None
         place.refuse(
             value, self.expected, rule="no-unit", what=f"{display(value)} has no unit" if value else None
         )

@@ -206,9 +206,14 @@ def _in_unit(kind: QuantityKind, si: float, text: str) -> float:
     return (float(si) - (0.0 if kind.unit.difference else si_unit.offset)) / si_unit.factor
 
 
+def _shared(form: Kind, table: Mapping[str, Any]) -> float:
+    """Return how many keys of an entry a table has; half a key for one that takes any."""
+    return sum(key in form.keys for key in table) if isinstance(form, TableKind) else 0.5
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FormsKind(Kind):
-    """One of several forms: told apart by shape (a text or a table), tables by the word in ``tag``."""
+    """One of several forms: told apart by shape (a text or a table), tables by a word (``tag``) or keys."""
 
     forms: tuple[Kind, ...]
     tag: str | None = None
@@ -244,8 +249,13 @@ class FormsKind(Kind):
             if word is None:
                 return place.at(self.tag).refuse(None, words.expected, kind="missing")
             return words.read(word, place.at(self.tag))
-        form = next((form for form in self.forms if form.suits(value)), None)
-        return self.wrong(value, place) if form is None else form.read(value, place)
+        forms = [form for form in self.forms if form.suits(value)]
+        if not forms:
+            return self.wrong(value, place)
+        if isinstance(value, dict):
+            # A table of names may have any key: it is meant where no declared table has one of them.
+            return max(forms, key=lambda form: _shared(form, value)).read(value, place)
+        return forms[0].read(value, place)
 
     def write(self, value: Any) -> Any:
         """Return the entry as the form that it has writes it."""

@@ -169,6 +169,15 @@ class _Step:
         "what one far behind must take away, where no first one can be fitted",
     )
     least_gain: float = _set(1.5, "of the held-out log score", "less is what chance gives on rows not seen")
+    hinted: float = _set(
+        0.05, "of the whole search", "what coloured noise of few rows hides so far may show on unseen runs"
+    )
+    runs: int = _set(3, "runs", "that are held out whole, for what was only hinted at: two agree by chance")
+    shown: float = _set(
+        0.75,
+        "of the held-out mean square",
+        "taken in runs that no fit has seen, although only hinted at: they all differ from it alike",
+    )
     first: float = _set(
         0.02,
         "of the held-out mean square",

@@ -109,8 +109,7 @@ class Effect:
     uneventful one; ``numerics`` are numbers of its computation in a case, which no fit moves; ``from_digits``
     says that it is read off the recorded digits and not searched; ``needs_signal`` that its output must have
     most of the simulated signal in it; ``nuisance`` that it is fitted beside the effects and never named;
-    ``reshapes`` that it changes the shape of an answer, so that parameters refitted without it may have gone
-    where it no longer helps.
+    ``reshapes`` that it changes the shape of an answer, as every discrete effect does (`misleads`).
 
     Of zeros: ``is_zero`` says that it adds one constant; ``zero_beside`` how large a constant may be that is
     only the point from which this effect starts; ``frees_zero`` that its size depends on a free constant.
@@ -188,6 +187,11 @@ class Effect:
     def replaces_record(self) -> bool:
         """It computes with another calibration record than the named one."""
         return self.second == "record"
+
+    @property
+    def misleads(self) -> bool:
+        """Parameters refitted without it may have gone where it no longer helps."""
+        return self.reshapes or self.discrete
 
     def parameter(self, name: str) -> EffectParameter:
         """Return a parameter by its name."""

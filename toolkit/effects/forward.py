@@ -193,11 +193,7 @@ def resisting(
             continue
         # A driving force is reported as the term that stands in the output's own equation.
         sign = -1.0 if term.drives else 1.0
-        total += sign * np.fromiter(
-            (force(x, v, values) for x, v in zip(position.tolist(), velocity.tolist(), strict=True)),
-            np.float64,
-            len(position),
-        )
+        total += sign * np.asarray(force(position, velocity, values))
     return total
 
 

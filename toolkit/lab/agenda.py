@@ -7,8 +7,6 @@ reads every session. What `calibration list`, `due` and `chart` answer is asked 
 from __future__ import annotations
 
 import datetime as dt
-import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +15,11 @@ from toolkit.errors import ConfigError, ToolkitError
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.holdings import Holdings
+    from toolkit.lab.record_answer_types import RecordRow, RefusedRow
 
 SOON_DAYS = 30
 """A check that is due in so many days stands on the agenda."""
-
-_NO_WORK = frozenset(("calibrations", "report_templates", "trust", "node_modules"))
 
 
 def instruments_answer(registry: Registry, today: dt.date) -> list[dict[str, Any]]:
@@ -65,11 +63,11 @@ def _witnesses(registry: Registry, instrument: str) -> list[dict[str, Any]]:
     return rows
 
 
-def candidates_answer(registry: Registry) -> list[dict[str, Any]]:
+def candidates_answer(registry: Registry) -> list[RecordRow | RefusedRow]:
     """Return the candidates as `calibration list` has them; one that fails its gates says so."""
     from toolkit.lab.registry_answer import record_row
 
-    rows: list[dict[str, Any]] = []
+    rows: list[RecordRow | RefusedRow] = []
     for name in registry.instruments():
         if registry.ledger(name).damage is not None:
             continue
@@ -133,63 +131,46 @@ def work_of(home: Path) -> Work:
 
     A test has a report where some manifest of the home names its ``test.toml`` by its content: a test whose
     statements changed since has none. An audit is unfinished while its results are newer than its answer.
-    Links are not followed; hidden folders, the registry and the templates are left out.
     """
-    from toolkit.audit.resume import RESULTS
-    from toolkit.lab.audit import LINES
-    from toolkit.recording.folder import TEST_FILE
-    from toolkit.report.handover import MANIFEST
+    from toolkit.lab.holdings import holdings_of, reported_inputs
 
-    tests: dict[str, str | None] = {}
-    reported: set[str] = set()
-    audits: dict[str, bool] = {}
-    for folder, names in _folders(home):
-        place = os.path.relpath(folder, home)
-        for name in names:
-            if name == TEST_FILE:
-                tests[place] = _sha256(folder / name)
-            elif name == MANIFEST:
-                reported |= _inputs(folder / name)
-            elif name == RESULTS:
-                audits[place] = _is_finished(folder / RESULTS, folder / LINES)
+    holdings = holdings_of(home)
+    reported = reported_inputs(holdings)
+    tests = holdings.places["test"].values()
     return Work(
         tests=len(tests),
-        audits=len(audits),
-        without_report=tuple(sorted(place for place, sha256 in tests.items() if sha256 not in reported)),
-        unfinished=tuple(sorted(place for place, finished in audits.items() if not finished)),
+        audits=len(holdings.places["audit"]),
+        without_report=tuple(place for place in tests if _sha256(home / place) not in reported),
+        unfinished=unfinished_audits(holdings),
     )
 
 
-def _folders(home: Path) -> Iterator[tuple[Path, list[str]]]:
-    for folder, below, names in os.walk(home):
-        below[:] = sorted(name for name in below if not name.startswith(".") and name not in _NO_WORK)
-        yield Path(folder), names
+def unfinished_audits(holdings: Holdings) -> tuple[str, ...]:
+    """Return the places of the audits whose results are newer than their answer."""
+    from toolkit.audit.resume import RESULTS
+    from toolkit.lab.audit import LINES
+
+    return tuple(
+        place
+        for place in holdings.places["audit"].values()
+        if not _is_finished(holdings.home / place / RESULTS, holdings.home / place / LINES)
+    )
 
 
-def _sha256(path: Path) -> str | None:
+def _sha256(test: Path) -> str | None:
     from toolkit.files import sha256_bytes
     from toolkit.inputs import SETTINGS_FILE, read_regular
+    from toolkit.recording.folder import TEST_FILE
 
     try:
-        return sha256_bytes(read_regular(path, SETTINGS_FILE))
+        return sha256_bytes(read_regular(test / TEST_FILE, SETTINGS_FILE))
     except OSError:
         return None
 
 
-def _inputs(path: Path) -> set[str]:
-    """Return the hashes of what a manifest's report rests on; empty where it is none."""
-    import json
-
-    from toolkit.inputs import RESULT_FILE, read_regular
-
-    try:
-        manifest = json.loads(read_regular(path, RESULT_FILE))
-        return {str(entry["sha256"]) for entry in manifest["inputs"]}
-    except (OSError, ValueError, TypeError, KeyError):
-        return set()
-
-
 def _is_finished(results: Path, lines: Path) -> bool:
+    if not results.is_file():  # only the answer was kept
+        return True
     try:
         return lines.stat().st_mtime_ns >= results.stat().st_mtime_ns
     except OSError:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
+    from toolkit.lab.tire_answer_types import DraftKeys, EstimateEntry
     from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
 
@@ -59,12 +60,19 @@ def one_line(text: object) -> str:
     )
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:
-    """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``."""
+def table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "", width: int | None = None
+) -> str:
+    """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``.
+
+    With a ``width`` [characters] the longest texts lose their middle until a line fits; numbers stay whole.
+    """
     if not rows:
         return ""
     align = align or "<" + ">" * (len(header) - 1)
     rows = [[one_line(cell) for cell in row] for row in rows]
+    if width is not None:
+        rows = _shortened(header, [list(row) for row in rows], align, width)
     widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
     lines = [
         "  ".join(
@@ -75,7 +83,34 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = 
     return "\n".join(lines)
 
 
-def draft_keys(*uses: CalibrationUse) -> dict[str, Any]:
+def _shortened(
+    header: Sequence[str], rows: Sequence[Sequence[str]], align: str, width: int
+) -> list[Sequence[str]]:
+    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+    while sum(widths) + 2 * (len(widths) - 1) > width:
+        room = [
+            size if side == "<" and size > len(title) else 0
+            for size, side, title in zip(widths, align, header, strict=True)
+        ]
+        if not any(room):
+            break
+        widths[room.index(max(room))] -= 1
+    return [[_middle_out(cell, size) for cell, size in zip(row, widths, strict=True)] for row in rows]
+
+
+def _middle_out(text: str, size: int) -> str:
+    """Return a text of so many characters at most, its end the longer part: names differ there.
+
+    >>> _middle_out("archive/2014/FM_run_11.xlsx", 20)
+    'archive…_run_11.xlsx'
+    """
+    if len(text) <= size:
+        return text
+    end = max(1, 2 * (size - 1) // 3)
+    return f"{text[: max(size - 1 - end, 0)]}…{text[-end:]}"
+
+
+def draft_keys(*uses: CalibrationUse) -> DraftKeys:
     """Return whether an answer is a draft, and why: the same keys in every answer and manifest."""
     reasons = dict.fromkeys(f"{use.id}: {reason}" for use in uses for reason in use.draft_reasons)
     return {"draft": bool(reasons), "draft_reasons": list(reasons)}
@@ -97,7 +132,7 @@ def signature_words(*uses: CalibrationUse) -> str:
     return f"signature: {signature_of(uses)}"
 
 
-def estimate_keys(estimate: Estimate) -> dict[str, Any]:
+def estimate_keys(estimate: Estimate) -> EstimateEntry:
     """Return an estimate under the keys of the answers, with its expanded uncertainty."""
     U, k = estimate.expanded()
     return {

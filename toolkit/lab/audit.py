@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.lab.audit_answer import AuditAnswer, files_of
+from toolkit.lab.audit_headline import headline
 
 if TYPE_CHECKING:
     from toolkit.audit.since_good import DriftedFile
@@ -146,18 +147,28 @@ def write_folder(
     view = AuditView(
         made=answer.made,
         rules=rules_catalogue(),
-        timelines=timelines(answer.made, registry),
+        timelines=timelines(answer.made.files.plain(), registry, answer.made.known_at),
         traces=tuple(traces(answer.made, registry, _WORST)),
         linked=answer.linked,
         drift=answer.drift,
         drifted=answer.drifted,
         drifted_tests=answer.drifted_tests,
         uses=_uses(answer, registry),
+        headline=headline(answer.made).sentence,
     )
     with publication(out) as stage:
         with (stage / LINES).open("wb") as lines:
-            head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
-            lines.write(json.dumps({**head, "known_at": answer.made.known_at.isoformat()}).encode() + b"\n")
+            head: dict[str, object] = {
+                "generator": GENERATOR,
+                "marks": OWN_OUTPUT,
+                "schema": 1,
+                "kind": "audit",
+            }
+            head |= {
+                "known_at": answer.made.known_at.isoformat(),
+                "archive": str(answer.made.archive.absolute()),
+            }
+            lines.write(json.dumps(head).encode() + b"\n")
             linked = answer.linked is not None
             files = (
                 (json.dumps(one).encode() for one in files_of(answer)) if linked else answer.made.files.raw()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
 from toolkit.lab.answers import one_line, table
+from toolkit.lab.audit_headline import headline
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
@@ -39,6 +41,7 @@ def payload_of(answer: AuditAnswer) -> dict[str, Any]:
     payload: dict[str, Any] = {
         "archive": audit.archive,
         "known_at": audit.known_at.isoformat(),
+        "headline": headline(audit).as_dict(),
         "files": files_of(answer),
         "summary": {"files": len(audit.files), "grades": dict(audit.grades), "undated": audit.undated},
         "tests": _tests(answer),
@@ -76,15 +79,15 @@ def _tests(answer: AuditAnswer) -> Iterator[dict[str, Any]]:
         yield test
 
 
-def text_of(answer: AuditAnswer) -> str:
-    """Return the answer for people."""
+def text_of(answer: AuditAnswer, *, width: int = 80) -> str:
+    """Return the answer for people, the headline first; tables fit ``width`` characters."""
     from toolkit.reduction.physics import RULES
 
     audit = answer.made
     rows = list(_rows(audit))
     bad = len(audit.files) - audit.grades["exact"] - audit.grades["rounding"]
-    header = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"]
-    lines = [table(header, rows, align="<<<<<>>")] if rows else []
+    lines = [*textwrap.wrap(headline(audit).sentence + ".", width), ""]
+    lines += _table(rows, width) if rows else []
     if bad > len(rows):
         lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
     counted = ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count)
@@ -95,17 +98,31 @@ def text_of(answer: AuditAnswer) -> str:
     impossible = {finding.where for finding in audit.findings if finding.rule in RULES}
     if impossible:
         places = one_line(", ".join(sorted(impossible)[:3])) + (", ..." if len(impossible) > 3 else "")
-        lines.append(f"Fy or Mz that no tire has, in files: {len(impossible)} ({places}); --json tells why")
+        text = f"Fy or Mz that no tire has, in files: {len(impossible)} ({places}); --json tells why"
+        lines += textwrap.wrap(text, width)
     settings = Counter(finding.message for finding in audit.findings if finding.rule == "test-toml")
     lines += [one_line(f"{count} files: {message}") for message, count in settings.most_common(_SETTINGS)]
     if len(settings) > _SETTINGS:
         lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
     lines += [f"refused record {record.id}: {record.reason}" for record in audit.refused]
     lines += [f"head of {name}: {head}" for name, head in audit.heads]
-    return "\n".join([*lines, *_asked(answer)])
+    return "\n".join([*lines, *_asked(answer, width)])
 
 
-def _asked(answer: AuditAnswer) -> Iterator[str]:
+def _table(rows: list[list[str]], width: int) -> list[str]:
+    """Return the table of files; what is the same for all of them stands below it."""
+    header, align = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"], "<<<<<>>"
+    same = [
+        len(rows) > 1 and side == "<" and len({row[at] for row in rows}) == 1 for at, side in enumerate(align)
+    ]
+    kept = [at for at, alone in enumerate(same) if not alone]
+    cells = [[row[at] for at in kept] for row in rows]
+    lines = [table([header[at] for at in kept], cells, align="".join(align[at] for at in kept), width=width)]
+    common = [f"{header[at]} {rows[0][at]}" for at, alone in enumerate(same) if alone and rows[0][at]]
+    return [*lines, *textwrap.wrap(f"all of them: {', '.join(common)}", width)] if common else lines
+
+
+def _asked(answer: AuditAnswer, width: int) -> Iterator[str]:
     if answer.linked is not None:
         yield ""
         for report in answer.linked.reports:
@@ -134,7 +151,9 @@ def _asked(answer: AuditAnswer) -> Iterator[str]:
              f"without {t.left_out} files, see --json" if t.left_out else ""]
             for t in answer.drifted_tests[:_SHOWN]
         ]  # fmt: skip
-        yield table(["test", "date", "share", "files", "dFY [N]", "dMZ [N·m]", ""], rows, align="<<>>>><")
+        yield table(
+            ["test", "date", "share", "files", "dFY [N]", "dMZ [N·m]", ""], rows, align="<<>>>><", width=width
+        )
         if len(answer.drifted_tests) > len(rows):
             yield f"... and {len(answer.drifted_tests) - len(rows)} more; --json tells all of them"
     if answer.copies is not None:

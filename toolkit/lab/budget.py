@@ -113,7 +113,7 @@ def _budget(
     if indications is None:
         value = None if at is None else _value(at, record.load(name))
         return calibration_budget(record, rows, check, name, value, temperature=temperature), []
-    prediction = predict(record, rows, check, name, _indications(indications), temperature=temperature)
+    prediction = predict(record, rows, check, name, values_of(indications), temperature=temperature)
     findings = [
         Finding(rule="beyond-range", where=f"{record.id}, {cell}",
                 message="the indication lies beyond those of the calibration: the record extrapolates")
@@ -252,16 +252,17 @@ def _value(text: str, fit: LoadFit) -> float:
     return value * si_scale(match[2].strip(), load_unit.dimension, where="--at") / load_unit.factor
 
 
-def _indications(text: str) -> dict[str, float]:
+def values_of(text: str, where: str = "--indications") -> dict[str, float]:
+    """Return numbers by name from the words ``A=1,B=-2`` of a command line."""
     indications: dict[str, float] = {}
     for part in text.split(","):
         name, _, number = part.partition("=")
         try:
             value = float(number)
         except ValueError as error:
-            raise _wrong("an indication cannot be read", "--indications", part, "NAME=NUMBER,...") from error
+            raise _wrong("an indication cannot be read", where, part, "NAME=NUMBER,...") from error
         if name.strip() in indications:
-            raise _wrong("an indication is given twice", "--indications", name.strip(), "each of them once")
+            raise _wrong("an indication is given twice", where, name.strip(), "each of them once")
         indications[name.strip()] = value
     return indications
 

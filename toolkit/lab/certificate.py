@@ -30,19 +30,21 @@ def deliver_certificate(
     amendment: str | None,
     dcc: bool,
     sealing: Sealing | None = None,
+    asked: bool = False,
     keep: bool,
     step: Callable[[str], None],
 ) -> tuple[Certificate, Delivered]:
-    """Issue a record's certificate, with ``dcc`` the XML beside it.
+    """Make a record's certificate, with ``dcc`` the XML beside it, and issue it.
 
-    What is no certificate, a draft, is made and not issued.
+    It is an entry of the ledger where people are enrolled, where it is sealed, or where that is ``asked``
+    for; a draft never is.
 
     Raises
     ------
     ToolkitError
         the record has no certificate; who signs may not issue one; the document is not delivered
     """
-    from toolkit.lab.issuing import Issuing
+    from toolkit.lab.issuing import open_issuing
     from toolkit.report.certificate.collect import collect
     from toolkit.report.certificate.content import build_content
     from toolkit.report.certificate.dcc import build_dcc
@@ -56,8 +58,12 @@ def deliver_certificate(
     )
     xml = build_dcc(certificate) if dcc else None
     content, issue = build_content(certificate, style), None
-    if not certificate.draft:
-        issuing = Issuing(registry=registry, sealing=sealing)
+    enrolled = registry.people().history.now is not None or bool(registry.signers)
+    issuing = open_issuing(
+        registry, sealing, asked=asked or (enrolled and not certificate.draft),
+        draft=certificate.draft or (asked and draft),
+    )  # fmt: skip
+    if issuing is not None:
         content = issuing.content(content)
         issue = issuing.issue(
             content, document=f"certificate {certificate.id}", decided=certificate.ledger_head

@@ -11,10 +11,11 @@ from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_w
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
     from toolkit.findings import Finding
+    from toolkit.lab.tire_answer_types import Compared, ComparedEntry, DifferenceEntry
     from toolkit.report.style import Style
 
 
-def comparison_payload(comparison: Comparison) -> dict[str, Any]:
+def comparison_payload(comparison: Comparison) -> Compared:
     """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes."""
     return {
         "mode": comparison.mode,
@@ -41,19 +42,19 @@ def comparison_payload(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _entry(entry: Entry) -> dict[str, Any]:
+def _entry(entry: Entry) -> ComparedEntry:
     return {
         "label": entry.label,
         "kind": entry.kind,
         "source": entry.source,
         "simulated": entry.simulated,
-        "calibration": entry.calibration and entry.calibration.as_dict(),
+        "calibration": None if entry.calibration is None else entry.calibration.as_dict(),
         "unverified": entry.calibration is not None and entry.calibration.unverified,
         "conditions": dict(entry.conditions),
     }
 
 
-def _difference(difference: Difference) -> dict[str, Any]:
+def _difference(difference: Difference) -> DifferenceEntry:
     base = difference.reference.value
     return {
         "table": difference.part,

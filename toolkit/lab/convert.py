@@ -77,6 +77,7 @@ def convert(source: Path, target: Path, *, axes: str, resolve: Callable[[Path], 
 
 def _kinds(source: Path, target: Path) -> tuple[str, str]:
     from toolkit.errors import OutputError
+    from toolkit.files import same_file
 
     kinds = (_KINDS.get(source.suffix.lower(), ""), _KINDS.get(target.suffix.lower(), ""))
     if kinds not in _PAIRS:
@@ -85,7 +86,7 @@ def _kinds(source: Path, target: Path) -> tuple[str, str]:
             got=f"{source.suffix or 'no ending'} to {target.suffix or 'no ending'}", expected=_WAYS,
             next_step="choose a name with one of these endings", rule="output-name",
         )  # fmt: skip
-    if source.resolve() == target.resolve():
+    if same_file(source, target):
         raise OutputError(
             "the output would replace the input", where="OUT", got=target, expected="another name",
             next_step="choose another name", rule="original",

@@ -171,8 +171,9 @@ def _write_document(
 def _apart(model: Path | None, target: Path) -> None:
     """Refuse to write the new model over the one that the simulation was taken from."""
     from toolkit.errors import OutputError
+    from toolkit.files import same_file
 
-    if model is not None and model.resolve() == target.resolve():
+    if model is not None and same_file(model, target):
         raise OutputError(
             "the answer's model would replace the one that it starts from", where=target,
             got=f"--model {model}", expected="another folder",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
+
+from toolkit.system import is_administrator
 
 PACKAGES = (
     "libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils"
@@ -31,7 +32,7 @@ def checks() -> tuple[Check, ...]:
 
 def mending_command() -> str:
     """Return the one command that installs the system's packages."""
-    sudo = "" if os.geteuid() == 0 else "sudo "
+    sudo = "" if is_administrator() else "sudo "
     return f"{sudo}sh -c 'apt-get update && apt-get install -y --no-install-recommends {PACKAGES}'"
 
 

@@ -83,13 +83,14 @@ def grid_rows(table: TireTable, values: dict[str, list[float]]) -> list[dict[str
 def refuse_output(out: Path, originals: tuple[Path, ...]) -> None:
     """Refuse an output that is no .csv, or that would replace an input."""
     from toolkit.errors import OutputError
+    from toolkit.files import same_file
 
     if out.suffix.lower() != ".csv":
         raise OutputError(
             "the output is a table", where="--out", got=out.name, expected="a name that ends in .csv",
             next_step="choose such a name", rule="output-name",
         )  # fmt: skip
-    if any(out.resolve() == original.resolve() for original in originals):
+    if any(same_file(out, original) for original in originals):
         raise OutputError(
             "the output would replace an input", where="--out", got=out, expected="another name",
             next_step="choose another name", rule="original",

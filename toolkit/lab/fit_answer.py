@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolkit.estimate import plus_minus
 from toolkit.lab.answers import draft_keys, findings_text, mark_words, signature_words, table
@@ -14,28 +14,84 @@ if TYPE_CHECKING:
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.lab.fit_models import Fitted
+    from toolkit.lab.tire_answer_types import (
+        CurveEntry,
+        FitKeys,
+        FittedModels,
+        LoadFit,
+        Slope,
+        SurfaceEntry,
+        SweepsEntry,
+    )
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_model import GlobalFit
     from toolkit.tires.model import CurveFit
+    from toolkit.tires.sweeps import Sweeps
 
 _PER_DEGREE = 3.141592653589793 / 180
 _WORDS = {"pure": "Pure", "combined": "Combined"}
 
 
-def fit_payload(fitted: Fitted) -> dict[str, Any]:
+def fit_payload(fitted: Fitted) -> FittedModels:
     """Return fits and comparison as JSON."""
     global_fits = [channel_fit for fit in fitted.globals for channel_fit in fit.fits]
-    return {
+    answer: FittedModels = {
         "fits": [
             *(curve_payload(fit, turn) for fit, turn in zip(fitted.curves, fitted.rotations, strict=True)),
             *(global_payload(fit) for fit in global_fits),
         ],
         "comparison": fitted.comparison.as_dict(),
-        **({"calibration": fitted.use.as_dict(), **draft_keys(fitted.use)} if fitted.use else {}),
+    }
+    if fitted.sweeps is not None:
+        answer["sweeps"] = sweeps_payload(fitted.sweeps)
+    if fitted.use:
+        answer["calibration"] = fitted.use.as_dict()
+        draft = draft_keys(fitted.use)
+        answer["draft"], answer["draft_reasons"] = draft["draft"], draft["draft_reasons"]
+    return answer
+
+
+def sweeps_payload(sweeps: Sweeps) -> SweepsEntry:
+    """Return what a continuous test was split into, in degrees, kPa and N."""
+    return {
+        "swept": sweeps.swept,
+        "axes": sweeps.table.axes,
+        "samples": sweeps.samples,
+        "samples_left_out": sweeps.left_out,
+        "rows": len(sweeps.table["SA"]),
+        "conditions": [
+            {
+                "inclination_deg": None if s.inclination_rad is None else math.degrees(s.inclination_rad),
+                "pressure_kPa": None if s.pressure_Pa is None else s.pressure_Pa / 1e3,
+                "load_N": s.load_N,
+                "direction": s.direction,
+                "samples": s.samples,
+            }
+            for s in sweeps.sweeps
+        ],
     }
 
 
-def curve_payload(fit: CurveFit, rotation: str | None = None) -> dict[str, Any]:
+def sweeps_text(sweeps: Sweeps) -> str:
+    """Return the same for people: the levels of each condition."""
+    conditions = sweeps_payload(sweeps)["conditions"]
+    lines = [
+        f"{sweeps.samples} samples in axes {sweeps.table.axes}, {sweeps.swept} swept; {sweeps.left_out} on "
+        f"the way between levels left out; {len(conditions)} sweeps, {len(sweeps.table['SA'])} means"
+    ]
+    levels = (
+        ("inclination", "deg", [c["inclination_deg"] for c in conditions]),
+        ("pressure", "kPa", [c["pressure_kPa"] for c in conditions]),
+        ("load", "N", [c["load_N"] for c in conditions]),
+    )
+    for name, unit, column in levels:
+        values = sorted({round(value, 1) for value in column if value is not None})
+        if values:
+            lines.append(f"  {name:12s} {', '.join(f'{value:g}' for value in values)} {unit}")
+    return "\n".join(lines)
+
+
+def curve_payload(fit: CurveFit, rotation: str | None = None) -> CurveEntry:
     """Return the fit of one load as the JSON answer of the files contract."""
     return {
         **_common(fit, rotation),
@@ -44,9 +100,9 @@ def curve_payload(fit: CurveFit, rotation: str | None = None) -> dict[str, Any]:
     }
 
 
-def global_payload(fit: GlobalFit) -> dict[str, Any]:
+def global_payload(fit: GlobalFit) -> SurfaceEntry:
     """Return a channel of a model over all loads; the contract's keys, and what is said of each load."""
-    loads = [
+    loads: list[LoadFit] = [
         {
             "load_N": load.load_N,
             "n": load.n,
@@ -70,7 +126,7 @@ def global_payload(fit: GlobalFit) -> dict[str, Any]:
     }
 
 
-def _common(fit: CurveFit | GlobalFit, rotation: str | None) -> dict[str, Any]:
+def _common(fit: CurveFit | GlobalFit, rotation: str | None) -> FitKeys:
     stiffness = _estimate(fit.slope_at_zero, fit)
     return {
         "model": fit.model,
@@ -95,7 +151,7 @@ def _common(fit: CurveFit | GlobalFit, rotation: str | None) -> dict[str, Any]:
     }
 
 
-def _estimate(slope: Estimate | None, fit: CurveFit | GlobalFit) -> dict[str, float | None] | None:
+def _estimate(slope: Estimate | None, fit: CurveFit | GlobalFit) -> Slope | None:
     # Both stiffnesses are positive for a tire in every axis system.
     if slope is None:
         return None
@@ -113,6 +169,8 @@ def fit_text(fitted: Fitted, findings: Sequence[Finding]) -> str:
     parts = []
     if fitted.use:
         parts.append(f"calibration {fitted.use.id}{mark_words(fitted.use)}\n{signature_words(fitted.use)}")
+    if fitted.sweeps is not None:
+        parts.append(sweeps_text(fitted.sweeps))
     rows = list(zip(fitted.curves, fitted.rotations, strict=True))
     for channel, head in (("FY", "C_FY [N/deg]"), ("MZ", "C_MZ [N·m/deg]")):
         if lines := [_line(fit, turn) for fit, turn in rows if fit.channel == channel]:

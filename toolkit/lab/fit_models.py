@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import GlobalModel, ModelFit
     from toolkit.tires.model import CurveFit, Loss, TireModel
+    from toolkit.tires.sweeps import Sweeps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +28,7 @@ class Fitted:
 
     ``curves`` are the fits of single loads with their ``rotations``; ``globals`` those over all loads, of the
     rows in ``data``; ``radius_m`` the tire's free radius where it is known; ``use`` the calibration record
-    that computed the forces, None for a table.
+    that computed the forces, None for a table; ``sweeps`` what a continuous test was split into.
     """
 
     data: Measured
@@ -38,19 +39,22 @@ class Fitted:
     findings: tuple[Finding, ...]
     radius_m: float | None
     use: CalibrationUse | None = None
+    sweeps: Sweeps | None = None
 
 
 def fit_table_models(
     table: Path,
     names: Sequence[str],
     *,
-    axes: str,
+    axes: str | None,
     loss: Loss,
     weights: str,
     rated_load_N: float | None,
     radius_m: float | None,
 ) -> Fitted:
-    """Return the fits of a table.
+    """Return the fits of a table, or of a file of the field, which is split by condition and direction.
+
+    ``axes`` are None for those of the file: SAE for a table, by the sign of the load for a file of the field.
 
     Raises
     ------
@@ -58,12 +62,15 @@ def fit_table_models(
         the table cannot be read; no curve of it can be fitted; a model cannot be fitted to it
     """
     from toolkit.lab.tire_files import STAND_IN_RADIUS
+    from toolkit.tires.field_file import is_field_file
     from toolkit.tires.global_data import of_table
     from toolkit.tires.plausibility import size_findings
+    from toolkit.tires.sweeps import split_file
     from toolkit.tires.table import read_table
     from toolkit.tires.table_fit import axes_findings, fit_table, repeat_findings, row_findings
 
-    measured = read_table(table, axes=axes)
+    sweeps = split_file(table, axes) if is_field_file(table) else None
+    measured = read_table(table, axes=axes or "SAE") if sweeps is None else sweeps.table
     data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
     single, over_loads = _split(names)
     curves: tuple[CurveFit, ...] = ()
@@ -82,14 +89,15 @@ def fit_table_models(
             *axes_findings(measured, seeds),
             *size_findings(seeds, table.name),
         )
-    return _fitted(data, curves, (None,) * len(curves), fits, (*findings, *fit_findings), radius_m, seconds)
+    fitted = _fitted(data, curves, (None,) * len(curves), fits, (*findings, *fit_findings), radius_m, seconds)
+    return replace(fitted, sweeps=sweeps)
 
 
 def fit_test_models(
     test: Path,
     names: Sequence[str],
     *,
-    axes: str,
+    axes: str | None,
     loss: Loss,
     weights: str,
     rated_load_N: float | None,
@@ -109,7 +117,7 @@ def fit_test_models(
     """
     from toolkit.lab.resolve import resolve_test
 
-    if axes != "SAE":
+    if axes not in (None, "SAE"):
         raise ConfigError(
             "a test is reduced to SAE axes", where="--axes", got=axes, expected="SAE for a test",
             next_step="leave --axes away; it declares the axes of a table", rule="axes-of-test",

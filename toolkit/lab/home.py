@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
+from toolkit.files import real_path
+from toolkit.publication import check_folder, publication
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.trust.signing import Travel
 
 TEMPLATES = "report_templates"
-_PACKAGE = Path(__file__).resolve().parents[1]
+_PACKAGE = real_path(Path(__file__)).parents[1]
 
 
 def packaged_home() -> Path:
@@ -37,8 +39,8 @@ def find_home(home: Path | None = None) -> Path:
     if stated is not None:
         if not (stated / "calibrations").is_dir():
             raise _no_home(stated)
-        return stated.resolve()
-    cwd = Path.cwd().resolve()
+        return real_path(stated)
+    cwd = real_path(Path.cwd())
     for folder in (cwd, *cwd.parents):
         if (folder / "calibrations").is_dir():
             return folder
@@ -58,12 +60,13 @@ def calibrations_folder(calibrations: Path | None = None, home: Path | None = No
             next_step="check --calibrations, or make a home with 'toolkit init DIR'",
             rule="no-registry",
         )
-    return calibrations.resolve()
+    return real_path(calibrations)
 
 
 def registry_to_write(calibrations: Path | None = None, home: Path | None = None) -> Path:
     """Return the registry folder of a command that enters a record: one that was named may yet be made."""
-    if calibrations is not None and not calibrations.exists():
+    if calibrations is not None and not os.path.lexists(calibrations):
+        check_folder(calibrations)
         return calibrations.absolute()
     return calibrations_folder(calibrations, home)
 
@@ -126,8 +129,6 @@ def make_home(folder: Path) -> tuple[str, ...]:
     OutputError
         the folder cannot be written to
     """
-    from toolkit.publication import publication
-
     written: list[str] = []
     with publication(folder) as stage:
         for name in ("calibrations", TEMPLATES):

@@ -10,6 +10,8 @@ from toolkit.lab.answers import finding_lines, table
 if TYPE_CHECKING:
     from toolkit.audit.inspection import Inspection, LoadBlock
     from toolkit.audit.intervals import Interval
+    from toolkit.audit.model import Segment as AuditSegment
+    from toolkit.lab.record_answer_types import Block, BlockValues, Identified, Inspected, Segment
 
 _SIGNS = {1: "+", -1: "-", 0: "open"}
 
@@ -25,7 +27,7 @@ def intervals_of(inspection: Inspection) -> tuple[Interval, ...]:
     )
 
 
-def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) -> dict[str, Any]:
+def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) -> Inspected:
     """Return what a recording holds as the JSON answer."""
     recording, context = inspection.recording, inspection.context
     return {
@@ -59,7 +61,7 @@ def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) 
     }
 
 
-def _block(block: LoadBlock) -> dict[str, Any]:
+def _block(block: LoadBlock) -> Block:
     return {
         "first_row": block.first_row,
         "last_row": block.last_row,
@@ -71,7 +73,7 @@ def _block(block: LoadBlock) -> dict[str, Any]:
     }
 
 
-def _values(block: LoadBlock) -> dict[str, Any]:
+def _values(block: LoadBlock) -> BlockValues:
     return {
         "first_row": block.first_row,
         "last_row": block.last_row,
@@ -86,7 +88,7 @@ def _values(block: LoadBlock) -> dict[str, Any]:
     }
 
 
-def _calibration(inspection: Inspection) -> dict[str, Any] | None:
+def _calibration(inspection: Inspection) -> Identified | None:
     from toolkit.audit.inspection import withdrawal, wrong_signs
 
     identified = inspection.identification
@@ -102,17 +104,7 @@ def _calibration(inspection: Inspection) -> dict[str, Any] | None:
         "withdrawn": None if withdrawn is None else withdrawn.reason,
         "against_corrected_by": wrong_signs(inspection),
         "void_always": None if withdrawn is None else withdrawn.void_always,
-        "segments": [
-            {
-                "first_row": s.first_row,
-                "last_row": s.last_row,
-                "record": s.record,
-                "variant": s.variant,
-                "grade": s.grade,
-                **({"candidates": s.candidates} if s.candidates else {}),
-            }
-            for s in identified.segments
-        ],
+        "segments": [_segment(segment) for segment in identified.segments],
         "in_force": identified.in_force,
         "repair": None
         if identified.repair is None
@@ -122,6 +114,19 @@ def _calibration(inspection: Inspection) -> dict[str, Any] | None:
         },
         "skipped": [{"id": s.id, "reason": s.reason} for s in identified.skipped],
     }
+
+
+def _segment(segment: AuditSegment) -> Segment:
+    entry: Segment = {
+        "first_row": segment.first_row,
+        "last_row": segment.last_row,
+        "record": segment.record,
+        "variant": segment.variant,
+        "grade": segment.grade,
+    }
+    if segment.candidates:
+        entry["candidates"] = segment.candidates
+    return entry
 
 
 def inspection_text(inspection: Inspection, intervals: tuple[Interval, ...]) -> str:

@@ -16,6 +16,7 @@ from toolkit.errors import RegistryError, ToolkitError, TrustError
 from toolkit.files import write_atomic
 from toolkit.inputs import PDF_FILE, read_regular
 from toolkit.lab.proofs import ORIGIN, anchor_in, raw_lines
+from toolkit.publication import check_file
 from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
 from toolkit.trust.keys import Signer
@@ -175,8 +176,7 @@ def anchor_document(registry: Registry, instrument: str, seq: int | None, checkp
     if not 0 <= index < len(texts):
         raise RegistryError(
             "the ledger has no such entry", where=registry.folder / instrument,
-            got="the last one" if seq is None else f"entry {seq}",
-            expected=f"1 to {len(texts)}" if texts else "an instrument: " + ", ".join(registry.instruments()),
+            got="the last one" if seq is None else f"entry {seq}", expected=f"1 to {len(texts)}",
             next_step="see 'toolkit calibration list' and 'toolkit calibration history'", rule="missing",
         )  # fmt: skip
     return json.dumps({"schema": 1, **anchor_of(texts, index, checkpoint).as_dict()}, indent=2) + "\n"
@@ -188,10 +188,16 @@ def lines_of(registry: Registry, instrument: str) -> list[str]:
     Raises
     ------
     RegistryError
-        the ledger is damaged
+        ``missing``: there is no such instrument; the ledger is damaged
     """
     from toolkit.calibration.registry.settled import damaged
 
+    if instrument not in registry.instruments():
+        raise RegistryError(
+            "there is no such instrument", where=registry.folder, got=instrument,
+            expected=", ".join(registry.instruments()) or "an instrument with records: there is none yet",
+            next_step="see 'toolkit calibration list'; nothing was changed", rule="missing",
+        )  # fmt: skip
     ledger = registry.ledger(instrument)
     if ledger.damage is not None:
         raise damaged(registry.folder / instrument, ledger.damage)
@@ -233,10 +239,11 @@ def witness(
 ) -> tuple[Checkpoint, int]:
     """Let a witness countersign an instrument's ledger; return the checkpoint and the size it knew before."""
     texts = lines_of(registry, instrument)
+    copy = registry.folder.parent / "trust" / "witnessed" / f"{instrument}-{name}{SUFFIX}"
+    check_file(copy)  # before the witness signs: it never forgets
     signed = countersign(
         folder, name, signer, checkpoint_of(registry, instrument), texts, time=int(time.time())
     )
-    copy = registry.folder.parent / "trust" / "witnessed" / f"{instrument}-{name}{SUFFIX}"
     write_atomic(copy, signed.checkpoint.text)
     return signed.checkpoint, signed.before
 

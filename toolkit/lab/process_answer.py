@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 
     from toolkit.estimate import Estimate
     from toolkit.lab.resolve import Resolved
+    from toolkit.lab.tire_answer_types import ReducedTest
     from toolkit.report.style import Style
 
 
-def process_payload(resolved: Resolved) -> dict[str, Any]:
+def process_payload(resolved: Resolved) -> ReducedTest:
     """Return a reduced test as the JSON answer: SI units, SAE axes; names carry the units.
 
     ``u_FY_N`` and ``u_MZ_Nm`` of a condition hold every source of its budget, null where it is not used.

@@ -14,19 +14,35 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.registry.ledger import Entry as LedgerEntry
     from toolkit.calibration.registry.ledger import Ledger
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.status import RecordStatus
+    from toolkit.lab.record_answer_types import (
+        CellEntry,
+        Event,
+        Head,
+        HistoryAnswer,
+        ListAnswer,
+        RecordContent,
+        RecordLoad,
+        RecordRow,
+        RefusedRow,
+        ShowAnswer,
+        StoredFile,
+    )
 
 
 def listed(
     registry: Registry, instrument: str | None, *, known_at: dt.date | None, everything: bool
-) -> tuple[dict[str, Any], str, bool]:
+) -> tuple[ListAnswer, str, bool]:
     """Return the records with their state as JSON and as text, and whether all of them are sound.
 
     ``everything`` lists discarded candidates too.
     """
-    rows, heads, bad, hidden = [], {}, 0, 0
+    rows: list[RecordRow | RefusedRow] = []
+    heads: dict[str, Head] = {}
+    bad = hidden = 0
     for name in [instrument] if instrument else registry.instruments():
         ledger = registry.ledger(name)
         heads[name] = {"count": len(ledger.entries), "sha256": ledger.head, "damage": ledger.damage}
@@ -45,11 +61,8 @@ def listed(
     lines = table(
         ["id", "state", "in force from", "void from", "verified", "signed", "sha256", "note"],
         [
-            [r["id"], r["status"], r.get("in_force_from") or "", r.get("void_from") or "",
-             "yes" if r.get("verified") else "no",
-             UNSIGNED if r.get("signature", UNSIGNED) == UNSIGNED else "yes",
-             r.get("sha256", "")[:12], r.get("reason") or ""]
-            for r in rows
+            [str(cell) for cell in _line(row)]
+            for row in rows
         ],
         align="<" * 8,
     )  # fmt: skip
@@ -59,7 +72,17 @@ def listed(
     return {"records": rows, "heads": heads, "hidden": hidden}, text, not bad
 
 
-def shown(registry: Registry, record_id: str, *, known_at: dt.date | None) -> tuple[dict[str, Any], str]:
+def _line(row: RecordRow | RefusedRow) -> tuple[str | None, ...]:
+    if "rule" in row:
+        return (row["id"], row["status"], "", "", "no", UNSIGNED, "", row["reason"])
+    signed = UNSIGNED if row["signature"] == UNSIGNED else "yes"
+    return (
+        row["id"], row["status"], row["in_force_from"] or "", row["void_from"] or "",
+        "yes" if row["verified"] else "no", signed, row["sha256"][:12], row["reason"] or "",
+    )  # fmt: skip
+
+
+def shown(registry: Registry, record_id: str, *, known_at: dt.date | None) -> tuple[ShowAnswer, str]:
     """Return a record with its state, cells, loads and files, as JSON and as text."""
     record = registry.load(record_id)
     row = record_row(record, registry.status(record_id, known_at=known_at), registry.signature(record_id))
@@ -70,21 +93,10 @@ def shown(registry: Registry, record_id: str, *, known_at: dt.date | None) -> tu
     return {"record": row, "head": head, **content}, "\n".join(lines)
 
 
-def history(ledger: Ledger, instrument: str, name: str) -> tuple[dict[str, Any], str]:
+def history(ledger: Ledger, instrument: str, name: str) -> tuple[HistoryAnswer, str]:
     """Return what happened to an instrument's records, or to the one record named, as JSON and as text."""
     entries = [entry for entry in ledger.entries if name in (instrument, entry.id)]
-    events = [
-        {
-            "seq": e.seq, "id": e.id, "event": e.event, "time": e.time, "by": e.by,
-            "approved_by": e.approved_by,
-            "known_on": e.known_on and e.known_on.isoformat(), "since": e.since and e.since.isoformat(),
-            "reason": e.reason, "note": e.note, "recall": e.recall,
-            "unverifiable": list(e.unverifiable), "evidence": list(e.evidence), "sha256": e.sha256,
-            **({"clock": e.clock} if e.clock else {}),
-            **({"signed_by": [row["by"] for row in e.signatures]} if e.signatures else {}),
-        }
-        for e in entries
-    ]  # fmt: skip
+    events = [_event(entry) for entry in entries]
     lines = [
         f"{e['seq']:>3}  {e['time']}  {e['id']}  {e['event']:<10}by {e['by']}"
         + (f", since {e['since']}" if e["since"] else "")
@@ -99,6 +111,20 @@ def history(ledger: Ledger, instrument: str, name: str) -> tuple[dict[str, Any],
     ]
     lines += [f"head {ledger.head}", *([f"DAMAGED: {ledger.damage}"] if ledger.damage else [])]
     return {"events": events, "head": ledger.head, "damage": ledger.damage}, "\n".join(lines)
+
+
+def _event(entry: LedgerEntry) -> Event:
+    event: Event = {
+        "seq": entry.seq, "id": entry.id, "event": entry.event, "time": entry.time, "by": entry.by,
+        "approved_by": entry.approved_by, "known_on": _iso(entry.known_on), "since": _iso(entry.since),
+        "reason": entry.reason, "note": entry.note, "recall": entry.recall,
+        "unverifiable": list(entry.unverifiable), "evidence": list(entry.evidence), "sha256": entry.sha256,
+    }  # fmt: skip
+    if entry.clock:
+        event["clock"] = entry.clock
+    if entry.signatures:
+        event["signed_by"] = [row["by"] for row in entry.signatures]
+    return event
 
 
 def difference(registry: Registry, first: str, second: str) -> tuple[dict[str, Any], str, bool]:
@@ -145,6 +171,10 @@ def _plainly(value: object) -> object:
     return "; ".join(map(str, value)) if isinstance(value, list) else value
 
 
+def _iso(day: dt.date | None) -> str | None:
+    return None if day is None else day.isoformat()
+
+
 def void_day(status: RecordStatus) -> str | None:
     """Return the first day on which a record is void; None without one."""
     # A record that was never in force is void from the beginning of time: no date to print.
@@ -153,7 +183,7 @@ def void_day(status: RecordStatus) -> str | None:
     return status.void_from.isoformat()
 
 
-def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) -> dict[str, Any]:
+def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) -> RecordRow:
     """Return a record and what its ledger tells of it, as one row of the list."""
     return {
         "id": record.id,
@@ -162,7 +192,7 @@ def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) 
         "status": status.state,
         "verified": record.verified,
         "date": record.date,
-        "in_force_from": status.in_force_from and status.in_force_from.isoformat(),
+        "in_force_from": _iso(status.in_force_from),
         "void_from": void_day(status),
         "void_always": status.void_always,
         "entered_by": status.entered_by,
@@ -175,9 +205,9 @@ def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) 
     }
 
 
-def _described(record: CalibrationRecord, registry: Path) -> tuple[dict[str, Any], list[str]]:
+def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent, list[str]]:
     """Return a record as JSON values, and as lines of text. ``registry`` is the registry's folder."""
-    cells = [
+    cells: list[CellEntry] = [
         {"name": c.name, "unit": c.unit, "serial": c.serial, "minimum": c.minimum, "maximum": c.maximum}
         for c in record.cells
     ]
@@ -186,7 +216,7 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[dict[str, Any
     ]
     lines = ["", table(["indication", "unit", "serial", "range"], rows, align="<<<<")]
     misses = _check_misses(record, registry)
-    loads: dict[str, Any] = {}
+    loads: dict[str, RecordLoad] = {}
     for load in record.loads:
         errors = load.standard_errors or (None,) * len(load.terms)
         loads[load.load] = {
@@ -215,9 +245,9 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[dict[str, Any
             table(["term", "coefficient", "issued", "std error"], terms),
         ]
         lines += _figures(load, misses.get(load.load))
-    data = [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data]
+    data: list[StoredFile] = [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data]
     lines += ["", *(f"{d.role:<9}{d.file}  {d.sha256[:12]}" for d in record.data)]
-    payload = {
+    payload: RecordContent = {
         "zero": record.zero,
         "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
         "indications": cells,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.candidate import Candidate
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.record_answer_types import FittedSession, SessionLoad
 
 NOT_ENTERED = "not entered"
 
@@ -78,8 +79,8 @@ def _write(fit: SessionFit, title: str, folder: Path) -> list[str]:
     return sorted(pictures)
 
 
-def candidate_payload(candidate: Candidate, status: str) -> dict[str, Any]:
-    """Return a session's record and fit as the JSON answer."""
+def candidate_payload(candidate: Candidate, status: str, signature: str) -> FittedSession:
+    """Return a session's record and fit as the JSON answer; ``signature`` says who signed its decisions."""
     from toolkit.calibration.fit.readings import readings_json
     from toolkit.calibration.fit.session_fit import residual_correlation
 
@@ -89,7 +90,7 @@ def candidate_payload(candidate: Candidate, status: str) -> dict[str, Any]:
     def by_load(values: list[Any]) -> dict[str, Any]:
         return dict(zip(names, values, strict=True))
 
-    loads = {}
+    loads: dict[str, SessionLoad] = {}
     for load in candidate.fit.loads:
         # Of a session that is recorded already the record's own figures hold, whatever a fit gives today.
         fit, diagnostics, stored = load.fit, load.diagnostics, record.load(load.setting.name)
@@ -120,6 +121,7 @@ def candidate_payload(candidate: Candidate, status: str) -> dict[str, Any]:
             "existing": candidate.existing,
             "path": str(candidate.path),
         },
+        "signature": signature,
         "findings": [finding.as_dict() for finding in candidate.findings],
         "readings": readings_json(candidate.readings),
         "residual_correlation": by_load(
@@ -129,7 +131,7 @@ def candidate_payload(candidate: Candidate, status: str) -> dict[str, Any]:
     }
 
 
-def candidate_text(candidate: Candidate, status: str) -> str:
+def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
     """Return a session's record and fit for people."""
     record = candidate.record
     lines = [
@@ -137,6 +139,7 @@ def candidate_text(candidate: Candidate, status: str) -> str:
         + ("  (already recorded; nothing was written)" if candidate.existing else ""),
         f"sha256 {record.sha256}",
         f"file   {candidate.path}" + ("  (not written: a dry run)" if status == NOT_ENTERED else ""),
+        f"signature: {signature}",
     ]
     for load in candidate.fit.loads:
         stored = record.load(load.setting.name)

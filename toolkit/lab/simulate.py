@@ -112,8 +112,9 @@ def _test(
 
 def _check_apart(folder: Path, out: Path) -> None:
     from toolkit.errors import OutputError
+    from toolkit.files import real_path
 
-    if out.resolve() in (folder.resolve(), *folder.resolve().parents):
+    if real_path(out) in (real_path(folder), *real_path(folder).parents):
         raise OutputError(
             "CSV files would lie among the test's recordings", where=folder, got=f"a folder in {out}",
             expected="a folder beside the one of --out",

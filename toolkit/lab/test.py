@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.lab.reports import MadeReport
     from toolkit.lab.resolve import Resolved
+    from toolkit.lab.tire_answer_types import ReducedTest
     from toolkit.lab.tires import TireFit
     from toolkit.recording import model
     from toolkit.recording.folder import TestFolder
@@ -207,7 +208,7 @@ class ProcessedTest(Face):
         return write_test_file(Path(path), self.result.result, dict(self.result.recordings))
 
     @cached_property
-    def _answer(self) -> dict[str, Any]:
+    def _answer(self) -> ReducedTest:
         from toolkit.lab.process_answer import process_payload
 
         return process_payload(self.result)

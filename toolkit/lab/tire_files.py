@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
+from toolkit.files import same_file
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def check_tir(tir: Path, source: Path, names: Sequence[str]) -> str:
             next_step=f"give --model {fitting[0] if fitting else 'mf61'}, and no second of them",
             rule="tir-needs-global",
         )
-    if tir.resolve() == source.resolve():
+    if same_file(tir, source):
         raise ConfigError(
             "the tire file would replace the table", where="--tir", got=tir, expected="another name",
             next_step="choose another name", rule="original",

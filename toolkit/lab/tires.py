@@ -215,7 +215,7 @@ class Tire(Face):
 def fit_tire(
     source: Processed | Resolved | Columns | str | Path,
     *models: str,
-    axes: str = "SAE",
+    axes: str | None = None,
     units: Mapping[str, str] | None = None,
     loss: Loss = "linear",
     weights: str = "equal",
@@ -226,10 +226,11 @@ def fit_tire(
 
     Parameters
     ----------
-    source : a test that was processed; a table (.csv), a DataFrame or a mapping with ``SA``, ``FZ``, and
+    source : a test that was processed; a table (.csv), a continuous test (.mat, .dat), a DataFrame or a
+        mapping with ``SA``, ``FZ``, and
         ``FY`` or ``MZ``, with units
     models : names such as ``mf61``; default ``magic_formula``, every load by itself; ``all`` is every one
-    axes : of a table's numbers
+    axes : of a table's numbers; default SAE, of a .mat or .dat file by the sign of its load
     units : unit by column name, for columns without
     loss, weights : ``linear`` or ``robust``; ``equal`` or ``noise``
     rated_load_N, radius_m : of a table's tire, for its tire file

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -90,6 +89,7 @@ def alone(out: Path) -> Iterator[None]:
     """Hold the output folder for one watch."""
     from toolkit.errors import OutputError
     from toolkit.inputs import open_regular_to_append
+    from toolkit.system import lock_file
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -101,7 +101,7 @@ def alone(out: Path) -> Iterator[None]:
         ) from error  # fmt: skip
     with lock:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(lock.fileno())
         except OSError as error:
             raise OutputError(
                 "another watch works into this folder", where=out, got="a lock that is held",

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from toolkit.declared import Entry, plain, read_text
 from toolkit.errors import OutputError, RegistryError, ToolkitError
-from toolkit.files import sha256_bytes
+from toolkit.files import real_path, same_file, sha256_bytes
 from toolkit.inputs import RESULT_FILE, read_regular
 from toolkit.version import __version__
 
@@ -268,7 +268,7 @@ class Watcher:
         return tests
 
     def _skipped(self, folder: Path) -> bool:
-        return folder.name.startswith(".") or folder.resolve() == self.out.resolve()
+        return folder.name.startswith(".") or same_file(folder, self.out)
 
     def _listing(self, test: Path) -> Listing:
         """Return (path, size, time of change) of a test's files: what tells that one is still growing."""
@@ -286,7 +286,7 @@ class Watcher:
 
     def _name(self, test: Path) -> str:
         relative = test.relative_to(self.folder).as_posix()
-        return test.resolve().name if relative == "." else relative
+        return real_path(test).name if relative == "." else relative
 
     def _note(self, name: str) -> Path:
         # Two tests never share a note: year/one and year_one are different tests.

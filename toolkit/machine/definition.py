@@ -70,10 +70,13 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drum:
-    """The road: circumference [m], surface speed and its tolerance [m/s]."""
+    """The road: circumference [m], None of a flat belt or a track, surface speed and its tolerance [m/s]."""
 
     surface: Annotated[str, Entry("what the road is like", example="convex")]
-    circumference_m: Annotated[float, Unit("m"), Above(0), Entry("of the surface", key="circumference")]
+    circumference_m: Annotated[
+        float | None, Unit("m"), Above(0),
+        Entry("of a drum's surface; a flat belt has none", key="circumference"),
+    ] = None  # fmt: skip
     speed_m_s: Annotated[float, Unit("km/h"), Above(0), Entry("of the surface", key="speed")]
     speed_tolerance_m_s: Annotated[
         float, Unit("km/h"), AtLeast(0), Entry("about that speed", key="speed_tolerance")
@@ -81,8 +84,8 @@ class Drum:
 
     @property
     def radius_m(self) -> float:
-        """Radius of the drum [m]."""
-        return self.circumference_m / (2 * math.pi)
+        """Radius of the drum [m]; a flat road is one without end."""
+        return math.inf if self.circumference_m is None else self.circumference_m / (2 * math.pi)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,12 +93,12 @@ class CellLayout:
     """Where the load cells are: the circle through them, the lever of each about the longitudinal axis."""
 
     pitch_diameter_m: Annotated[
-        float, Unit("m"), Above(0), Entry("of the circle through the cells", key="pitch_diameter")
-    ]
+        float | None, Unit("m"), Above(0), Entry("of the circle through the cells", key="pitch_diameter")
+    ] = None
     overturning_lever_m: Annotated[
         tuple[tuple[str, float], ...], Keyed(), _INDICATIONS, Unit("m", plain=True),
         Entry("of each cell, with its sign", key="overturning_lever", example={}),
-    ]  # fmt: skip
+    ] = ()  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,7 +211,7 @@ class Machine:
         Entry("one entry a column of the machine's files, in their order", key="column"),
     ]  # fmt: skip
     drum: Annotated[Drum, Entry("the road")]
-    layout: Annotated[CellLayout, Entry("where the load cells are", key="cells")]
+    layout: Annotated[CellLayout, Entry("where the load cells are", key="cells")] = CellLayout()
     cells: Annotated[
         tuple[CellPolarity, ...], Distinct("name"), Entry("signs that a cell must have", key="cell")
     ] = ()
@@ -254,7 +257,12 @@ class Machine:
         return TypeB(symbol=symbol, u=0.0, relative=0.0, source="not stated")
 
     def faults(self) -> Iterator[Fault]:
-        """Yield a header that two columns have: their numbers could not be told apart."""
+        """Yield a header that two columns have, and turns of a drum whose circumference nobody states."""
+        if self.protocol.revolutions_of == "drum" and self.drum.circumference_m is None:
+            yield Fault(
+                key=("drum", "circumference"), got=None, expected='{ value = NUMBER, unit = "m" }',
+                what="is not stated, and the protocol counts the drum's revolutions",
+            )  # fmt: skip
         headers = [column.header for column in self.columns]
         for number, header in enumerate(headers):
             if header in headers[:number]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from toolkit.errors import ConfigError
-from toolkit.files import is_number
+from toolkit.files import is_number, number_expected
 from toolkit.units import si_scale, unit
 
 
@@ -20,13 +21,15 @@ def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
             next_step="write value and unit",
             rule="no-unit",
         )
+    number = entry["value"]
     # A float that is not finite is refused by the caller, who knows what the number is for.
-    if not is_number(entry["value"]) and not isinstance(entry["value"], float):
+    if not is_number(number) and (not isinstance(number, float) or math.isfinite(number)):
         raise ConfigError(
-            "a quantity's value is not a number", where=where, got=entry["value"], expected="a number",
+            "a quantity's value cannot be used", where=where, got=number,
+            expected=number_expected(number, "a number"),
             next_step="write value as a plain number", rule="wrong-value",
         )  # fmt: skip
     found = unit(entry["unit"], where=where)
     if found.dimension == dimension:
-        return float(entry["value"]) * found.factor + found.offset
-    return float(entry["value"]) * si_scale(entry["unit"], dimension, where=where)
+        return float(number) * found.factor + found.offset
+    return float(number) * si_scale(entry["unit"], dimension, where=where)

@@ -6,6 +6,7 @@ import importlib
 from types import ModuleType
 
 from toolkit.errors import ConfigError
+from toolkit.version import DISTRIBUTION
 
 
 def needed(module: str, *, extra: str, to: str, where: object) -> ModuleType:
@@ -24,7 +25,7 @@ def needed(module: str, *, extra: str, to: str, where: object) -> ModuleType:
       where:    run 1
       got:      no module no_such_library
       expected: the extra 'tdms'
-      next:     pip install "toolkit[tdms]"
+      next:     pip install "tire-lab-toolkit[tdms]"
     """
     try:
         return importlib.import_module(module)
@@ -34,6 +35,6 @@ def needed(module: str, *, extra: str, to: str, where: object) -> ModuleType:
             where=where,
             got=f"no module {error.name}",
             expected=f"the extra {extra!r}",
-            next_step=f'pip install "toolkit[{extra}]"',
+            next_step=f'pip install "{DISTRIBUTION}[{extra}]"',
             rule="missing-extra",
         ) from error

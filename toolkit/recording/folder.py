@@ -11,6 +11,7 @@ from pathlib import Path
 from toolkit.channels import Rotation
 from toolkit.declared import Fault, Format, Quantity, Source, nearest, read_text, refuse
 from toolkit.errors import ConfigError, RecordingError
+from toolkit.files import real_path
 from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine import Machine, Protocol, load_machine, read_protocol
 from toolkit.publication import settle
@@ -54,7 +55,7 @@ class TestFolder:
 
 def nearest_test_toml(path: Path) -> Path | None:
     """Return the ``test.toml`` that a recording belongs to: the nearest at or above it, None without one."""
-    start = Path(os.path.abspath(path))  # noqa: PTH100  resolve() would follow links
+    start = Path(os.path.abspath(path))  # noqa: PTH100  links are not followed
     for folder in (start, *start.parents):
         candidate = folder / TEST_FILE
         if candidate.is_file():
@@ -172,7 +173,7 @@ def _machine_name(entries: StatedTest, toml: Path) -> str:
 def _info(entries: StatedTest, machine_name: str, machine: Machine, folder: Path) -> TestInfo:
     tire = entries.tire or TireLabel()
     return TestInfo(
-        name=folder.resolve().name,
+        name=real_path(folder).name,
         machine=machine_name,
         date=entries.date,
         operator=entries.operator,

@@ -78,7 +78,8 @@ class Tare:
 class ReducedTest:
     """A whole test, reduced. ``conditions`` in the order of the protocol, unused ones last.
 
-    ``protocol`` is the source that the protocol of the test names; ``stated`` are the standard
+    ``protocol`` is the source that the protocol of the test names, ``machine_title`` what the definition of
+    its machine calls it; ``stated`` are the standard
     uncertainties that the machine states of what has no calibration record (GUM type B), as far as the test
     uses them.
     """
@@ -92,6 +93,7 @@ class ReducedTest:
     code_version: str
     axes: str = "SAE"
     protocol: str = ""
+    machine_title: str = ""
     stated: tuple[TypeB, ...] = ()
 
     @property

@@ -105,6 +105,7 @@ def reduce_test(
         findings=tuple(findings),
         code_version=__version__,
         protocol=protocol.source,
+        machine_title=machine.title,
         stated=_stated(machine, info, files[0].tare),
     )
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -19,6 +18,7 @@ Cell = str | float | None
 
 IMPOSSIBLE = "IMPOSSIBLE VALUES"
 SIGNATURE = "signature"
+RULE = "rule"  # a column of ids, the same in every language
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +104,8 @@ class ReportContent:
     """A report's content. ``marks`` must stand in the document whatever the template says.
 
     What stands on every page, and the word in every figure, follows from ``calibrations``. ``symbol``: the
-    document is issued, and its PDF carries the ledger's proof on the last page.
+    document is issued, and its PDF carries the ledger's proof on the last page. ``untranslated``: sentences
+    of findings that the document prints in English, for want of a translation.
     """
 
     values: dict[str, Value]
@@ -121,6 +122,7 @@ class ReportContent:
     style: Style = field(default_factory=Style)
     vocabulary: Vocabulary
     symbol: bool = False
+    untranslated: tuple[str, ...] = ()
 
     @property
     def signature(self) -> str:
@@ -129,7 +131,7 @@ class ReportContent:
 
     def issued_by(self, issuer: str | None) -> ReportContent:
         """Return the content of a document that is issued, by somebody who signs or, None, unsigned."""
-        text = signature_text(self.calibrations, issuer)
+        text = self.style.say(signature_text(self.calibrations, issuer))
         return replace(self, values=self.values | {SIGNATURE: Value(kind="text", value=text)}, symbol=True)
 
     @property
@@ -139,7 +141,8 @@ class ReportContent:
         Values that no tire has are told on every page too: a page is copied without its first one.
         """
         impossible = f"{IMPOSSIBLE}: see the findings" if self.conditions.get("impossible") else None
-        return " - ".join(part for part in (mark_of(self.calibrations), impossible) if part) or None
+        mark = " - ".join(part for part in (mark_of(self.calibrations), impossible) if part)
+        return self.style.say(mark) or None
 
     @property
     def draft_reasons(self) -> tuple[str, ...]:
@@ -176,61 +179,54 @@ def signature_text(calibrations: Sequence[CalibrationUse], issuer: str | None = 
     return records if records == UNSIGNED else f"{records}; document {UNSIGNED}"
 
 
-# The organisation's words. What people wrote, names, notes and findings, is never touched: only the terms
-# that the toolkit itself prints.
-_OWN_TEXTS = (
-    "test.directions test.averaging test.tare simulated calibration.status report.title report.deviations"
-).split()
-_OWN_COLUMNS = ("rotation", "quantity", "level", "channel")
+# A document in the words of its organisation. What people wrote, names and notes, is never touched.
 
 
-def say(text: str, words: Mapping[str, str]) -> str:
-    """Return a text with every term replaced, the longest first, once each place.
+def in_words_of(content: ReportContent, style: Style, people: Collection[str]) -> ReportContent:
+    """Return a content with all that the toolkit says in it in the language and the words of a style.
 
-    >>> say("slip angle SA [deg]", {"slip angle": "Schräglaufwinkel", "angle": "Winkel"})
-    'Schräglaufwinkel SA [deg]'
+    ``people``: texts of the document's source that a person wrote.
     """
-    if not words:
-        return text
-    terms = sorted(words, key=len, reverse=True)
-    pattern = "|".join(rf"(?<!\w){re.escape(term)}(?!\w)" for term in terms)
-    return re.sub(pattern, lambda term: words[term[0]], text)
-
-
-def say_values(values: dict[str, Value], words: Mapping[str, str]) -> dict[str, Value]:
-    """Return the values with the toolkit's own texts in the organisation's words."""
-    return values | {
-        path: replace(values[path], value=say(text, words))
-        for path in _OWN_TEXTS
-        if path in values and isinstance(text := values[path].value, str)
+    stated = style.texts | set(people)
+    plots = {name: _said_plot(plot, style) for name, plot in content.plots.items()}
+    values = {
+        path: replace(value, value=style.say(value.value))
+        for path, value in content.values.items()
+        if value.kind == "text" and isinstance(value.value, str) and value.value not in stated
     }
+    captions = {f"caption.{name}": Value(kind="text", value=plot.caption) for name, plot in plots.items()}
+    return replace(
+        content,
+        plots=plots,
+        values=content.values | values | captions,
+        tables={name: _said_table(table, style, stated) for name, table in content.tables.items()},
+        marks=tuple((name, style.say(text)) for name, text in content.marks),
+        title=style.say(content.title),
+        subject=style.say(content.subject),
+    )
 
 
-def say_table(table: Table, words: Mapping[str, str]) -> Table:
-    """Return a table with its direction, quantity and level columns in the organisation's words."""
-    ours = [column.name in _OWN_COLUMNS for column in table.columns]
+def _said_table(table: Table, style: Style, stated: Collection[str]) -> Table:
+    spoken = [column.name != RULE for column in table.columns]
     rows = tuple(
         tuple(
-            say(cell, words) if our and isinstance(cell, str) else cell
-            for our, cell in zip(ours, row, strict=True)
+            style.say(cell) if says and isinstance(cell, str) and cell not in stated else cell
+            for says, cell in zip(spoken, row, strict=True)
         )
         for row in table.rows
     )
     return replace(table, rows=rows)
 
 
-def say_plot(plot: Plot, words: Mapping[str, str], alt: Mapping[str, str]) -> Plot:
-    """Return a figure with its axes, legend and caption in the organisation's words.
-
-    Its alternative text is made of sentences: for these ``alt`` has words that would be too short elsewhere.
-    """
+def _said_plot(plot: Plot, style: Style) -> Plot:
     return replace(
         plot,
-        alt=say(plot.alt, {**words, **alt}),
-        x_label=say(plot.x_label, words),
-        y_label=say(plot.y_label, words),
-        caption=say(plot.caption, words),
-        watermark=None if plot.watermark is None else say(plot.watermark, words),
-        legend_title=None if plot.legend_title is None else say(plot.legend_title, words),
-        curves=tuple(replace(curve, label=say(curve.label, words)) for curve in plot.curves),
+        alt=style.say(plot.alt, alternative=True),
+        x_label=style.say(plot.x_label),
+        y_label=style.say(plot.y_label),
+        caption=style.say(plot.caption),
+        watermark=None if plot.watermark is None else style.say(plot.watermark),
+        legend_title=None if plot.legend_title is None else style.say(plot.legend_title),
+        names=tuple(style.say(name) for name in plot.names),
+        curves=tuple(replace(curve, label=style.say(curve.label)) for curve in plot.curves),
     )

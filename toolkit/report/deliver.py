@@ -90,6 +90,7 @@ class Delivered:
     units: tuple[str, str]
     signature: str
     ledger: Mapping[str, Any] | None = None
+    untranslated: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -97,6 +98,11 @@ class Delivered:
         said = [f"{finding.rule}: {finding.message}" for finding in self.filled.lint]
         said += [f"{check.name}: {check.message}" for check in self.checks if not check.ok]
         said += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
+        if self.untranslated:
+            said += [
+                f"untranslated: {len(self.untranslated)} finding(s) are printed in English, first: "
+                f"{self.untranslated[0]}"
+            ]
         said += [
             f"mark-added: the template has no place for the mark {name!r}" for name in self.filled.marks_added
         ]
@@ -284,7 +290,15 @@ class _Run:
             ledger = job.issue(pdf, [file for file in beside if file != pdf], pages, digest)
         if job.provenance is not None:
             outputs = [self._stage() / name for name in names if name != MANIFEST]
-            text = manifest_json(job.provenance, job.content, job.template, digest, outputs, ledger)
+            text = manifest_json(
+                job.provenance,
+                job.content,
+                job.template,
+                digest,
+                outputs,
+                ledger,
+                missing=self.filled.missing,
+            )
             (self._stage() / MANIFEST).write_text(text, encoding="utf-8")
         self.publication.close()
         targets = [job.out / name for name in names]
@@ -303,6 +317,7 @@ class _Run:
             units=(job.content.style.force, job.content.style.moment),
             signature=job.content.signature,
             ledger=ledger,
+            untranslated=job.content.untranslated,
         )
 
     def result(self) -> Delivered | ToolkitError:

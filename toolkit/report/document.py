@@ -10,7 +10,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
@@ -20,7 +20,16 @@ from typing import Any, Generic, TypeVar, cast
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.estimate import Estimate, has_interval
 from toolkit.findings import Finding
-from toolkit.report.content import SIGNATURE, Cell, Plot, ReportContent, Table, Value, signature_text
+from toolkit.report.content import (
+    SIGNATURE,
+    Cell,
+    Plot,
+    ReportContent,
+    Table,
+    Value,
+    in_words_of,
+    signature_text,
+)
 from toolkit.report.style import Style
 from toolkit.report.vocabulary import Column, Entry, TableEntry, Vocabulary, columns_of
 
@@ -29,6 +38,7 @@ Other = TypeVar("Other")
 Row = Sequence[Cell] | Mapping[str, Cell]
 Rows = Iterable[Row]
 Number = float | Estimate | None
+MESSAGE = "message"  # the column of a table of findings that holds their sentences
 
 _SIGNED = Entry(
     path=SIGNATURE,
@@ -286,8 +296,12 @@ class Document(Generic[Source]):
         identity: str,
         subject: str,
         issued: dt.date,
+        people: Collection[str] = (),
     ) -> ReportContent:
-        """Return the content of declared document: everything that a template of the kind can ask for."""
+        """Return the content of declared document: everything that a template of the kind can ask for.
+
+        It is in the language and the words of the style, but for what ``people`` wrote.
+        """
         plots = self.plots(source, style)
         tables = {
             declared.name: printed_table(declared, cast("Rows", declared.build(source, style) or ()), style)
@@ -311,7 +325,7 @@ class Document(Generic[Source]):
             declared.name: bool(declared.build(source, style)) for declared in self._all(DeclaredCondition)
         }
         marks = ((declared.name, declared.build(source, style)) for declared in self._all(DeclaredMark))
-        return ReportContent(
+        content = ReportContent(
             values=values,
             tables=tables,
             plots=plots,
@@ -325,7 +339,21 @@ class Document(Generic[Source]):
             marks=tuple((name, str(text)) for name, text in marks if text),
             style=style,
             vocabulary=self.vocabulary,
+            untranslated=_untranslated(tables, style),
         )
+        return in_words_of(content, style, people)
+
+
+def _untranslated(tables: Mapping[str, Table], style: Style) -> tuple[str, ...]:
+    """Return the sentences of findings that have no translation in the style's language."""
+    messages = (
+        str(row[at])
+        for table in tables.values()
+        for at, column in enumerate(table.columns)
+        if column.name == MESSAGE
+        for row in table.rows
+    )
+    return tuple(message for message in dict.fromkeys(messages) if style.lacks(message))
 
 
 def declared_in(module: str) -> Iterator[Declaration[Any]]:

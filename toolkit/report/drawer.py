@@ -18,6 +18,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
+from toolkit.system import can_fork, processors
+
 if TYPE_CHECKING:
     from toolkit.report.content import Plot
     from toolkit.report.figures import Picture
@@ -28,7 +30,8 @@ class Drawer:
 
     def __init__(self, *, hands: int | None = None) -> None:
         """Start the worker; it draws with so many processes, by default one a core, two at most."""
-        count = min(2, os.cpu_count() or 1) if hands is None else hands
+        count = min(2, processors()) if hands is None else hands
+        count = count if can_fork() else 1
         # -P: a folder named toolkit where the user happens to stand must not be imported.
         command = [sys.executable, "-P", "-m", "toolkit.report.drawer", str(count)]
         self._worker = subprocess.Popen(

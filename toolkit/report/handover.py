@@ -45,11 +45,13 @@ def manifest_json(
     digest: str,
     outputs: Sequence[Path],
     ledger: Mapping[str, Any] | None = None,
+    *,
+    missing: Sequence[str] = (),
 ) -> str:
     """Return the manifest: inputs, calibration, software and outputs, each with its SHA-256.
 
     ``provenance`` holds what the caller knows: the inputs and the software; ``ledger`` is the proof of a
-    document that was issued.
+    document that was issued, ``missing`` are the tags that print a mark in place of a value.
     """
     manifest = {
         "generator": GENERATOR,
@@ -62,6 +64,7 @@ def manifest_json(
         "draft_reasons": list(content.draft_reasons),
         "signature": content.signature,
         "calibrations": [calibration.as_dict() for calibration in content.calibrations],
+        "missing": list(missing),
         **provenance,
         "outputs": [
             {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}

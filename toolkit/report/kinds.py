@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # The list of tags of a kind of document: for programs, and as the page of the manual.
 
 
-_TITLES = {
+TITLES = {
     "report": "The report of a test",
     "certificate": "A calibration certificate",
     "comparison": "A comparison",
@@ -79,7 +79,7 @@ def reference_page(vocabularies: Iterable[Vocabulary]) -> str:
 
 
 def _chapter(vocabulary: Vocabulary) -> Iterator[str]:
-    yield from (f"## {_TITLES[vocabulary.name]}", "")
+    yield from (f"## {TITLES[vocabulary.name]}", "")
     yield from ("A template must hold " + ", ".join(f"`{tag}`" for tag in vocabulary.required) + ".", "")
     yield from ("### Values", "", "| tag | kind | unit | value |", "|---|---|---|---|")
     for entry in vocabulary.values:

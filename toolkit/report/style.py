@@ -1,19 +1,23 @@
-"""The style file beside a template (``org.toml``): laboratory, units, decimals, names of styles."""
+"""The style file beside a template (``org.toml``): laboratory, language, units, decimals, names of styles."""
 
 from __future__ import annotations
 
 import datetime as dt
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
 from toolkit.units import si_scale
+from toolkit.words.catalogue import SOURCE, decimal_sign, languages
+from toolkit.words.phrasebook import phrasebook
 
 _KEYS = (
-    "schema laboratory report words alt decimal_comma dates missing required styles decimals units".split()
-)
+    "schema language laboratory report words alt decimal_comma dates missing required styles decimals units"
+).split()
 _TABLES = ("laboratory", "report", "words", "alt", "styles", "decimals", "units")
 _LABORATORY = "name address contact place country accreditation".split()
 _REPORT = "method authorised_by function".split()
@@ -28,9 +32,12 @@ class Style:
 
     ``method``, ``authorised_by``, ``function`` stand in a report whose test names none. ``decimals`` maps a
     unit, a tag's path or ``<table>.<column>`` to digits after the point; ``styles`` maps heading, caption and
-    table to the names of the template's Word styles; ``words`` are the organisation's own for the terms that
-    figures and tables print, ``alt`` further ones for the sentences of alternative texts alone.
+    table to the names of the template's Word styles. ``language`` is that of the toolkit's sentences;
+    ``words`` are the organisation's own for phrases and terms of it, ``alt`` further ones for the sentences
+    of alternative texts alone.
     """
+
+    language: str = SOURCE
 
     laboratory: str | None = None
     address: str | None = None
@@ -59,6 +66,27 @@ class Style:
         except ValueError:
             return iso
 
+    @property
+    def texts(self) -> frozenset[str]:
+        """What the organisation states of itself: nobody says it in other words."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return frozenset(value for value in values if isinstance(value, str))
+
+    def say(self, text: str, *, alternative: bool = False) -> str:
+        """Return a text of the toolkit in the language and the words of the organisation.
+
+        What is no phrase of the toolkit stays as it is; ``alternative`` takes the words of alternative texts
+        too.
+        """
+        own = self.words + self.alt if alternative else self.words
+        if self.language != SOURCE or self.decimal_comma:
+            text = phrasebook(self.language, decimal_comma=self.decimal_comma, own=own).say(text)
+        return replace_terms(text, dict(own))
+
+    def lacks(self, text: str) -> bool:
+        """Tell whether a sentence of the toolkit has no translation in the organisation's language."""
+        return self.language != SOURCE and not phrasebook(self.language, own=self.words).knows(text)
+
     def digits(self, *names: str | None) -> int | None:
         """Return the decimals of the first name that the style file has."""
         table = dict(self.decimals)
@@ -79,12 +107,39 @@ class Style:
         return f"{chosen}{slash}{tail}", 1 / si_scale(chosen)
 
 
+def replace_terms(text: str, words: Mapping[str, str]) -> str:
+    """Return a text with every term replaced, the longest first, once each place.
+
+    >>> replace_terms("slip angle SA [deg]", {"slip angle": "Schräglaufwinkel", "angle": "Winkel"})
+    'Schräglaufwinkel SA [deg]'
+    """
+    if not words:
+        return text
+    terms = sorted(words, key=len, reverse=True)
+    pattern = "|".join(rf"(?<!\w){re.escape(term)}(?!\w)" for term in terms)
+    return re.sub(pattern, lambda term: words[term[0]], text)
+
+
 def style_file(template: Path) -> Path | None:
     """Return the style file of a template: ``<its name>.toml`` beside it, else ``org.toml`` there."""
     for path in (template.with_suffix(".toml"), template.with_name("org.toml")):
         if path.is_file():
             return path
     return None
+
+
+def style_in_language(toml: str, language: str) -> str:
+    """Return a style file as text for a language: its decimal sign, its word for what is missing.
+
+    >>> print(style_in_language('language = "en"\\ndecimal_comma = false', "fr"))
+    language = "fr"
+    decimal_comma = true
+    """
+    comma = str(decimal_sign(language) == ",").lower()
+    missing = phrasebook(language).say("n/a")
+    for key, value in (("language", f'"{language}"'), ("decimal_comma", comma), ("missing", f'"{missing}"')):
+        toml = re.sub(rf'(?m)^{key} = ("[^"]*"|\w+)', lambda _, line=f"{key} = {value}": line, toml)  # type: ignore[misc]
+    return toml
 
 
 def read_style(path: Path | None) -> Style:
@@ -110,11 +165,15 @@ def read_style(path: Path | None) -> Style:
     for name in _UNITS:
         if name in parts["units"]:
             si_scale(str(parts["units"][name]), name, where=f"{path}: units.{name}")
+    language = _typed(table, "language", str, SOURCE, path)
+    if language not in languages():
+        raise _wrong(path, "language", language, " or ".join(languages()))
     required = _typed(table, "required", list, list(_DEFAULT_REQUIRED), path)
     missing = _typed(table, "missing", str, "n/a", path)
     if not missing.strip():
         raise _wrong(path, "missing", missing, "a visible text")
     return Style(
+        language=language,
         laboratory=_text(parts["laboratory"], "name", path),
         **{key: _text(parts["laboratory"], key, path) for key in _LABORATORY[1:]},
         **{key: _text(parts["report"], key, path) for key in _REPORT},

@@ -19,7 +19,7 @@ from toolkit.effects.applied import AppliedEffect, Condition
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, is_number, parse_toml, sha256_bytes
+from toolkit.files import check_keys, is_number, number_expected, parse_toml, sha256_bytes
 from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, read_input
 from toolkit.publication import settle
 from toolkit.units import unit
@@ -358,7 +358,7 @@ def _texts(entry: object, where: str) -> tuple[str, ...]:
 
 def _number(entry: object, where: str) -> float:
     if not is_number(entry):
-        raise _wrong("an entry is no number", where, entry, "a finite number")
+        raise _wrong("an entry is no number", where, entry, number_expected(entry, "a finite number"))
     return float(entry)
 
 

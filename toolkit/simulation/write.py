@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.declared import toml_text
 from toolkit.errors import OutputError
+from toolkit.machine.definition import Machine, load_machine, machine_names
 from toolkit.publication import publication
 from toolkit.recording.labview import write_labview
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
@@ -77,6 +79,7 @@ def further(signals: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.
 
 TRUTH = "truth.json"
 TEST = "test.toml"
+MACHINE = "machine.toml"
 SESSION = "SESSION.toml"
 # CSV has no place for a remark: the names carry it.
 LOADS_CSV = "loads_simulated.csv"
@@ -99,13 +102,21 @@ def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
             columns = file.columns if test.plan.record == "dwell" else file.columns | further(file.signals)
             write_labview(stage / file.name, test.plan.machine, columns, simulated=True)
         (stage / TEST).write_text(test_toml(test), encoding="utf-8")
+        if not _is_packaged(test.plan.machine):
+            (stage / MACHINE).write_text(toml_text(test.plan.machine), encoding="utf-8")
         (stage / TRUTH).write_text(_json(truth_document(test)), encoding="utf-8")
     return tuple(folder / name for name in names)
 
 
 def test_names(test: VirtualTest) -> tuple[str, ...]:
     """Return the names of a virtual test's files, recordings first."""
-    return (*(file.name for file in test.files), TEST, TRUTH)
+    definition = () if _is_packaged(test.plan.machine) else (MACHINE,)
+    return (*(file.name for file in test.files), TEST, *definition, TRUTH)
+
+
+def _is_packaged(machine: Machine) -> bool:
+    """Tell whether a machine's name alone finds it: any other one's definition goes with the test."""
+    return machine.name in machine_names() and load_machine(machine.name) == machine
 
 
 def write_session(session: VirtualSession, folder: Path) -> tuple[Path, ...]:
@@ -132,7 +143,7 @@ def test_toml(test: VirtualTest) -> str:
     lines = [
         "schema = 1",
         f"date = {plan.date}",
-        f"machine = {_text(plan.machine.name)}",
+        f"machine = {_text(plan.machine.name if _is_packaged(plan.machine) else MACHINE)}",
         "simulated = true",
         'operator = "virtual operator"',
         'requestor = "simulated test"',

@@ -75,8 +75,9 @@ def content_hash(result: TestResult) -> str:
         "reduced": dataclasses.asdict(result.reduced),
         "characteristics": _characteristics(result.characteristics),
     }
-    if not result.reduced.stated:  # a file from before there were any keeps its hash
-        del content["reduced"]["stated"]
+    for name in ("stated", "machine_title"):  # a file from before there were any keeps its hash
+        if not content["reduced"][name]:
+            del content["reduced"][name]
     for name in ("draft_reasons", "since"):  # and one of a record in force has the hash of before too
         if not content["reduced"]["calibration"][name]:
             del content["reduced"]["calibration"][name]

@@ -144,6 +144,7 @@ def _result(sheets: dict[str, list[Cells]], items: Cells) -> TestResult:
         code_version=items["code_version"],
         axes=items["axes"],
         protocol=items["protocol"],
+        machine_title=items.get("machine_title", ""),
         stated=_stated(items),
     )
     return TestResult(reduced=reduced, characteristics=_characteristics(sheets, reduced))

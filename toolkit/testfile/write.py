@@ -16,6 +16,7 @@ from toolkit.estimate import Estimate
 from toolkit.publication import write_result
 from toolkit.recording.marks import mark_workbook
 from toolkit.testfile.layout import CONDITION_FIELDS, KIND, SCHEMA, cell, content_hash, header
+from toolkit.testfile.readable import Sheet, Shown, readable_sheets
 
 if TYPE_CHECKING:
     from toolkit.findings import Finding
@@ -27,6 +28,7 @@ Rows = Iterable[Sequence[Any]]
 
 _SHEET_ROWS = 2**20 - 1  # below the head: a worksheet has 2^20 rows
 _AT_A_TIME = 1 << 12  # rows, as objects
+_LOOKED_AT, _WIDEST = 20, 90  # rows that set the width of a column, and its most [characters]
 
 
 def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Recording] | None = None) -> str:
@@ -35,9 +37,14 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
     ``recordings`` (by their path inside the test) fill the sheet ``raw`` with every row of every file, in the
     file's own units; beyond a worksheet's rows it goes on in ``raw 2``.
     """
-    digest = content_hash(result)
+    write_result(path, workbook(result, recordings))
+    return content_hash(result)
+
+
+def workbook(result: TestResult, recordings: Mapping[str, Recording] | None = None) -> bytes:
+    """Return the file that `write_test_file` writes."""
     try:
-        data = _workbook(result, digest, recordings or {})
+        return _workbook(result, content_hash(result), recordings or {})
     except OSError as error:
         raise OutputError(
             "the reduced test cannot be put together",
@@ -46,8 +53,6 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
             expected="free space for temporary files",
             next_step="free space, or name another folder in TMPDIR; nothing was changed",
         ) from error
-    write_result(path, data)
-    return digest
 
 
 def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recording]) -> bytes:
@@ -57,8 +62,10 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
     book = Workbook(write_only=True)
     use, info = result.reduced.calibration, result.reduced.info
     mark_workbook(book, simulated=info.simulated, machine=info.machine, word=use.word)
+    for page in readable_sheets(result):
+        _readable(book, page, use.mark)
     for name, rows in (
-        ("provenance", _provenance(result, digest)),
+        ("findings", _findings(result.reduced.findings)),
         ("reduced", _reduced(result)),
         ("fits", _fits(result)),
         ("fit_parameters", _parameters(result)),
@@ -68,48 +75,94 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
         ("points", _points(result)),
         ("budgets", _budgets(result)),
         ("characteristic_findings", _findings(result.characteristics.findings)),
-        ("findings", _findings(result.reduced.findings)),
         *_raw_sheets(recordings),
+        ("provenance", _provenance(result, digest)),
     ):
-        _sheet(book, name, rows, use.mark)
+        _machine_sheet(book, name, rows, use.mark)
     bytes_io = BytesIO()
     book.save(bytes_io)
     return bytes_io.getvalue()
 
 
-def _sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
-    from openpyxl.cell import WriteOnlyCell
-    from openpyxl.styles import Font
-
+def _sheet(book: Any, name: str, mark: str | None) -> Any:
     sheet = book.create_sheet(name)
-    sheet.freeze_panes = "A2"
     if mark is not None:
         # In the header of every printed page; "&" begins a code of the format there.
         sheet.oddHeader.center.text = mark.replace("&", "&&")
-    bold = Font(bold=True)
+    return sheet
 
-    def made(value: Any, *, head: bool) -> Any:
-        # openpyxl writes 16 digits; a double that needs 17 is given as its own shortest decimal, typed as
-        # the number that it is.
-        if isinstance(value, float) and float(f"{value:.16g}") != value:
-            exact = WriteOnlyCell(sheet, value=repr(value))
-            exact.data_type = "n"
-            return exact
-        # A text is a text even where it begins like a formula: openpyxl would guess otherwise.
-        if not (head or (isinstance(value, str) and value.startswith("="))):
-            return value
-        cell = WriteOnlyCell(sheet, value=value)
-        if isinstance(value, str):
-            cell.data_type = "s"
-        if head:
-            cell.font = bold
-        return cell
 
-    for index, row in enumerate(rows):
-        if index == 0:
-            for column, text in enumerate(row):
-                sheet.column_dimensions[_letter(column)].width = max(11, min(len(str(text)) + 2, 40))
-        sheet.append([made(cell(value), head=index == 0) for value in row])
+def _readable(book: Any, page: Sheet, mark: str | None) -> None:
+    """Write a sheet for people: one page wide in print, its head frozen and repeated, with a filter."""
+    from openpyxl.worksheet.properties import PageSetupProperties
+
+    sheet = _sheet(book, page.name, mark)
+    sheet.sheet_view.showGridLines = bool(page.head)
+    sheet.page_setup.orientation = "landscape" if page.head else "portrait"
+    sheet.page_setup.paperSize = 9  # A4
+    sheet.page_setup.fitToHeight = 0
+    sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
+    for column, width in enumerate(page.widths):
+        sheet.column_dimensions[_letter(column)].width = width
+    if page.head:
+        sheet.freeze_panes = "A2"
+        sheet.print_title_rows = "1:1"
+        sheet.auto_filter.ref = f"A1:{_letter(len(page.head) - 1)}{len(page.rows) + 1}"
+        numbers = {at for row in page.rows for at, value in enumerate(row) if isinstance(value, Shown)}
+        sheet.append(
+            [
+                _cell(sheet, Shown(value=text, bold=True, side="right" if at in numbers else None))
+                for at, text in enumerate(page.head)
+            ]
+        )
+    for row in page.rows:
+        sheet.append([_cell(sheet, value) for value in row])
+
+
+def _machine_sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
+    """Write a sheet for programs: values as they are, its head frozen and with a filter."""
+    sheet = _sheet(book, name, mark)
+    sheet.freeze_panes = "A2"
+    lines = iter(rows)
+    first = list(itertools.islice(lines, _LOOKED_AT))
+    for column, texts in enumerate(zip(*first, strict=True)):
+        longest = max(len(str(text)) for text in texts if isinstance(text, str) or text is texts[0])
+        sheet.column_dimensions[_letter(column)].width = max(11, min(longest + 2, _WIDEST))
+    count = 0
+    for count, row in enumerate(itertools.chain(first, lines), start=1):
+        sheet.append([_cell(sheet, Shown(value=value, bold=True) if count == 1 else value) for value in row])
+    sheet.auto_filter.ref = f"A1:{_letter(len(first[0]) - 1)}{count}"
+
+
+def _cell(sheet: Any, value: Any) -> Any:
+    """Return a value as a sheet takes it: plain where openpyxl writes it as it is."""
+    shown = value if isinstance(value, Shown) else None
+    content = cell(value if shown is None else shown.value)
+    # openpyxl writes 16 digits; a double that needs 17 is given as its own shortest decimal, typed as the
+    # number that it is.
+    long = isinstance(content, float) and float(f"{content:.16g}") != content
+    # A text is a text even where it begins like a formula: openpyxl would guess otherwise.
+    formula = isinstance(content, str) and content.startswith("=")
+    if shown is None and not long and not formula:
+        return content
+    return _styled(sheet, repr(content) if long else content, shown, is_number=long)
+
+
+def _styled(sheet: Any, content: Any, shown: Shown | None, *, is_number: bool) -> Any:
+    from openpyxl.cell import WriteOnlyCell
+    from openpyxl.styles import Alignment, Font
+
+    made = WriteOnlyCell(sheet, value=content)
+    if isinstance(content, str):
+        made.data_type = "n" if is_number else "s"
+    if shown is not None:
+        made.number_format = shown.number_format
+        if shown.bold or shown.size or shown.warning:
+            colour = "B3261E" if shown.warning else None
+            made.font = Font(name="Calibri", bold=shown.bold, size=shown.size or 11, color=colour)
+        if shown.side:
+            made.alignment = Alignment(horizontal=shown.side)
+    return made
 
 
 def _letter(column: int) -> str:
@@ -130,6 +183,7 @@ def _provenance(result: TestResult, digest: str) -> Rows:
     yield ("axes", reduced.axes)
     yield ("averaging", reduced.averaging)
     yield ("protocol", reduced.protocol)
+    yield ("machine_title", reduced.machine_title)
     use = reduced.calibration
     if use.mark is not None:
         yield (str(use.word or "MARK"), use.mark)

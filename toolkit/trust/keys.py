@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolkit.errors import TrustError
+from toolkit.files import real_path
 from toolkit.inputs import read_regular
 from toolkit.trust.ssh import PublicKey, Sign, armoured, parse_public, public_of, sign_with
 
@@ -74,11 +75,17 @@ def make_key(path: Path, passphrase: str, comment: str) -> PublicKey:
         Encoding.PEM, PrivateFormat.OpenSSH, BestAvailableEncryption(passphrase.encode())
     )
     name = path.with_name(path.name + ".pub")
+    written: list[Path] = []
     try:
-        _write_new(path, text, 0o600)
-        _write_new(name, f"{public.line} {comment}\n".encode(), 0o644)
+        for place, data, mode in (
+            (path, text, 0o600),
+            (name, f"{public.line} {comment}\n".encode(), 0o644),
+        ):
+            _write_new(place, data, mode, written)
     except OSError as error:
-        raise _unusable(path, error.strerror, "a path where no file is") from error
+        for place in written:  # a key without its public half is none
+            place.unlink(missing_ok=True)
+        raise _unusable(path, error.strerror, "a path where no file is, and FILE.pub neither") from error
     return public
 
 
@@ -144,7 +151,7 @@ def _signer(path: Path, data: bytes, passphrase: Passphrase) -> Signer:
 
 
 def _demand_outside(path: Path) -> None:
-    home = next((folder for folder in path.resolve().parents if (folder / "calibrations").is_dir()), None)
+    home = next((folder for folder in real_path(path).parents if (folder / "calibrations").is_dir()), None)
     if home is not None:
         raise TrustError(
             "a private key lies in a laboratory's home", where=path, got=f"inside {home}, which is copied",
@@ -157,17 +164,20 @@ def _demand_outside(path: Path) -> None:
 def _content(path: Path) -> bytes:
     try:
         data = read_regular(path)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise _unusable(
-            path, error.strerror, "an OpenSSH private key, or the public key of one in the agent"
+            path,
+            getattr(error, "strerror", error),
+            "an OpenSSH private key, or the public key of one in the agent",
         ) from error
     if len(data) > _LARGEST:
         raise _unusable(path, f"{len(data)} bytes", "a key file")
     return data
 
 
-def _write_new(path: Path, data: bytes, mode: int) -> None:
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+def _write_new(path: Path, data: bytes, mode: int, written: list[Path]) -> None:
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+    written.append(path)
     with os.fdopen(handle, "wb") as stream:
         stream.write(data)
         stream.flush()

@@ -137,8 +137,19 @@ def read_request(path: Path) -> Request:
     TrustError
         ``request``: it is none, or its parts do not belong together
     """
+    return parse_request(read_input(path, REQUEST_FILE), path)
+
+
+def parse_request(data: bytes, path: Path) -> Request:
+    """Return a request from the content of its file; ``path`` says in messages where that is.
+
+    Raises
+    ------
+    TrustError
+        ``request``
+    """
     try:
-        entries = json.loads(read_input(path, REQUEST_FILE))
+        entries = json.loads(data)
         parts = {key: entries[key] for key in ("message", "people", "file", "operators", "signatures")}
         body = json.loads(parts["message"])
         request = Request(

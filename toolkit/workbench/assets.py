@@ -19,8 +19,13 @@ _SCRIPT, _STYLE = "text/javascript; charset=utf-8", "text/css; charset=utf-8"
 _SERVED: dict[str, tuple[str, tuple[Path, ...]]] = {
     "htmx.js": (_SCRIPT, (STATIC / "htmx.min.js",)),
     "uPlot.js": (_SCRIPT, (STATIC / "uPlot.iife.min.js",)),
+    "session.js": (_SCRIPT, (STATIC / "session.js",)),
     "workbench.js": (_SCRIPT, (STATIC / "workbench.js",)),
-    "workbench.css": (_STYLE, (KIT / "page.css", STATIC / "uPlot.min.css", STATIC / "workbench.css")),
+    "curves.js": (_SCRIPT, (STATIC / "curves.js",)),
+    "workbench.css": (
+        _STYLE,
+        (KIT / "page.css", STATIC / "uPlot.min.css", STATIC / "workbench.css", STATIC / "work.css"),
+    ),
 }
 
 

@@ -12,34 +12,93 @@ from toolkit.calibration.registry.clock import today
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.audited import Audited
+    from toolkit.lab.holdings import Holdings, Kind
+    from toolkit.trust.people import Person
     from toolkit.workbench.guard import Keys
 
 Answer = TypeVar("Answer")
 _MOST_ANSWERS = 64
+_MOST_AUDITS = 2
 
 
 class Bench:
-    """The workbench of one home. Answers that cost seconds are remembered by what they rest on."""
+    """The workbench of one home. Answers that cost seconds are remembered by what they rest on.
 
-    def __init__(self, home: Path, registry: Registry, keys: Keys) -> None:
-        self.home, self.registry, self.keys = home, registry, keys
+    ``person``: whose session it is, where other computers reach the workbench; None: that of the server's own
+    user.
+    """
+
+    def __init__(self, home: Path, registry: Registry, keys: Keys, *, person: Person | None = None) -> None:
+        self.home, self.registry, self.keys, self.person = home, registry, keys, person
         self._answers: dict[tuple[object, ...], object] = {}
         self._asked: dict[tuple[str, str | None], threading.Lock] = {}
+        self._holdings: Holdings | None = None
+        self._audited: dict[Path, tuple[object, Audited]] = {}
+        self._reading = threading.Lock()
+        self._reported: tuple[Holdings, frozenset[str]] | None = None
+
+    @property
+    def is_own(self) -> bool:
+        """Whether only the computer of the server's own user reaches it."""
+        return self.person is None
 
     @property
     def today(self) -> dt.date:
         """The day by which things are due."""
         return today()
 
-    def remembered(self, question: str, instrument: str | None, ask: Callable[[], Answer]) -> Answer:
+    def holdings(self, *, again: bool = False) -> Holdings:
+        """Return what the home holds, as it was when it was last looked through; ``again`` looks now."""
+        from toolkit.lab.holdings import holdings_of
+
+        if self._holdings is None or again:
+            self._holdings = holdings_of(self.home)
+        return self._holdings
+
+    def path_of(self, kind: Kind, holding_id: str) -> Path | None:
+        """Return the folder of a holding by its id; the home is looked through where it is not known."""
+        known = self.holdings().path(kind, holding_id)
+        return known or self.holdings(again=True).path(kind, holding_id)
+
+    def reported(self) -> frozenset[str]:
+        """Return the hashes that the reports of the home rest on, read once for each look through it."""
+        from toolkit.lab.holdings import reported_inputs
+
+        holdings = self.holdings()
+        if self._reported is None or self._reported[0] is not holdings:
+            self._reported = (holdings, reported_inputs(holdings))
+        return self._reported[1]
+
+    def audited(self, audit_id: str) -> Audited | None:
+        """Return the answer of an audit, read again once it is another; None where none has this id."""
+        from toolkit.lab.audited import read_audited, stamp
+
+        folder = self.path_of("audit", audit_id)
+        if folder is None:
+            return None
+        with self._reading:
+            now = stamp(folder)
+            before, answer = self._audited.get(folder, (None, None))
+            if answer is None or before != now:
+                answer = read_audited(folder)
+                while len(self._audited) >= _MOST_AUDITS:
+                    self._audited.pop(next(iter(self._audited)))
+                self._audited[folder] = (now, answer)
+        return answer
+
+    def remembered(
+        self, question: str, instrument: str | None, ask: Callable[[], Answer], *, rests_on: object = None
+    ) -> Answer:
         """Return an answer about an instrument's records (None: all), asked again when a byte changed.
 
-        Who asks the same meanwhile waits for that answer; who asks something else does not.
+        ``rests_on`` is what else it rests on, such as the hash of a file. Who asks the same meanwhile waits
+        for that answer; who asks something else does not.
         """
         names = self.registry.instruments() if instrument is None else (instrument,)
         with self._asked.setdefault((question, instrument), threading.Lock()):
             state = tuple((name, self.registry.digest(name)) for name in names)
-            key = (question, instrument, self.today, state)
+            key = (question, instrument, self.today, state, rests_on)
             if key not in self._answers:
                 answer = ask()
                 while len(self._answers) >= _MOST_ANSWERS:

@@ -10,28 +10,31 @@ other user of the computer. What keeps them out:
   that the browser sends from our own pages alone (``SameSite=Strict``);
 - what changes something needs the **Origin** of our pages and the **form key** that stands in them.
 
-A handler sees a form only as ``request.state.form``, after these checks: none can be forgotten.
+A handler sees a form only as ``request.state.form``, its files as ``request.state.files``, after these
+checks: none can be forgotten.
 """
 
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from hmac import compare_digest
 from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, parse_qsl
+from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import HTMLResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from toolkit.workbench.forms import FILES_TYPE, FORM_TYPE, read_form
 from toolkit.workbench.page import bare_page
 
-LARGEST_FORM = 65_536
-"""Bytes of a form: names, a date, a reason."""
+LARGEST_FORM = 4 << 20
+"""Bytes of a form: names, a reason, the rows of a session that somebody types."""
+LARGEST_UPLOAD = 32 << 20
+"""Bytes of a form with files, all in memory; each file is held against the limit of its own form as well."""
 
-FORM_TYPE = "application/x-www-form-urlencoded"
 ENTRANCE = "/open"
 COOKIE = "toolkit"
 HEADERS: Mapping[str, str] = {
@@ -81,10 +84,15 @@ class _Refusal:
 
 
 class Guard:
-    """ASGI middleware around the pages. ``origin`` is the one that was printed, as http://127.0.0.1:8731."""
+    """ASGI middleware around the pages. ``origin`` is the one that was printed, as http://127.0.0.1:8731.
 
-    def __init__(self, app: ASGIApp, *, origin: str, keys: Keys) -> None:
-        self.app, self.origin, self.keys = app, origin, keys
+    ``is_open`` tells at each request whether its person is still let in.
+    """
+
+    def __init__(
+        self, app: ASGIApp, *, origin: str, keys: Keys, is_open: Callable[[], bool] = lambda: True
+    ) -> None:
+        self.app, self.origin, self.keys, self.is_open = app, origin, keys, is_open
         self.authority = origin.partition("://")[2]
 
     @property
@@ -121,6 +129,8 @@ class Guard:
             return _Refusal(405, "The workbench does not answer this method.")
         if not scope["path"].startswith(self.keys.place + "/"):
             return _Refusal(404, "There is no such page.")
+        if not self.is_open():
+            return _Refusal(401, "This person is let in no more: the laboratory's people changed.")
         return None
 
     def _person_refusal(self, scope: Scope, headers: Headers) -> _Refusal | None:
@@ -137,7 +147,9 @@ class Guard:
 
     async def _read_form(self, scope: Scope, headers: Headers, receive: Receive) -> _Refusal | None:
         """Read the form of a request into its state; what has no key of our pages is refused."""
-        if headers.get("content-type", "").partition(";")[0].strip().lower() != FORM_TYPE:
+        content_type = headers.get("content-type", "")
+        kind = content_type.partition(";")[0].strip().lower()
+        if kind not in (FORM_TYPE, FILES_TYPE):
             return _Refusal(415, "The workbench takes forms alone.")
         body = bytearray()
         more = True
@@ -147,17 +159,15 @@ class Guard:
                 return _Refusal(400, "The form did not arrive whole.")
             body += message.get("body", b"")
             more = message.get("more_body", False)
-            if len(body) > LARGEST_FORM:
+            if len(body) > (LARGEST_FORM if kind == FORM_TYPE else LARGEST_UPLOAD):
                 return _Refusal(413, "The form is too large.")
         try:
-            form = dict(
-                parse_qsl(body.decode(), keep_blank_values=True, strict_parsing=True, max_num_fields=50)
-            )
+            form = read_form(bytes(body), content_type)
         except ValueError:
             return _Refusal(400, "The form cannot be read.")
-        if not compare_digest(form.pop("form_key", "").encode(), self.keys.form.encode()):
+        if not compare_digest(form.fields.pop("form_key", "").encode(), self.keys.form.encode()):
             return _Refusal(403, "The form is not one of this run of the workbench. Load its page again.")
-        scope.setdefault("state", {})["form"] = form
+        scope.setdefault("state", {}).update(form=form.fields, files=form.files)
         return None
 
     def _entrance(self, scope: Scope) -> HTMLResponse:
@@ -174,6 +184,19 @@ class Guard:
             secure=self.origin.startswith("https:"),
         )  # fmt: skip
         return response
+
+
+class Doors:
+    """The guards of several people, each at the place of its own keys: no cookie is sent to another's."""
+
+    def __init__(self, guards: Sequence[Guard]) -> None:
+        self.guards = {guard.keys.place: guard for guard in guards}
+        self.closed = guards[0]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on to the guard of its place; any of them refuses what has none."""
+        place = "/" + scope.get("path", "").lstrip("/").partition("/")[0]
+        await self.guards.get(place, self.closed)(scope, receive, send)
 
 
 def _cookie(headers: Headers) -> str:

@@ -43,6 +43,18 @@ def _instruments(bench: Bench) -> dict[str, Any]:
     return {"instruments": questions.instruments_answer(bench.registry, bench.today)}
 
 
+def _requests(bench: Bench) -> dict[str, Any]:
+    from toolkit.lab.pending import pending_requests
+
+    return {"rows": pending_requests(bench.home, bench.registry)}
+
+
+def _drafts(bench: Bench) -> dict[str, Any]:
+    from toolkit.lab.drafts import drafts
+
+    return {"rows": drafts(bench.home)}
+
+
 def _candidates(bench: Bench) -> dict[str, Any]:
     rows = bench.remembered("candidates", None, lambda: questions.candidates_answer(bench.registry))
     return {"rows": rows}
@@ -62,6 +74,8 @@ def _work(bench: Bench) -> dict[str, Any]:
 
 _QUESTIONS: dict[str, Callable[[Bench], dict[str, Any]]] = {
     "instruments": _instruments,
+    "requests": _requests,
+    "drafts": _drafts,
     "candidates": _candidates,
     "due": _due,
     "drift": _drift,

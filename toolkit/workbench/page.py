@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, pass_context
 from jinja2.runtime import Context
+from markupsafe import Markup
 from starlette.responses import HTMLResponse
 
+from toolkit.estimate import plus_minus
 from toolkit.lab.answers import one_line
-from toolkit.report.pages.kit import data, environment
+from toolkit.lab.holdings import holding_id
+from toolkit.report.pages.kit import data, drawn, environment
 from toolkit.workbench.words import decimal_sign, preferred, translations
 
 if TYPE_CHECKING:
@@ -31,8 +34,8 @@ def templates(language: str) -> Environment:
     drawn = environment(TEMPLATES)
     drawn.add_extension("jinja2.ext.i18n")
     drawn.install_gettext_translations(translations(language), newstyle=False)  # type: ignore[attr-defined]
-    drawn.globals |= {"language": language, "number": _number}
-    drawn.filters |= {"chart": _chart, "one_line": one_line}
+    drawn.globals |= {"language": language, "number": _number, "measured": _measured}
+    drawn.filters |= {"chart": _chart, "one_line": one_line, "holding_id": holding_id}
     return drawn
 
 
@@ -43,12 +46,20 @@ def bare_page(name: str, **context: object) -> str:
 
 def page(request: Request, name: str, *, status: int = 200, **context: object) -> HTMLResponse:
     """Return a page, or a part of one, by its template."""
-    language = preferred(request.headers.get("accept-language", ""))
+    return HTMLResponse(fragment(request, name, **context), status, {"content-language": _language(request)})
+
+
+def fragment(request: Request, name: str, **context: object) -> Markup:
+    """Return the text of a page or of a part, to stand in another."""
     bench = request.app.state.bench
-    text = templates(language).get_template(f"{name}.html.j2").render(
-        place=bench.keys.place, form_key=bench.keys.form, home=bench.home.name, **context
-    )  # fmt: skip
-    return HTMLResponse(text, status, {"content-language": language})
+    shared = {"place": bench.keys.place, "form_key": bench.keys.form, "home": bench.home.name}
+    template = templates(_language(request)).get_template(f"{name}.html.j2")
+    text = template.render(**shared, visitor=bench.person, **context)
+    return drawn(text)
+
+
+def _language(request: Request) -> str:
+    return preferred(request.headers.get("accept-language", ""))
 
 
 def refusal(request: Request, error: ToolkitError) -> HTMLResponse:
@@ -66,9 +77,21 @@ def _number(context: Context, value: float | None, form: str = ".4g", unit: str 
     """Return a number with its unit; the element's ``value`` is the number itself, as the JSON has it."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "–"
-    digits = format(value, form).replace(".", decimal_sign(context["language"])).replace("-", "\u2212")
+    digits = _printed(context, format(value, form))
     text = f"{digits}\u00a0{unit}" if unit else digits
     return data(json.dumps(value), text)
+
+
+@pass_context
+def _measured(context: Context, value: float, U: float | None) -> tuple[str, str]:
+    """Return a value and its U as wherever people read both: U in two digits, the value to its last place."""
+    parts = plus_minus(value, math.nan if U is None else U).split(" ± ")
+    U_text = data(json.dumps(U), _printed(context, parts[1])) if len(parts) > 1 else "–"
+    return data(json.dumps(value), _printed(context, parts[0])), U_text
+
+
+def _printed(context: Context, digits: str) -> str:
+    return digits.replace(".", decimal_sign(context["language"])).replace("-", "\u2212")
 
 
 def _chart(content: Mapping[str, Any]) -> str:

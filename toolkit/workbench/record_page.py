@@ -12,9 +12,13 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse
 
 from toolkit.calibration.registry.registry import ID
-from toolkit.errors import ConfigError
-from toolkit.workbench.page import page, refusal
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.lab.decisions import Order
+from toolkit.lab.pending import decide as settle_decision
+from toolkit.trust.requested import Requested
+from toolkit.workbench.page import page
 from toolkit.workbench.record_charts import budget_chart, residual_chart
+from toolkit.workbench.waiting import waiting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -45,26 +49,33 @@ def _newest_first(status: Any) -> int:
 
 def record(request: Request) -> Response:
     """Return a record's page: its state and coefficients, and a place for each part."""
-    return _record_page(request)
+    _, record_id = _asked(request)
+    return record_page(request, record_id)
 
 
-def _record_page(
+def record_page(
     request: Request,
+    record_id: str,
     *,
     status: int = 200,
     outcome: Mapping[str, Any] | None = None,
     typed: Mapping[str, str] | None = None,
+    refused: ToolkitError | None = None,
 ) -> Response:
+    """Return the page of a record that a ledger knows; ``refused`` is told at the form of its decision."""
     from toolkit.lab.registry_answer import history, shown
 
-    bench, record_id = _asked(request)
+    bench: Bench = request.app.state.bench
     instrument = ID.match(record_id)["instrument"]  # type: ignore[index]
     content, _ = shown(bench.registry, record_id, known_at=None)
     events, _ = history(bench.registry.ledger(instrument), instrument, record_id)
+    version = bench.registry.people().history.now
     return page(
         request, "record", status=status, content=content, events=events["events"], outcome=outcome,
-        parts=tuple(_PARTS) if content["record"]["verified"] else ("gates", "responses"), typed=typed or {},
-        people=bench.registry.people().history.now is not None, today=bench.today.isoformat(),
+        parts=tuple(PARTS) if content["record"]["verified"] else ("gates", "responses"), typed=typed or {},
+        people=() if version is None else version.people.person, today=bench.today.isoformat(),
+        refused=None if refused is None else refused.as_dict(),
+        **waiting(bench, record_id),
     )  # fmt: skip
 
 
@@ -72,10 +83,10 @@ def part(request: Request) -> Response:
     """Return one part of a record's page."""
     bench, record_id = _asked(request)
     name = request.path_params["part"]
-    if name not in _PARTS:
+    if name not in PARTS:
         raise HTTPException(404)
     instrument = ID.match(record_id)["instrument"]  # type: ignore[index]
-    content = bench.remembered(f"{name} {record_id}", instrument, lambda: _PARTS[name](bench, record_id))
+    content = bench.remembered(f"{name} {record_id}", instrument, lambda: PARTS[name](bench, record_id))
     return page(request, f"part_{name}", record_id=record_id, **content)
 
 
@@ -124,7 +135,7 @@ def _as_found(bench: Bench, record_id: str) -> dict[str, Any]:
     return {"found": as_found_answer(bench.registry, record_id)}
 
 
-_PARTS: dict[str, Callable[[Bench, str], dict[str, Any]]] = {
+PARTS: dict[str, Callable[[Bench, str], dict[str, Any]]] = {
     "gates": _gates,
     "responses": _responses,
     "fit": _fit,
@@ -136,53 +147,37 @@ _PARTS: dict[str, Callable[[Bench, str], dict[str, Any]]] = {
 def decide(request: Request) -> Response:
     """Decide about a record as the command line does: by name, behind its gates.
 
-    Where people are enrolled a decision is signed by their keys, which never come here: the page says how.
+    Where people are enrolled the decision is requested: it is signed by their keys, which never come here.
     """
     bench, record_id = _asked(request)
     decision = request.path_params["decision"]
     if decision not in DECISIONS:
         raise HTTPException(404)
-    if bench.registry.people().history.now is not None:
-        return refusal(
-            request,
-            ConfigError(
-                "people are enrolled here: a decision is signed by their keys", where=record_id,
-                got="a decision without a signature", expected="the command that the record's page shows",
-                next_step="run it where the key is; nothing was changed", rule="not-signed",
-            ),
-        )  # fmt: skip
     form = {name: value.strip() for name, value in request.state.form.items()}
-    if decision == "approve":
-        outcome = _approve(bench, record_id, form)
-        if not outcome.done:
-            return _record_page(
-                request, status=422, outcome={"findings": [f.as_dict() for f in outcome.findings]}, typed=form
-            )
-    elif decision == "withdraw":
-        from toolkit.calibration.registry.approval import withdraw
-
-        withdraw(
-            bench.registry,
-            record_id,
-            on=_day(form, "on"),
-            reason=form.get("reason", ""),
-            by=form.get("by", ""),
-        )
-    else:
-        from toolkit.calibration.registry.approval import discard
-
-        discard(bench.registry, record_id, reason=form.get("reason", ""), by=form.get("by") or "not stated")
+    try:
+        order = _order(decision, record_id, form)
+        decision_made = settle_decision(bench.home, bench.registry, record_id, order)
+    except Requested:
+        return RedirectResponse(f"{bench.keys.place}/record/{record_id}#decision", 303)
+    except ToolkitError as error:
+        return record_page(request, record_id, status=400, typed=form, refused=error)
+    if findings := getattr(decision_made, "findings", ()):
+        told = {"findings": [finding.as_dict() for finding in findings]}
+        return record_page(request, record_id, status=422, outcome=told, typed=form)
     return RedirectResponse(f"{bench.keys.place}/record/{record_id}", 303)
 
 
-def _approve(bench: Bench, record_id: str, form: Mapping[str, str]) -> Any:
-    from toolkit.calibration.registry.approval import approve
-
-    return approve(
-        bench.registry, record_id, in_force_from=_day(form, "in_force_from"),
-        checked_by=form.get("checked_by", ""), approved_by=form.get("approved_by") or None,
-        reason=form.get("reason") or None, recall=form.get("recall") or None,
-    )  # fmt: skip
+def _order(decision: str, record_id: str, form: Mapping[str, str]) -> Order:
+    if decision == "approve":
+        return Order(
+            action="approve", record=record_id, since=_day(form, "in_force_from"),
+            by=form.get("checked_by", ""), approved_by=form.get("approved_by") or None,
+            reason=form.get("reason") or None, recall=form.get("recall") or None,
+        )  # fmt: skip
+    by, reason = form.get("by", ""), form.get("reason", "")
+    if decision == "withdraw":
+        return Order(action="withdraw", record=record_id, on=_day(form, "on"), by=by, reason=reason)
+    return Order(action="discard", record=record_id, by=by, reason=reason)
 
 
 def _day(form: Mapping[str, str], name: str) -> dt.date:

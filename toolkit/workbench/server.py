@@ -5,21 +5,26 @@ from __future__ import annotations
 import socket
 import tempfile
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
-from toolkit.workbench.guard import Guard, Keys
+from toolkit.inputs import CERTIFICATE_FILE, read_input
+from toolkit.workbench.guard import Doors, Guard, Keys
 from toolkit.workbench.page import bare_page
 
 if TYPE_CHECKING:
     import uvicorn
 
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.trust.people import Person
 
 LOOPBACK = "127.0.0.1"
+Addresses = Mapping[str | None, str]
+"""The addresses that let in, by the person whom each lets in; None: the user of this computer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,46 +74,79 @@ def check_listening(listening: Listening, registry: Registry) -> None:
 
 
 def serve(
-    home: Path, registry: Registry, listening: Listening, *, browser: bool, say: Callable[[str, Path], None]
+    home: Path, registry: Registry, listening: Listening, *, browser: bool, say: Callable[[Addresses], None]
 ) -> None:
-    """Serve the workbench of a home until Ctrl-C; ``say`` is told the address once it answers.
+    """Serve the workbench of a home until Ctrl-C; ``say`` is told the addresses once they answer.
 
     Raises
     ------
     ConfigError
         ``workbench-host``; ``workbench-port``: the address is taken, or is none of this computer
     """
-    from toolkit.workbench.app import application
-
     check_listening(listening, registry)
     with _bound(listening) as bound, tempfile.TemporaryDirectory(prefix="toolkit-open-") as private:
-        keys = Keys()
-        origin = listening.origin(bound.getsockname()[1])
-        guard = Guard(application(home, registry, keys), origin=origin, keys=keys)
-        server = server_of(guard, listening)
-        say(guard.address, home)
-        if browser:
-            webbrowser.open(_way_in(Path(private), guard.address).as_uri())
+        guards = guards_of(home, registry, listening, listening.origin(bound.getsockname()[1]))
+        server = server_of(Doors(tuple(guards.values())), listening)
+        say({person: guard.address for person, guard in guards.items()})
+        if browser and None in guards:
+            webbrowser.open(_way_in(Path(private), guards[None].address).as_uri())
         try:
             server.run(sockets=[bound])
         except KeyboardInterrupt:
             return
 
 
-def server_of(guard: Guard, listening: Listening) -> uvicorn.Server:
+def guards_of(home: Path, registry: Registry, listening: Listening, origin: str) -> dict[str | None, Guard]:
+    """Return who is let in: the server's own user, or each person who is enrolled, by id, with own keys.
+
+    Whose keys were all revoked since is let in no more, whatever address or cookie that person has.
+    """
+    from toolkit.workbench.app import application
+
+    if listening.is_loopback:
+        keys = Keys()
+        return {None: Guard(application(home, registry, keys), origin=origin, keys=keys)}
+    guards: dict[str | None, Guard] = {}
+    for person in signing_people(registry):
+        keys = Keys()
+        guards[person.id] = Guard(
+            application(home, registry, keys, person=person), origin=origin, keys=keys,
+            is_open=partial(_signs, registry, person.id),
+        )  # fmt: skip
+    return guards
+
+
+def signing_people(registry: Registry) -> tuple[Person, ...]:
+    """Return the people who sign now."""
+    version, now = registry.people().history.now, registry.now()
+    people = () if version is None else version.people.person
+    return tuple(person for person in people if any(key.valid_at(now) for key in person.keys))
+
+
+def _signs(registry: Registry, person_id: str) -> bool:
+    return any(person.id == person_id for person in signing_people(registry))
+
+
+def server_of(guard: Guard | Doors, listening: Listening) -> uvicorn.Server:
     """Return the server of guarded pages: plain HTTP, no web sockets, nothing written to the terminal.
 
     Raises
     ------
     ConfigError
         ``workbench-host``: the certificate cannot be used
+    TrustError
+        a file of the two cannot be read
     """
     import uvicorn
 
+    for path in (listening.certificate, listening.key):
+        if path is not None:
+            read_input(path, CERTIFICATE_FILE)  # ssl would wait for a pipe
     config = uvicorn.Config(
         guard, log_config=None, access_log=False, server_header=False, lifespan="off", ws="none",
         http="h11", loop="asyncio", timeout_graceful_shutdown=2, proxy_headers=False,
         ssl_certfile=listening.certificate, ssl_keyfile=listening.key,
+        ssl_keyfile_password="",  # an encrypted key would be asked for at the terminal
     )  # fmt: skip
     try:
         config.load()

@@ -6,35 +6,29 @@ language's decimal sign; days stay ISO 8601, which laboratories write in every l
 
 from __future__ import annotations
 
-import io
-from functools import cache
-from gettext import GNUTranslations, NullTranslations
+from gettext import NullTranslations
 from pathlib import Path
 
+from toolkit.words import catalogue
+from toolkit.words.catalogue import SOURCE, decimal_sign
+
+__all__ = ["MESSAGES", "SOURCE", "TERMS", "decimal_sign", "languages", "preferred", "translations"]
+
 MESSAGES = Path(__file__).with_name("messages")
-SOURCE = "en"
-TERMS = ("candidate", "approved", "withdrawn", "discarded", "entered")
+TERMS = (
+    "candidate", "approved", "withdrawn", "discarded", "entered", "enter", "approve", "withdraw", "discard",
+)  # fmt: skip
 """Words of the ledger that pages translate: no template spells them."""
 
 
 def languages() -> tuple[str, ...]:
     """Return the languages of the pages, the templates' own first."""
-    return (SOURCE, *sorted(path.stem for path in MESSAGES.glob("*.po")))
+    return catalogue.languages(MESSAGES)
 
 
-@cache
 def translations(language: str) -> NullTranslations:
     """Return the catalogue of a language; that of the templates' own is empty."""
-    from babel.messages.mofile import write_mo
-    from babel.messages.pofile import read_po
-
-    if language == SOURCE:
-        return NullTranslations()
-    catalogue = read_po(io.BytesIO((MESSAGES / f"{language}.po").read_bytes()), locale=language)
-    compiled = io.BytesIO()
-    write_mo(compiled, catalogue)
-    compiled.seek(0)
-    return GNUTranslations(compiled)
+    return catalogue.translations(language, MESSAGES)
 
 
 def preferred(accepted: str) -> str:
@@ -55,11 +49,3 @@ def preferred(accepted: str) -> str:
         ranked.append((-weight, name.strip()))
     names = [name for _, name in sorted(ranked, key=lambda entry: entry[0])]
     return negotiate_locale(names, languages(), sep="-") or SOURCE
-
-
-@cache
-def decimal_sign(language: str) -> str:
-    """Return the sign between a number and its decimals."""
-    from babel.numbers import get_decimal_symbol
-
-    return get_decimal_symbol(language)

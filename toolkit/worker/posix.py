@@ -7,13 +7,11 @@ ended with the worker. It holds none of the tool's descriptors, and the kernel s
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import gc
 import io
 import json
 import math
 import os
-import resource
 import select
 import signal
 import sys
@@ -21,7 +19,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from typing import NoReturn
 
+from toolkit.errors import ConfigError
+from toolkit.system import can_fork
 from toolkit.worker.walls import Walls, libc
+
+with contextlib.suppress(ModuleNotFoundError):  # another system: `begin` refuses there
+    import fcntl
+    import resource
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _PDEATHSIG, _SUBREAPER = 1, 36  # of prctl(2)
@@ -57,7 +61,19 @@ def begin(limits: Limits, ends: tuple[int, int, int], scratch: str) -> int:
 
     A process of one thread is forked: everything is loaded already. One of several may hold a lock at that
     moment, which nobody would ever open in the child: a new interpreter begins there.
+
+    Raises
+    ------
+    ConfigError
+        ``no-isolation``: the system cannot keep a process and all that it starts within limits
     """
+    if not can_fork():
+        raise ConfigError(
+            "this system cannot run code of others within limits",
+            where="the simulator's process", got=sys.platform, expected="Linux: forks, sessions, a guardian",
+            next_step="run it in a container or on a Linux computer; a notebook may take it into its own "
+            "process (in_process=True)", rule="no-isolation",
+        )  # fmt: skip
     high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, _FIRST) for end in ends]
     try:
         if _has_threads() and sys.executable:

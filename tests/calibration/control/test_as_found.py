@@ -102,3 +102,51 @@ def test_a_history_of_results_without_those_withdrawn(used: Registry, tmp_path: 
     assert [(one.date.year, one.within) for one in found] == [(2024, True), (2025, True), (2026, False)]
     withdraw(used, found[1].session_record, on=dt.date(2026, 2, 1), reason="a wrong weight", by="B")
     assert [one.date.year for one in as_found_history(used, "cell")] == [2024, 2026]
+
+
+def test_the_record_of_each_session_is_that_of_the_whole_ledger(used: Registry, tmp_path: Path) -> None:
+    # By the rule's words, approval for approval: the newest first day, the last entry among equals, known
+    # before later told, nothing void, nothing of the session's own day or later.
+    for at in range(2, 8):
+        entered = enter(used, tmp_path / f"s{at}", dt.date(2024, at, 10), span=1 + 1e-4 * at)
+        if at != 4:
+            put_in_force(used, entered)
+    withdraw(used, "cell-r3", on=dt.date(2024, 5, 20), reason="x", by="B")
+    ledger = used.ledger("cell")
+    for day in (dt.date(2024, 1, 1) + dt.timedelta(days=3 * n) for n in range(90)):
+        expected = []
+        for name in ledger.entered():
+            status = used.status(name, known_at=day)
+            if status.void_from is not None and day >= status.void_from:
+                continue
+            for entry in ledger.of(name):
+                if entry.event == "approved" and entry.since is not None and entry.since <= day:
+                    known = entry.known_on is not None and entry.known_on <= day
+                    expected.append((known, entry.since, entry.seq, name))
+        earlier = [rank for rank in expected if dt.date.fromisoformat(used.load(rank[3]).date) < day]
+        before = in_use_before(used, "cell", day)
+        assert (None if before is None else before.id) == (max(earlier)[3] if earlier else None), day
+
+
+def test_the_history_refits_what_it_uses_alone(
+    used: Registry, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from toolkit.calibration.control import as_found as module
+    from toolkit.errors import RecordError
+
+    enter(used, tmp_path / "s2", dt.date(2025, 1, 10), phase="as_found")
+    enter(used, tmp_path / "s3", dt.date(2025, 2, 10))
+    refitted: list[str] = []
+    load_many = module.load_many
+    monkeypatch.setattr(
+        module,
+        "load_many",
+        lambda folder, ids, ledger: refitted.extend(ids) or load_many(folder, ids, ledger),
+    )
+    assert len(as_found_history(used, "cell")) == 1
+    assert refitted == ["cell-r2"]
+    # A record whose bytes were changed is never passed over by what it now says.
+    path = used.folder / "cell" / "cell-r2.json"
+    path.write_text(path.read_text().replace("as_found", "as_left_"))
+    with pytest.raises(RecordError):
+        as_found_history(used, "cell")

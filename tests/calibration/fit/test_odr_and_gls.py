@@ -398,7 +398,7 @@ def test_what_a_method_needs_and_is_not_told_is_named(
     path = make_session(name="bad", method=f'"{method}"', tail=tail)
     with pytest.raises(ConfigError) as caught:
         calibrate(path, Registry(tmp_path / "cal"))
-    assert where in str(caught.value.where)
+    assert where in f"{caught.value.where} {caught.value.got}"
     assert caught.value.next_step
     assert not (tmp_path / "cal").exists()
 

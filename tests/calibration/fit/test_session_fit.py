@@ -169,7 +169,7 @@ BAD_SETTINGS = [
     ({"model": '"polynomial"'}, ConfigError, "degree"),
     ({"model": '"polynomial"', "degree": '"2"'}, ConfigError, "a whole number"),
     ({"temperature": '{ value = nan, unit = "degC" }'}, ConfigError, "temperature.value"),
-    ({"zero": "[{ when = 'before', values = { D51 = inf } }]"}, ConfigError, "zero 1.values.D51"),
+    ({"zero": "[{ when = 'before', values = { D51 = inf } }]"}, ConfigError, "zero[1].values.D51"),
     ({"drop": '["D51", "D52", "E5"]'}, SessionError, "no term of an indication"),
     ({"drop": '["D51", "D52", "E5", "intercept"]'}, SessionError, "no term of an indication"),
     ({"reference": '{ standard = ["s"] }'}, ConfigError, "reference.standard"),
@@ -181,7 +181,7 @@ BAD_SETTINGS = [
     ({"data": "-"}, ConfigError, "data"),
     ({"check": "7"}, ConfigError, "check"),
     ({"indications": "[]"}, ConfigError, "indications"),
-    ({"indications": '["D51", "D51"]'}, ConfigError, "different names"),
+    ({"indications": '["D51", "D51"]'}, ConfigError, "D51\" stands twice"),
     ({"loads": '["FY", "FQ"]'}, SessionError, "FQ"),
     ({"zero": '"none"'}, ConfigError, "included"),
     ({"phase": '"found"'}, ConfigError, "as_found"),
@@ -191,7 +191,7 @@ BAD_SETTINGS = [
     ({"temperature": '{ value = -300, unit = "degC" }'}, ConfigError, "absolute zero"),
     ({"cells": "{ D51 = { resolution = -1e-6 } }"}, ConfigError, "above zero"),
     ({"cells": "{ D51 = { u = 0 } }"}, ConfigError, "above zero"),
-    ({"cells": '{ D51 = { excitation = { value = 10, unit = "mm" } } }'}, UnitError, "voltage"),
+    ({"cells": '{ D51 = { excitation = { value = 10, unit = "mm" } } }'}, ConfigError, "voltage"),
     ({"cells": '{ D59 = { serial = "1" } }'}, ConfigError, "did you mean 'D52'"),
 ]  # fmt: skip
 

@@ -221,7 +221,7 @@ def test_a_record_cannot_disown_its_conversion(tmp_path: Path) -> None:
         ("scale = 0", "session"),
         ('scale = { value = -5e-7, unit = "mV/V" }', "session"),
         ('scale = { value = 0, unit = "mV/V" }', "session"),
-        ('scale = { value = inf, unit = "mV/V" }', "session"),
+        ('scale = { value = inf, unit = "mV/V" }', "wrong-value"),
         ('scale = { value = 5e-7, unit = "count" }', "unit-dimension"),
         ('scale = { value = 5e-7, unit = "degC" }', "unit-dimension"),
         ("scale = { value = 5e-7 }", "no-unit"),

@@ -6,7 +6,6 @@ import dataclasses
 import json
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +29,6 @@ from toolkit.characteristics.characteristic import (
     COLUMNS,
     CORRECTION,
     PRINTED,
-    PULL,
-    STIFFNESS,
     Characteristic,
 )
 from toolkit.characteristics.groups import CHANNELS
@@ -41,10 +38,12 @@ from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import simulate
 from toolkit.simulation.write import write_test
 from toolkit.units import si_scale
+from toolkit.words.catalogue import languages
+from toolkit.words.phrasebook import phrasebook
 
 EACH = pytest.mark.parametrize("declared", characteristics(), ids=lambda one: one.name)
 TEXTS = (
-    "name", "symbol", "title", "title_de", "definition", "formula", "term", "source", "column_text",
+    "name", "symbol", "title", "definition", "formula", "term", "source", "column_text",
 )  # fmt: skip
 
 
@@ -109,14 +108,10 @@ def test_a_test_that_lacks_its_needs_says_which(declared: Characteristic) -> Non
         assert row.lacking in {need.text for need in declared.needs}
 
 
-def test_the_german_words_of_the_report_make_the_german_titles() -> None:
-    style = packaged_home() / "report_templates" / "pruefbericht.toml"
-    words: dict[str, str] = tomllib.loads(style.read_text(encoding="utf-8"))["words"]
-    for declared in (*columns(STIFFNESS), *columns(PULL)):
-        german = declared.title
-        for english in sorted(words, key=len, reverse=True):
-            german = german.replace(english, words[english])
-        assert declared.title_de.endswith(german), declared.name
+@pytest.mark.parametrize("language", languages())
+def test_every_title_has_its_words_in_each_language(language: str) -> None:
+    book = phrasebook(language)
+    assert [declared.name for declared in characteristics() if not book.knows(declared.title)] == []
 
 
 def test_every_table_figure_and_value_of_the_catalogue_is_a_tag() -> None:

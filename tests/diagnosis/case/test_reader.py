@@ -50,7 +50,12 @@ def test_a_word_that_is_not_known_names_the_nearest_one(tmp_path, old, new, what
         ('unit = "kg"\n', 'unit = "kgg"\n', "unknown unit 'kgg'", "simulation.parameters.mass.unit"),
         ("value = 94.0", 'value = "94"', "a finite number", "simulation.parameters.mass.value"),
         ("value = 94.0", "value = inf", "a finite number", "simulation.parameters.mass.value"),
-        ("value = 94.0", f"value = {10**400}", "a finite number", "simulation.parameters.mass.value"),
+        (
+            "value = 94.0",
+            f"value = {10**400}",
+            "a number of at most 1e+100 in size",
+            "simulation.parameters.mass.value",
+        ),
         ("value = 94.0", "value = true", "a finite number", "simulation.parameters.mass.value"),
         ("value = 94.0", "", "is missing", "simulation.parameters.mass.value"),
         ("sd = 5.0", "sd = 0.0", "a number above zero", "simulation.parameters.mass.sd"),

@@ -10,8 +10,19 @@ from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
+from toolkit.diagnosis.simulators.case_code import CaseCode
+from toolkit.worker.worker import LateError
 
 WAITS = SIMULATOR.replace("import pandas as pd", "import pandas as pd, time\n    WAIT")
+DRIVEN = """
+import numpy as np
+def rhs(t, x, u, p):
+    return [(u["a"] - p["c"] * x[0]) / p["mass"]]
+def outputs(x, u, p):
+    return {"F": x[0]}
+def initial(p):
+    return [0.0]
+"""
 PREDICT = '[[recording.predict]]\nfile = "more.csv"\n'
 
 
@@ -92,3 +103,23 @@ def test_a_search_that_is_cut_off_never_says_that_nothing_is_missing(tmp_path):
     assert (made.verdict, made.remaining, made.complete) == ("untestable", "unknown", False)
     assert made.skipped[0].startswith("step 1: structure")
     assert made.held_out[0].refitted_rmse > 0
+
+
+@pytest.mark.parametrize("step", ["refit of the nominal", "step 1: structure"])
+def test_an_equation_whose_worker_is_late_is_still_answered(tmp_path, monkeypatch, step):
+    equation = HEAD.replace('kind = "python"', 'kind = "ode"').replace('function = "simulate"\n', "")
+    case = read_case(write_case(tmp_path, equation + TWO, simulator=DRIVEN))
+
+    def spent(*_):
+        raise LateError
+
+    def late(told):
+        if told.startswith(step):
+            monkeypatch.setattr(CaseCode, "_asked", spent)
+            raise BudgetSpentError(told)
+
+    made = diagnose(case, None, tell=late).diagnosis
+    assert not made.complete
+    assert made.skipped[0].startswith(step)
+    assert made.held_out[0].nominal_rmse > 0
+    assert {one.unit for one in made.not_found if one.name == "coulomb_friction"} <= {"N/s", ""}

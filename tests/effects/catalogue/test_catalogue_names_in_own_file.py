@@ -25,6 +25,13 @@ OTHER_MEANINGS = {
     "characteristics": (PULL, "characteristics of a tire that a test has as results"),
     "report": (PULL, "characteristics of a tire that a test has as results"),
     "calibration": ({"creep"}, "a statement on a cell in the file of a session, by the word of its standard"),
+    "planning": (
+        {"conicity", "creep"},
+        "what a test is planned for, and what acts on the cells of a session",
+    ),
+    "lab/plan_session.py": ({"creep"}, "as in the planning"),
+    "lab/protocol_plan.py": (PULL, "what a test is planned for"),
+    "cli/plan_runs.py": ({"conicity"}, "examples of what a test is planned for"),
     "simulation/plan_file.py": (
         PULL,
         "the tire's own pull, by the keys of [tire], and an example of --effect",

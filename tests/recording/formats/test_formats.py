@@ -87,7 +87,7 @@ def test_an_absent_library_is_named_with_its_extra(read, table, monkeypatch, mod
         monkeypatch.delitem(sys.modules, loaded)
     monkeypatch.setattr(sys, "meta_path", [_Absent(module), *sys.meta_path])
     error = refused(read, data, "missing-extra", ConfigError)
-    assert error.next_step == f'pip install "toolkit[{extra}]"'
+    assert error.next_step == f'pip install "tire-lab-toolkit[{extra}]"'
 
 
 class _Absent:

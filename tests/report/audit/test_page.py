@@ -56,7 +56,7 @@ def view(tmp_path_factory):
     return AuditView(
         made=audited,
         rules=rules_catalogue(),
-        timelines=timelines(audited, registry),
+        timelines=timelines(audited.files.plain(), registry, audited.known_at),
         traces=tuple(traces(audited, registry, 3)),
         linked=link(audited, reports),
     )

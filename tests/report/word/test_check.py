@@ -19,7 +19,8 @@ CHECKOUT = Path(__file__).resolve().parents[3]
 
 
 def rules(folder: Path, body: str, style: Style | None = None, **more: object) -> list[str]:
-    return [one.rule for one in check_template(opened(folder, body, **more), style or Style(), fonts=False)]
+    found = check_template(opened(folder, body, **more), style or Style(), fonts=False)
+    return [one.rule for one in found if one.level != "note"]
 
 
 FIELD = (

@@ -15,7 +15,7 @@ from toolkit.trust.seal.authority import make_authority, to_pem, to_pkcs12
 from toolkit.trust.seal.key import open_key
 
 
-def _never() -> bytes:
+def _never(_key: Path) -> str:
     raise AssertionError("no passphrase is needed")
 
 
@@ -28,13 +28,13 @@ def _written(folder: Path, data: bytes) -> Path:
 @pytest.mark.parametrize("encrypt", [to_pem, to_pkcs12])
 def test_an_encrypted_key_opens_by_its_passphrase(tmp_path: Path, encrypt: object) -> None:
     path = _written(tmp_path, encrypt(key(), b"correct horse"))  # type: ignore[operator]
-    opened = open_key(path, ask=lambda: b"correct horse")
+    opened = open_key(path, ask=lambda _: "correct horse")
     assert opened.certificate == key().certificate
     assert opened.chain == (key().certificate,)
     assert "private" not in repr(opened)
-    for wrong in (b"wrong", b""):
+    for wrong in ("wrong", ""):
         with pytest.raises(TrustError) as caught:
-            open_key(path, ask=lambda word=wrong: word)  # type: ignore[misc]
+            open_key(path, ask=lambda _, word=wrong: word)  # type: ignore[misc]
         assert caught.value.rule == "seal-key"
         assert "correct horse" not in str(caught.value)
 
@@ -90,7 +90,7 @@ def test_a_weak_key_or_one_of_another_kind_does_not_seal(tmp_path: Path, private
 @pytest.mark.parametrize("data", [b"", b"\0" * 40, b"-----BEGIN PRIVATE KEY-----\nAAAA\n"])
 def test_a_file_that_is_no_key_is_refused(tmp_path: Path, data: bytes) -> None:
     with pytest.raises(TrustError):
-        open_key(_written(tmp_path, data), ask=lambda: b"")
+        open_key(_written(tmp_path, data), ask=lambda _: "")
     with pytest.raises(TrustError):
         open_key(tmp_path / "missing", ask=_never)
 

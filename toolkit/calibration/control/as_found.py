@@ -8,20 +8,25 @@ before it.
 
 from __future__ import annotations
 
+import bisect
 import datetime as dt
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.apply import apply_record
+from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry.registry import load_checked, load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
 from toolkit.errors import ToolkitError, UnitError
+from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
+from toolkit.inputs import read_regular
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
@@ -70,6 +75,9 @@ def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[st
 
 # Which record an instrument was used with when it came to a session.
 
+Approvals = tuple[tuple[dt.date, int, str, dt.date | None], ...]
+"""First day in force, number of the entry, record and day of the decision of each approval, in order."""
+
 
 def in_use_before(
     registry: Registry,
@@ -79,6 +87,7 @@ def in_use_before(
     but: str | None = None,
     ledger: Ledger | None = None,
     checked: Mapping[str, CalibrationRecord] | None = None,
+    approvals: Approvals | None = None,
 ) -> CalibrationRecord | None:
     """Return the record that was in force when a session of day ``on`` began; None where there was none.
 
@@ -86,7 +95,8 @@ def in_use_before(
     the same day or later, whose approval may reach back. Else the rule is that of `Registry.in_force`, as
     known on the session's day: a withdrawal that came later does not change what was in force then.
 
-    ``ledger`` and ``checked`` (records by id that passed their gates) are what a caller has read already.
+    ``ledger``, its ``approvals``, and ``checked`` (records by id that passed their gates) are what a caller
+    has read already.
 
     Raises
     ------
@@ -94,33 +104,32 @@ def in_use_before(
         the ledger is damaged, or that record fails a gate
     """
     ledger = registry.ledger(instrument) if ledger is None else ledger
-    ranks = [
-        rank
-        for record_id in ledger.entered()
-        if record_id != but
-        for rank in _approvals(ledger, record_id, on)
-    ]
-    for rank in sorted(ranks, reverse=True):
-        record = (checked or {}).get(rank[3]) or load_checked(registry.folder / instrument, rank[3], ledger)
-        if record.kind != "fit" or dt.date.fromisoformat(record.date) < on:
-            return record
+    approvals = approvals_of(ledger) if approvals is None else approvals
+    past = approvals[: bisect.bisect_right(approvals, on, key=lambda approval: approval[0])]
+    for was_known in (True, False):
+        for _, _, record_id, known_on in reversed(past):
+            if record_id == but or (known_on is not None and known_on <= on) != was_known:
+                continue
+            void_from = status_of(record_id, ledger.of(record_id), on).void_from
+            if void_from is not None and on >= void_from:
+                continue
+            record = (checked or {}).get(record_id)
+            record = record or load_checked(registry.folder / instrument, record_id, ledger)
+            if record.kind != "fit" or dt.date.fromisoformat(record.date) < on:
+                return record
     return None
 
 
-def _approvals(ledger: Ledger, record_id: str, on: dt.date) -> list[tuple[bool, dt.date, int, str]]:
-    entries = ledger.of(record_id)
-    if not any(
-        entry.event == "approved" and entry.since is not None and entry.since <= on for entry in entries
-    ):
-        return []
-    status = status_of(record_id, entries, on)
-    if status.void_from is not None and on >= status.void_from:
-        return []
-    return [
-        (entry.known_on is not None and entry.known_on <= on, entry.since, entry.seq, record_id)
-        for entry in entries
-        if entry.event == "approved" and entry.since is not None and entry.since <= on
-    ]
+def approvals_of(ledger: Ledger) -> Approvals:
+    """Return the approvals of a ledger in the order in which they count: first day in force, then entry."""
+    return tuple(
+        sorted(
+            (entry.since, entry.seq, record_id, entry.known_on)
+            for record_id in ledger.entered()
+            for entry in ledger.of(record_id)
+            if entry.event == "approved" and entry.since is not None
+        )
+    )
 
 
 _SLACK = 1 + 1e-9
@@ -279,12 +288,29 @@ def _of_phase(registry: Registry, instrument: str, phase: str) -> list[Calibrati
         if not status_of(record_id, ledger.of(record_id), dt.date.max).ended
     ]
     dated = []
-    for at, record in enumerate(load_many(registry.folder / instrument, standing, ledger).values()):
+    folder = registry.folder / instrument
+    chosen = [record_id for record_id in standing if _may_state(folder, record_id, ledger, phase)]
+    for at, record in enumerate(load_many(folder, chosen, ledger).values()):
         if isinstance(record, ToolkitError):
             raise record
         if phase_of(record) == phase:
             dated.append((record.date, at, record))
     return [record for _, _, record in sorted(dated, key=lambda entry: entry[:2])]
+
+
+def _may_state(folder: Path, record_id: str, ledger: Ledger, phase: str) -> bool:
+    """Tell whether a record has to pass its gates for its phase; no other one is used, and none is refitted.
+
+    What a file says without them counts only where its bytes are those that were entered.
+    """
+    path = folder / f"{record_id}.json"
+    try:
+        data = read_regular(path)
+        if sha256_bytes(data) != ledger.entered()[record_id].file:
+            return True
+        return phase_of(from_bytes(data, where=path)) == phase
+    except (OSError, ToolkitError):
+        return True
 
 
 def _load(

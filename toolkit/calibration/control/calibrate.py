@@ -106,10 +106,32 @@ def rehearse(
     ToolkitError
         as `calibrate`
     """
+    with rehearsed(session_file, registry, machine=machine, again=again, standards=standards) as (
+        copy,
+        candidate,
+    ):
+        return dataclasses.replace(candidate, path=registry.folder / candidate.path.relative_to(copy.folder))
+
+
+@contextlib.contextmanager
+def rehearsed(
+    session_file: Path,
+    registry: Registry,
+    *,
+    machine: str | None = None,
+    again: bool = False,
+    standards: Standards | None = None,
+) -> Iterator[tuple[Registry, Candidate]]:
+    """Yield a copy of an instrument's registry into which its session was entered, and the candidate there.
+
+    Raises
+    ------
+    ToolkitError
+        as `calibrate`
+    """
     instrument = read_session(session_file, standards=standards).instrument
     with rehearsal(registry, instrument) as copy:
-        candidate = calibrate(session_file, copy, machine=machine, again=again, standards=standards)
-    return dataclasses.replace(candidate, path=registry.folder / candidate.path.relative_to(copy.folder))
+        yield copy, calibrate(session_file, copy, machine=machine, again=again, standards=standards)
 
 
 def control_findings(registry: Registry, record: CalibrationRecord) -> tuple[Finding, ...]:

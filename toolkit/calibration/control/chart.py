@@ -15,7 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.control.as_found import errors_by, in_use_before, phase_of
+from toolkit.calibration.control.as_found import (
+    Approvals,
+    approvals_of,
+    errors_by,
+    in_use_before,
+    phase_of,
+)
 from toolkit.calibration.registry.registry import load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check
@@ -311,8 +317,9 @@ def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list
         if isinstance(loaded, ToolkitError):
             raise loaded
         checked[record_id] = loaded
+    approvals = approvals_of(ledger)
     for at, record in enumerate(checked.values()):
-        evaluated = _session(registry, record, ledger, checked)
+        evaluated = _session(registry, record, ledger, checked, approvals)
         if isinstance(evaluated, str):
             left_out.append((record.id, evaluated))
         else:
@@ -321,7 +328,11 @@ def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list
 
 
 def _session(
-    registry: Registry, record: CalibrationRecord, ledger: Ledger, checked: dict[str, CalibrationRecord]
+    registry: Registry,
+    record: CalibrationRecord,
+    ledger: Ledger,
+    checked: dict[str, CalibrationRecord],
+    approvals: Approvals,
 ) -> _Session | str:
     if phase_of(record) == "as_left":
         return "as left: measured after an adjustment"
@@ -329,7 +340,9 @@ def _session(
     if check is None:
         return "no check loads"
     day = dt.date.fromisoformat(record.date)
-    before = in_use_before(registry, record.instrument, day, but=record.id, ledger=ledger, checked=checked)
+    before = in_use_before(
+        registry, record.instrument, day, but=record.id, ledger=ledger, checked=checked, approvals=approvals
+    )
     if before is None:
         return "no record was in force before it"
     errors = errors_by(before, check, zero=record.zero)

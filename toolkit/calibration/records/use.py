@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +19,16 @@ UNVERIFIED = "UNVERIFIED CALIBRATION"
 SINCE = "KNOWN SINCE"
 UNSIGNED = "unsigned"
 _LONGEST = 130  # characters of a part of the mark that stands on every page
+
+
+class UsedRecord(TypedDict):
+    """The calibration record that computed a result, in an answer."""
+
+    id: Annotated[str, "of the record"]
+    sha256: Annotated[str, "of its content"]
+    unverified: Annotated[bool, "whether it is a legacy import, without its data"]
+    signature: Annotated[str, "who signed the decisions that it rests on, or unsigned"]
+    draft: NotRequired[Annotated[bool, "true for a record that is not approved and in force"]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,15 +73,17 @@ class CalibrationUse:
         """The line that stands on every page of a document; None for a record that needs none."""
         return mark_of((self,))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> UsedRecord:
         """Return the use under the keys of the answers and manifests."""
-        content = {
+        content: UsedRecord = {
             "id": self.id,
             "sha256": self.sha256,
             "unverified": self.unverified,
             "signature": self.signature,
         }
-        return content | ({"draft": True} if self.draft else {})
+        if self.draft:
+            content["draft"] = True
+        return content
 
 
 def mark_of(uses: Sequence[CalibrationUse]) -> str | None:

@@ -10,9 +10,7 @@ import contextlib
 import gc
 import hashlib
 import itertools
-import json
-import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from datetime import date
 from functools import cached_property
@@ -20,6 +18,7 @@ from typing import Any
 
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.clock import day_of, moment, today
+from toolkit.calibration.registry.ledger_text import LineForms
 from toolkit.files import sha256_bytes
 from toolkit.trust.decisions import SIGNATURE
 
@@ -27,8 +26,8 @@ LEDGER = "ledger.jsonl"
 HEAD = "head.json"
 START = "0" * 64
 EVENTS = ("entered", "approved", "withdrawn", "discarded", "issued", "enrolled")
-_AT_ONCE = 4096  # lines
-_DECODE = json.JSONDecoder().raw_decode
+_FORMS = LineForms()
+"""Those of the lines of all ledgers that this process has read: few, and their names are in memory once."""
 _DAMAGE = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 BRINGING = ("entered", "enrolled")  # events with files of their own
 
@@ -97,8 +96,6 @@ _TYPES: Mapping[str, tuple[type, ...]] = {
     "seq": (int,),
 }  # fmt: skip
 """What each entry of a line is in JSON."""
-_SOUND: dict[tuple[object, ...], tuple[str, ...]] = {}
-"""The names of lines by names and types that are as they should be: few, and in the memory once."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,14 +192,15 @@ def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:
     if parts[-1] != b"":
         damage = f"line {len(parts)} of the ledger is incomplete"
     whole = parts[:-1]
+    prev = START
     with _uncollected():
-        for start in range(0, len(whole), _AT_ONCE):
-            try:
-                _take(entries, whole[start : start + _AT_ONCE])
-            except _DAMAGE as error:
-                damage = f"line {len(entries) + 1} of the ledger is damaged: {error}"
-                break
-    prev = entries[-1].sha256 if entries else START
+        try:
+            for number, line in enumerate(whole, start=1):
+                entry = _entry(line, number, prev)
+                entries.append(entry)
+                prev = entry.sha256
+        except _DAMAGE as error:
+            damage = f"line {len(entries) + 1} of the ledger is damaged: {error}"
     if damage is None and head != head_bytes(len(entries), prev):
         damage = (
             "head.json is missing"
@@ -224,66 +222,31 @@ def _uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def _take(entries: list[Entry], lines: Sequence[bytes]) -> None:
-    """Add the entries of lines, those before a damaged line too."""
-    try:
-        texts = [line.decode("utf-8") for line in lines]
-        bodies = [_body(text) for text in texts]
-        # Encoded at once, for each call has its price. Two JSON objects that begin at one place of one text
-        # end at one place too: where the texts agree as a whole, each agrees.
-        pairs: Iterable[tuple[str, dict[str, Any]]] = zip(texts, bodies, strict=True)
-        if canonical(bodies) != f"[{','.join(texts)}]":
-            pairs = map(_canonical_body, lines)
-    except _DAMAGE:
-        pairs = map(_canonical_body, lines)
-    for text, body in pairs:
-        prev = entries[-1].sha256 if entries else START
-        entries.append(_entry(text, body, len(entries) + 1, prev))
-
-
-def _canonical_body(line: bytes) -> tuple[str, dict[str, Any]]:
+def _entry(line: bytes, number: int, prev: str) -> Entry:
     text = line.decode("utf-8")
-    body = _body(text)
-    if canonical(body) != text:
-        raise ValueError("its text is not canonical")
-    return text, body
-
-
-def _body(text: str) -> dict[str, Any]:
-    body, end = _DECODE(text)
-    if end != len(text) or type(body) is not dict:
-        raise ValueError("it is no JSON object")
-    return body
-
-
-def _entry(text: str, body: dict[str, Any], number: int, prev: str) -> Entry:
-    stated = body.pop("sha256")
-    # Of a canonical text, the entry can be cut out: what is left is canonical too.
-    before, entry, after = text.partition(f'"sha256":"{stated}",')
-    remainder = before + after if entry and entry not in after else canonical(body)
-    if hashlib.sha256(remainder.encode()).hexdigest() != stated:
+    (body, remainder), is_known = _FORMS.read(text)
+    if hashlib.sha256(remainder.encode()).hexdigest() != body["sha256"]:
         raise ValueError("its hash does not match")
     if body["seq"] != number or body["prev"] != prev:
         raise ValueError("it does not follow the line before")
     if body["event"] not in EVENTS:
         raise ValueError(f"unknown event {body['event']!r}")
-    shape = (*body, *map(type, body.values()))
-    if shape not in _SOUND:
+    if not is_known:
         for key, value in body.items():
             if type(value) not in _TYPES[key]:
                 raise ValueError(f"{key} is {value!r}")
-        Entry(sha256=stated, **body)
-        _SOUND[shape] = tuple(map(sys.intern, body))
-    body = dict(zip(_SOUND[shape], body.values(), strict=True))
+        Entry(**body)
+        _FORMS.add(text)
     moment(body["time"])
-    for key in _DAYS & body.keys():
-        body[key] = None if body[key] is None else date.fromisoformat(body[key])
-    for key in _LISTS & body.keys():
-        body[key] = tuple(body[key])
+    for key in _DAYS:
+        if body.get(key) is not None:
+            body[key] = date.fromisoformat(body[key])
+    for key in _LISTS:
+        if key in body:
+            body[key] = tuple(body[key])
     for row in body.get("signatures", ()):
         if type(row) is not dict or {*row} != SIGNATURE or not all(isinstance(row[key], str) for key in row):
             raise ValueError("a signature says other than by whom, by which key, for what")
-    body["sha256"] = stated
     parsed = object.__new__(Entry)
     object.__setattr__(parsed, "__dict__", body)
     return parsed

@@ -10,7 +10,6 @@ keep each other out wherever the folder can be locked. Readers never wait for a 
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import socket
@@ -22,6 +21,13 @@ from toolkit.calibration.registry.clock import now
 from toolkit.errors import RegistryError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
+from toolkit.system import (
+    close_folder,
+    has_folder_locks,
+    is_open_at,
+    lock_folder,
+    open_folder,
+)
 
 LOCK_FILE = ".lock"
 PATIENCE_S = 10.0
@@ -35,9 +41,9 @@ def reading(folder: Path) -> Iterator[bool]:
     with contextlib.ExitStack() as stack:
         locked = True
         try:
-            handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-            stack.callback(os.close, handle)
-            fcntl.flock(handle, fcntl.LOCK_SH)
+            handle = open_folder(folder)
+            stack.callback(close_folder, handle)
+            lock_folder(handle, shared=True)
         except OSError:
             locked = False
         yield locked and not (folder / LOCK_FILE).exists()
@@ -57,16 +63,17 @@ def writing(folder: Path, *, lock_file: bool) -> Iterator[None]:
         the folder cannot be opened, or the lock file not be written
     """
     with contextlib.ExitStack() as stack:
+        lock_file = lock_file or not has_folder_locks()
         if lock_file:
             stack.enter_context(_lock_file(folder))
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        stack.callback(os.close, handle)
+        handle = open_folder(folder)
+        stack.callback(close_folder, handle)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            lock_folder(handle)
         except OSError as error:
             if not lock_file:
                 raise _without_locks(folder, error) from error
-        if not os.path.samestat(os.fstat(handle), os.stat(folder)):  # noqa: PTH116
+        if not is_open_at(handle, folder):
             raise FileNotFoundError(folder)
         if not lock_file:
             _wait(folder / LOCK_FILE)
@@ -79,7 +86,7 @@ def _lock_file(folder: Path) -> Iterator[None]:
     until = time.monotonic() + PATIENCE_S
     while True:
         try:
-            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
             break
         except FileExistsError:
             _wait(path, until)
@@ -149,7 +156,8 @@ def _ended(holder: bytes) -> bool:
     try:
         body = json.loads(holder)
         pid, started = int(body["pid"]), body["started"]
-        if started is None or (body["boot"], body["processes"]) != (_boot(), _processes()):
+        names = (_boot(), _processes())
+        if None in (started, *names) or (body["boot"], body["processes"]) != names:
             return False
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -171,13 +179,20 @@ def _started(pid: int) -> str | None:
     return "ended" if fields[0] in ("Z", "X") else fields[19]
 
 
-def _boot() -> str:
-    return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+def _boot() -> str | None:
+    """Return the name of this boot; None where the system names none."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    except OSError:
+        return None
 
 
-def _processes() -> str:
+def _processes() -> str | None:
     """Return the name of this process's table of processes: a container has one of its own."""
-    return os.readlink("/proc/self/ns/pid")  # noqa: PTH115
+    try:
+        return os.readlink("/proc/self/ns/pid")  # noqa: PTH115
+    except OSError:
+        return None
 
 
 def _told(holder: bytes) -> str:

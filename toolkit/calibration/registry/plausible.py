@@ -91,7 +91,7 @@ def _levers(new: CalibrationRecord, machine: Machine) -> list[GateResult]:
         stated = machine.cell(cell.name)
         limits = {
             "MX": (drawn[cell.name] / LEVER, drawn[cell.name] * LEVER) if drawn.get(cell.name) else None,
-            "MZ": (pitch / RANGE, pitch) if stated is not None and stated.sign("MZ") else None,
+            "MZ": (pitch / RANGE, pitch) if pitch and stated is not None and stated.sign("MZ") else None,
         }
         force = abs(response(new, loads["FY"], cell).value)
         for load, between in limits.items():

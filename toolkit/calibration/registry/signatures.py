@@ -71,7 +71,7 @@ def signed_event(
     root = Growing(map(leaf_hash, ledger.lines)).root()
     said = {**event, **statement(event, _subject(ledger, event), root, version)}
     message = canonical({"seq": len(ledger.entries) + 1, "prev": ledger.head, **said})
-    operators = _operators(ledger, event["id"])
+    operators = operators_of(ledger, event["id"])
     path = signing.travel.request
     request = Request(message=message, people=version.text, file=file, operators=operators, path=path)
     if path is not None:
@@ -114,7 +114,7 @@ def unproved(
                 body=body,
                 message=canonical(unsigned(body)).encode(),
                 subject=_subject(ledger, body),
-                operators=_operators(ledger, entry.id),
+                operators=operators_of(ledger, entry.id),
                 root=tree.root(),
             )
             reasons = violations(line, history.before(entry.seq) if of_people else history)
@@ -175,7 +175,7 @@ def _subject(ledger: Ledger, event: Mapping[str, Any]) -> str | None:
     return None if entered is None else entered.record
 
 
-def _operators(ledger: Ledger, record_id: str) -> tuple[str, ...]:
+def operators_of(ledger: Ledger, record_id: str) -> tuple[str, ...]:
     """Return who entered a record: those who signed its entry, and the operator whom it names."""
     entered = ledger.entered().get(record_id)
     return () if entered is None else (*signers_of(entered), entered.by)

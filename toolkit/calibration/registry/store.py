@@ -29,7 +29,8 @@ from toolkit.calibration.registry.lock import writing
 from toolkit.calibration.registry.settled import JOURNAL, before, content, damaged, is_part, state_of
 from toolkit.calibration.registry.signatures import signed_event, timed_event
 from toolkit.errors import OutputError, RegistryError, ToolkitError
-from toolkit.files import sha256_bytes, sync_folder, write_atomic
+from toolkit.files import sha256_bytes, write_atomic
+from toolkit.system import sync_folder
 from toolkit.trust.people import Action
 from toolkit.trust.signing import Signing
 

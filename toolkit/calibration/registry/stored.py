@@ -18,6 +18,7 @@ from toolkit.calibration.session.run_zero import without_read_zeros, without_run
 from toolkit.calibration.session.settings import dcc_name, parse_session
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
+from toolkit.files import real_path
 from toolkit.inputs import RECORD_FILE, read_input
 from toolkit.units import unit
 
@@ -159,8 +160,8 @@ def stored_session(registry: Path, record: CalibrationRecord) -> Session:
         # The session names its files as they were called when it was recorded.
         for name, role in ((raw["data"], "loads"), (check, "check"), (dcc_name(raw), "dcc")):
             if role in files:
-                target = Path(place, str(name)).resolve()
-                if not target.is_relative_to(Path(place).resolve()):
+                target = real_path(Path(place, str(name)))
+                if not target.is_relative_to(real_path(Path(place))):
                     continue  # the reader refuses such a name, and says so
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.write_bytes(files[role])

@@ -20,6 +20,7 @@ from toolkit.calibration.registry.registry import ID, load_many
 from toolkit.calibration.registry.settled import is_passing
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
+from toolkit.system import can_fork, processors
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -101,7 +102,7 @@ def _judged(folder: Path, ids: Sequence[str], ledger: Ledger) -> Iterator[tuple[
 
     # A worker of somebody else's pool may not start processes of its own.
     alone = multiprocessing.current_process().daemon
-    workers = 1 if alone else min(len(os.sched_getaffinity(0)), 4)
+    workers = 1 if alone or not can_fork() else min(processors(), 4)
     chunks = [ids[at : at + _CHUNK] for at in range(0, len(ids), _CHUNK)]
     if len(ids) < _SHARED_FROM or workers < 2:
         for chunk in chunks:

@@ -27,7 +27,7 @@ from toolkit.calibration.session.statement_checks import check_columns, check_st
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.declared import Source, refuse
 from toolkit.errors import SessionError
-from toolkit.files import sha256_bytes
+from toolkit.files import real_path, sha256_bytes
 from toolkit.inputs import DATA_FILE, SETTINGS_FILE, TooLargeError, read_input, read_regular, unreadable
 from toolkit.publication import settle
 
@@ -240,7 +240,7 @@ def _file(path: Path, name: object, key: str) -> bytes:
     target = path.parent / name
     try:
         # Links too: what an error quotes of a file must never be another one than the session's own.
-        if not target.resolve().is_relative_to(path.parent.resolve()) or Path(name).is_absolute():
+        if not real_path(target).is_relative_to(real_path(path.parent)) or Path(name).is_absolute():
             raise SessionError(
                 "a data file lies outside the session's folder",
                 where=f"{path}: {key}", got=name, expected="a relative path to a file beside the session",
@@ -250,7 +250,7 @@ def _file(path: Path, name: object, key: str) -> bytes:
         return read_regular(target, DATA_FILE)
     except TooLargeError as error:
         raise unreadable(target, DATA_FILE, error) from error
-    except (OSError, ValueError, RuntimeError) as error:
+    except (OSError, ValueError) as error:
         raise SessionError(
             "a data file cannot be read",
             where=target, got=getattr(error, "strerror", None) or error,

@@ -1,7 +1,8 @@
 """SESSION.toml, declared once: the session's reader and the certificate both go by it.
 
-Values whose meaning depends on the data or on one another (units, models, readings) are ``Any`` in this file
-and judged where they are read; all of it happens before anything is fitted or written.
+What an entry may be stands here. What depends on the data or on other entries (whether a unit is of the
+column's dimension, a term of the model) is judged where it is read; all of it happens before anything is
+fitted or written.
 """
 
 from __future__ import annotations
@@ -10,7 +11,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
-from toolkit.declared import AtLeast, AtMost, Day, Entry, Fault, Format, Keyed, Names, Text, attempt
+from toolkit.declared import (
+    Above,
+    AtLeast,
+    AtMost,
+    Day,
+    Distinct,
+    Entry,
+    Fault,
+    Format,
+    Keyed,
+    Names,
+    Size,
+    Text,
+    Unit,
+    attempt,
+)
 
 TEXTS = (
     "number laboratory address place country accreditation customer customer_address item method "
@@ -71,12 +87,28 @@ class Certificate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Amount:
+    """A number with its unit."""
+
+    value: Annotated[float, Entry(expected="a finite number", rule="wrong-value", example=1)]
+    unit: Annotated[str, Entry(expected="a unit such as 'N'", rule="no-unit", example="N")]
+
+
+_Stated = float | Amount
+_Named = Mapping[str, _Stated]
+_WithUnit = Annotated[Amount, Entry(expected="{ value, unit }", rule="no-unit")]
+_PLAIN = "a number in the column's unit, or { value, unit }"
+_POSITIVE = f"{_PLAIN}, above zero; leave out what is not known"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
     """Indications without load, or with the shunt, at a moment of the session."""
 
-    when: Annotated[Any, Entry(expected='a text: "before", "after", "run 1", "shunt"', example="before")]
+    when: Annotated[str, Entry(expected='a text: "before", "after", "run 1", "shunt"', example="before")]
     values: Annotated[
-        Any, Entry(expected="{ indication = number }, or a list of numbers", example={"D51": 0})
+        _Named | tuple[_Stated, ...] | _Stated,
+        Entry(expected="{ indication = number }, or a list of numbers", example={"D51": 0}),
     ]
 
 
@@ -84,7 +116,7 @@ class Reading:
 class ZeroTable:
     """The zero of the fit, and readings of it."""
 
-    fit: Annotated[Any, Entry("included, tared or run", example="included")] = None
+    fit: Annotated[Literal["included", "tared", "run"], Entry("what becomes of it")] = "included"
     readings: Annotated[tuple[Reading, ...], Entry("of the unloaded cells")] = ()
 
 
@@ -92,17 +124,27 @@ class ZeroTable:
 class Creep:
     """A reading under a constant load."""
 
-    load: Annotated[Any, Entry(expected="a load, a number, or { value, unit }", example="FY")]
-    seconds: Annotated[Any, Entry(expected="seconds, zero or more", example=30)]
-    value: Annotated[Any, Entry(expected="{ indication = number }", example={"D51": 0})]
+    load: Annotated[str | _Stated, Entry(expected="a load, a number, or { value, unit }", example="FY")]
+    seconds: Annotated[
+        float,
+        Unit("s", plain=True),
+        AtLeast(0),
+        Entry(expected="seconds, zero or more", example=30),
+    ]
+    value: Annotated[
+        _Named | tuple[_Stated, ...] | _Stated,
+        Entry(expected="{ indication = number }", example={"D51": 0}),
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Uncertainty:
     """Expanded uncertainty of a reference load."""
 
-    U: Annotated[Any, Entry("expanded uncertainty", expected="a number, zero or more", example=1)]
-    k: Annotated[Any, Entry("coverage factor", expected="a positive number", example=2)]
+    U: Annotated[
+        float, AtLeast(0), Entry("expanded uncertainty", expected="a number, zero or more", example=1)
+    ]
+    k: Annotated[float, Above(0), Entry("coverage factor", example=2)]
     unit: Annotated[
         str, Text(empty=True),
         Entry(
@@ -115,9 +157,25 @@ class Uncertainty:
 class BetweenRuns:
     """Scatter from run to run of a load."""
 
-    zero: Annotated[Any, Entry(expected="a standard deviation, zero or more", example=0)]
-    gain: Annotated[Any, Entry(expected="a standard deviation at the largest load, zero or more", example=0)]
+    zero: Annotated[float, AtLeast(0), Entry(expected="a standard deviation, zero or more", example=0)]
+    gain: Annotated[
+        float,
+        AtLeast(0),
+        Entry(expected="a standard deviation at the largest load, zero or more", example=0),
+    ]
     unit: Annotated[str, Text(numbers="int"), Entry(expected="a unit of the load such as 'N'", example="N")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TemperatureCoefficient:
+    """What a kelvin does to a cell."""
+
+    span: Annotated[
+        _Stated | None, Entry("relative", expected="a number per kelvin, or { value, unit } in %/K")
+    ] = None
+    zero: Annotated[
+        _Stated | None, Entry("in the column's unit", expected="a number per kelvin, or { value, unit }")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,23 +185,40 @@ class CellEntries:
     serial: Annotated[
         str | None, Text(numbers="int"), Entry("serial number", expected='a text: serial = "..."')
     ] = None
-    resolution: Any = None
-    scale: Any = None
-    excitation: Any = None
-    shunt_expected: Any = None
-    shunt_measured: Any = None
-    shunt_tolerance: Any = None
-    u: Any = None
-    temperature_coefficient: Any = None
-    replacement: Any = None
+    resolution: Annotated[_Stated | None, Above(0), Entry("the smallest step", expected=_POSITIVE)] = None
+    scale: Annotated[
+        _Stated | None, Above(0),
+        Entry("of one count", expected='a number above zero, or { value, unit = "mV/V" } of one count'),
+    ] = None  # fmt: skip
+    excitation: Annotated[
+        float | None,
+        Unit("V", plain=True),
+        Above(0),
+        Entry("of the bridge", expected="volts above zero"),
+    ] = None
+    shunt_expected: Annotated[_Stated | None, Entry("the step that the shunt makes", expected=_PLAIN)] = None
+    shunt_measured: Annotated[_Stated | None, Entry("the step that was read", expected=_PLAIN)] = None
+    shunt_tolerance: Annotated[
+        float | None, Unit("%", plain=True), Above(0),
+        Entry("of the expected step; default 0.1 %", expected="per cent, above zero"),
+    ] = None  # fmt: skip
+    u: Annotated[_Stated | None, Above(0), Entry("standard uncertainty", expected=_POSITIVE)] = None
+    temperature_coefficient: Annotated[
+        TemperatureCoefficient | _Stated | None, Entry("of the span, or of span and zero, per kelvin")
+    ] = None
+    replacement: Annotated[
+        str | None, Entry("why a cell was replaced", expected="a text: why the cell was replaced")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SharedGroup:
     """Rows whose reference loads share an error."""
 
-    column: Any = None
-    error: Any = None
+    column: Annotated[
+        str | None, Entry("that tells the groups; none: every row", expected="the name of a column")
+    ] = None
+    error: Annotated[Literal["proportional", "constant"], Entry("how the shared error acts")] = "proportional"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,7 +239,10 @@ class Reference:
         str | None, Text(numbers="int"), Entry("of the standard", expected='a text: certificate = "..."')
     ] = None
     due: Annotated[_Date, Entry("when the standard is to be calibrated again")] = None
-    shared_group: SharedGroup | Any = None
+    shared_group: Annotated[
+        str | SharedGroup | None,
+        Entry("rows whose loads share an error", expected="run | rotation | direction | a load | a column"),
+    ] = None
     uncertainty: Annotated[tuple[tuple[str, Uncertainty], ...], Keyed(), _LOADS, Entry("by load")] = ()
 
 
@@ -172,30 +250,30 @@ class Reference:
 class CheckTable:
     """The check loads."""
 
-    file: Annotated[Any, Entry("name of their file", example="check.csv")] = None
-    data: Annotated[Any, Entry("the same", example="check.csv")] = None
-    tolerance: Annotated[tuple[tuple[str, Any], ...], Keyed(), _LOADS, Entry("by load, { value, unit }")] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Amount:
-    """A number with its unit."""
-
-    value: Annotated[Any, Entry(expected="a number", example=1)]
-    unit: Annotated[Any, Entry(expected="a unit such as 'N'", example="N")]
+    file: Annotated[str | None, Entry("name of their file", example="check.csv")] = None
+    data: Annotated[str | None, Entry("the same", example="check.csv")] = None
+    tolerance: Annotated[tuple[tuple[str, _WithUnit], ...], Keyed(), _LOADS, Entry("by load")] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polarity:
     """A reading that tells the sign of indications: a load put on by hand."""
 
-    load: Annotated[Any, Entry(expected='the name of a load, such as load = "FY"', example="FY")]
-    value: Annotated[Amount | Any, Entry(expected="the load that was applied: { value, unit }", example=1)]
-    indications: Annotated[
-        Mapping[str, Amount | Any], Entry(expected="what it made: { NAME = { value, unit } }", example={})
+    load: Annotated[
+        str,
+        _LOADS,
+        Entry("that was put on", expected='the name of a load, such as load = "FY"', example="FY"),
     ]
-    zero: Any = None
-    tolerance: Any = None
+    value: Annotated[Amount, Entry("the load that was applied", expected="{ value, unit }")]
+    indications: Annotated[
+        tuple[tuple[str, _WithUnit], ...], Keyed(), _INDICATIONS,
+        Entry("what it made", expected="{ NAME = { value, unit } }", example={}),
+    ]  # fmt: skip
+    zero: Annotated[
+        tuple[tuple[str, _WithUnit], ...], Keyed(), _INDICATIONS,
+        Entry("without load, where it is not zero", expected="{ NAME = { value, unit } }"),
+    ] = ()  # fmt: skip
+    tolerance: Annotated[float, Above(0), AtMost(0.5), Entry("as a share of the load")] = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,18 +299,26 @@ class SessionFile:
     )  # fmt: skip
 
     instrument: Annotated[
-        Any, Entry("what was calibrated", expected='a text: instrument = "..."', example="hub")
+        str, Entry("what was calibrated", expected='a text: instrument = "..."', example="hub")
     ]
     date: Annotated[str, Day(), Entry("of the session")]
     operator: Annotated[str, Entry("who calibrated", expected='a text: operator = "..."')]
     indications: Annotated[
-        Any, Entry("columns of the cells", expected='a list of names such as ["FY", "MZ"]', example=["D51"])
-    ]
+        tuple[str, ...], Size(), Distinct(),
+        Entry(
+            "columns of the cells", expected='a list of different names such as ["D51", "D52"]',
+            example=["D51"],
+        ),
+    ]  # fmt: skip
     loads: Annotated[
-        Any, Entry("columns of the loads", expected='a list of names such as ["FY", "MZ"]', example=["FY"])
-    ]
+        tuple[str, ...], Size(), Distinct(),
+        Entry(
+            "columns of the loads", expected='a list of different names such as ["FY", "MZ"]',
+            example=["FY"],
+        ),
+    ]  # fmt: skip
     data: Annotated[
-        Any,
+        str,
         Entry(
             "the reference loads", example="loads.csv",
             expected='the name of a file, such as data = "loads.csv" or "loads.xlsx"',
@@ -241,14 +327,14 @@ class SessionFile:
     phase: Annotated[Literal["as_found", "as_left"] | None, Entry("of the instrument", example="as_left")] = (
         None
     )
-    model: Annotated[Literal["linear", "polynomial", "balance"] | None, Entry("of the loads")] = None
+    model: Annotated[Literal["linear", "polynomial", "balance"], Entry("of the loads")] = "linear"
     degree: Annotated[
         int | None, AtLeast(1), AtMost(9), Entry("of a polynomial", expected="a whole number from 1 to 9")
     ] = None
-    method: Annotated[Literal["ols", "wls", "gls", "odr"] | None, Entry("of the fit")] = None
+    method: Annotated[Literal["ols", "wls", "gls", "odr"], Entry("of the fit")] = "ols"
     drop: Annotated[tuple[str, ...], Entry("terms that are left out", expected="a list of term names")] = ()
     temperature: Annotated[
-        Mapping[str, Any] | None,
+        Amount | None,
         Entry("of the room", expected='{ value = 20, unit = "degC" }', example={"value": 20, "unit": "degC"}),
     ] = None
     check: Annotated[
@@ -259,9 +345,9 @@ class SessionFile:
     between_runs: Annotated[tuple[tuple[str, BetweenRuns], ...], Keyed(), _LOADS, Entry("by load")] = ()
     cells: Annotated[tuple[tuple[str, CellEntries], ...], Keyed(), _INDICATIONS, Entry("by indication")] = ()
     zero: Annotated[
-        tuple[Reading, ...] | ZeroTable | Any,
-        Entry("included, tared or run; or readings", example="included"),
-    ] = None
+        Literal["included", "tared", "run"] | tuple[Reading, ...] | ZeroTable,
+        Entry("what becomes of the zero; or readings of it", example="included"),
+    ] = "included"
     creep: Annotated[tuple[Creep, ...], Entry("readings under a constant load")] = ()
     polarity: Annotated[tuple[Polarity, ...], Entry("readings that tell a sign")] = ()
     certificate: Annotated[Certificate | None, Entry("what it prints besides results")] = None

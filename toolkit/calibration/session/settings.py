@@ -17,7 +17,7 @@ from typing import Any, cast
 from toolkit.calibration.records.record import ZEROS, Zero, canonical
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.files import parse_toml, sha256_bytes
+from toolkit.files import number_expected, parse_toml, sha256_bytes
 from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
@@ -216,7 +216,7 @@ def wrong(where: object, key: str, got: object, expected: str, rule: str = "sess
         f"{key} is missing" if got is None else f"{key} has a value that cannot be used",
         where=f"{where}: {key}",
         got="nothing" if got is None else got,
-        expected=expected,
+        expected=number_expected(got, expected),
         next_step=f"correct {key}; nothing was written",
         rule=rule,
     )

@@ -53,6 +53,7 @@ def calibration_budget(
     *,
     temperature: Temperature | None = None,
     probability: float = PROBABILITY,
+    scatter: Scatter | None = None,
 ) -> Budget:
     """Return the budget of a load at a load value.
 
@@ -63,6 +64,7 @@ def calibration_budget(
     load : name
     at : load value in the record's unit, the other loads zero; None: the largest
     temperature : the sensitivity's coefficient and the span in use; None: listed as not stated
+    scatter : that of other rows, such as those of a plan; None: that of ``loads``
 
     Raises
     ------
@@ -81,7 +83,7 @@ def calibration_budget(
             "ask within the range, or calibrate over a larger one",
         )  # fmt: skip
     point = typical_indications(record, loads, load, value)
-    return _budget(record, loads, check, fitted, value, point, temperature, probability)
+    return _budget(record, loads, check, fitted, value, point, temperature, probability, scatter)
 
 
 def predict(

@@ -9,7 +9,6 @@ CHARACTERISTIC = Characteristic(
     name="MZ",
     symbol="MZ",
     title="MZ",
-    title_de="Rückstellmoment MZ",
     definition=(
         "Aligning moment at a slip angle of the protocol, off the fitted curve of one load and direction."
     ),

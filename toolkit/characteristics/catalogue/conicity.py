@@ -11,7 +11,6 @@ CHARACTERISTIC = Characteristic(
     name="conicity",
     symbol="FY_con",
     title="conicity",
-    title_de="Konizität",
     definition=(
         "Side force at zero slip angle that points to the same side of the tire in both directions "
         "of rotation, as that of a cone."

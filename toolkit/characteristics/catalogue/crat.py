@@ -15,7 +15,6 @@ CHARACTERISTIC = Characteristic(
     name="CRAT",
     symbol="CRAT",
     title="CRAT",
-    title_de="Konizitäts-Restrückstellmoment CRAT",
     definition=(
         "Aligning moment at zero slip angle that changes its sign with the direction of rotation, "
         "in axes that follow the travel."

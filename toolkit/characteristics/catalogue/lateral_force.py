@@ -9,7 +9,6 @@ CHARACTERISTIC = Characteristic(
     name="FY",
     symbol="FY",
     title="FY",
-    title_de="Seitenkraft FY",
     definition=(
         "Lateral force at a slip angle of the protocol, off the fitted curve of one load and direction."
     ),

@@ -11,7 +11,6 @@ CHARACTERISTIC = Characteristic(
     name="plysteer",
     symbol="FY_ply",
     title="plysteer",
-    title_de="Plysteer",
     definition=(
         "Side force at zero slip angle that changes its side of the tire with the direction of "
         "rotation, as that of a tire steered by a small angle."

@@ -9,7 +9,6 @@ CHARACTERISTIC = Characteristic(
     name="PRAT",
     symbol="PRAT",
     title="PRAT at 0 deg",
-    title_de="Plysteer-Restrückstellmoment PRAT bei 0 deg",
     definition=(
         "Aligning moment at zero slip angle that keeps its sign with the direction of rotation, in "
         "axes that follow the travel."

@@ -15,7 +15,6 @@ CHARACTERISTIC = Characteristic(
     name="PRAT_at_FY_zero",
     symbol="PRAT_0",
     title="PRAT at FY = 0",
-    title_de="Plysteer-Restrückstellmoment PRAT bei FY = 0",
     definition=(
         "Mean of the aligning moments of both directions of rotation, each at the slip angle at "
         "which its own side force is zero; an error of the steering zero does not move it."

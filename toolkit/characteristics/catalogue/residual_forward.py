@@ -9,7 +9,6 @@ CHARACTERISTIC = Characteristic(
     name="residual_forward",
     symbol="RAT_f",
     title="residual aligning torque, forward",
-    title_de="Restrückstellmoment, vorwärts",
     definition=(
         "Aligning moment of the forward run at the slip angle at which its side force is zero; one "
         "direction alone cannot tell CRAT from PRAT."

@@ -9,7 +9,6 @@ CHARACTERISTIC = Characteristic(
     name="residual_reverse",
     symbol="RAT_r",
     title="residual aligning torque, reverse",
-    title_de="Restrückstellmoment, rückwärts",
     definition=(
         "Aligning moment of the reversed run at the slip angle at which its side force is zero; one "
         "direction alone cannot tell CRAT from PRAT."

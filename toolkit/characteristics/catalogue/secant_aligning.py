@@ -15,7 +15,6 @@ CHARACTERISTIC = Characteristic(
     name="secant_aligning",
     symbol="C_MZ,1deg",
     title="aligning stiffness, ±1 deg secant",
-    title_de="Rückstellsteifigkeit, Sekante ±1 deg",
     definition=(
         "Chord of the aligning moment over the slip angle between the steps at +1 and -1 deg, each "
         "carried to its nominal angle along the fitted curve."

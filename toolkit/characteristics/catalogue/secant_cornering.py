@@ -15,7 +15,6 @@ CHARACTERISTIC = Characteristic(
     name="secant_cornering",
     symbol="C_FY,1deg",
     title="cornering stiffness, ±1 deg secant",
-    title_de="Schräglaufsteifigkeit, Sekante ±1 deg",
     definition=(
         "Negative of the chord of the side force over the slip angle between the steps at +1 and -1 "
         "deg, each carried to its nominal angle along the fitted curve."

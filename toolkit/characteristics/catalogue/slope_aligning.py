@@ -15,7 +15,6 @@ CHARACTERISTIC = Characteristic(
     name="slope_aligning",
     symbol="C_MZ",
     title="aligning stiffness, slope at 0 deg",
-    title_de="Rückstellsteifigkeit, Steigung bei 0 deg",
     definition=("Slope of the fitted curve of the aligning moment over the slip angle, at zero slip angle."),
     formula="dMZ/dSA at SA = 0",
     term="aligning stiffness",

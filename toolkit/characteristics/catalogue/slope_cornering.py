@@ -15,7 +15,6 @@ CHARACTERISTIC = Characteristic(
     name="slope_cornering",
     symbol="C_FY",
     title="cornering stiffness, slope at 0 deg",
-    title_de="Schräglaufsteifigkeit, Steigung bei 0 deg",
     definition=(
         "Negative slope of the fitted curve of the side force over the slip angle, at zero slip angle."
     ),

@@ -9,7 +9,6 @@ CHARACTERISTIC = Characteristic(
     name="thesis_CRAT",
     symbol="CRAT_src",
     title="CRAT, the thesis's formula",
-    title_de="CRAT nach der Formel der Quelle",
     definition=(
         "CRAT by the source document's formula, which is PRAT by symmetry in the axes of this machine."
     ),

@@ -9,7 +9,6 @@ CHARACTERISTIC = Characteristic(
     name="thesis_PRAT",
     symbol="PRAT_src",
     title="PRAT, the thesis's formula",
-    title_de="PRAT nach der Formel der Quelle",
     definition=(
         "PRAT by the source document's formula, which is CRAT by symmetry in the axes of this machine."
     ),

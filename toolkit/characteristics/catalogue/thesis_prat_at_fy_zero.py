@@ -15,7 +15,6 @@ CHARACTERISTIC = Characteristic(
     name="thesis_PRAT_at_FY_zero",
     symbol="PRAT_0src",
     title="PRAT at FY = 0, the thesis's formula",
-    title_de="PRAT bei FY = 0 nach der Formel der Quelle",
     definition=(
         "Half the difference of the aligning moments of both directions of rotation, each at the "
         "slip angle at which its own side force is zero."

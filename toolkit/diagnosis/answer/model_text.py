@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.diagnosis.simulators.built_in import parameter_names
 from toolkit.diagnosis.simulators.parameter_units import unit_of
 from toolkit.diagnosis.simulators.setting import nominal_load
-from toolkit.files import sha256_file
+from toolkit.files import real_path, sha256_file
 from toolkit.inputs import is_regular
 from toolkit.simulation.model_file import CONTENT, FittedEffect, effect_lines, toml_key, toml_lines
 from toolkit.version import __version__
@@ -184,4 +184,4 @@ def _standard_error(search: Search, at: int) -> float | None:
 
 
 def _relative(file: Path, folder: Path) -> str:
-    return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
+    return Path(os.path.relpath(real_path(file), real_path(folder))).as_posix()

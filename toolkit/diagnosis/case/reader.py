@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from toolkit.diagnosis.case.case_file import CaseFile, ModelCaseFile, Recording
 from toolkit.diagnosis.case.model_file import corrections_of
 from toolkit.diagnosis.case.recordings import read_run
 from toolkit.diagnosis.case.simulation import FORMAT
-from toolkit.files import parse_toml
+from toolkit.files import parse_toml, real_path
 from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, is_regular, read_input
 from toolkit.publication import settle
 
@@ -114,7 +113,7 @@ def _different_files(recording: Recording, path: Path, source: Source) -> None:
     files: set[Path] = set()
     for number, run in enumerate(recording.run):
         # Links that lead nowhere but in a circle are told where the file is read.
-        file = Path(os.path.realpath(path.parent / run["file"]))
+        file = real_path(path.parent / run["file"])
         if file in files:
             _refuse_twice(number, run["file"], "another file", source)
         files.add(file)

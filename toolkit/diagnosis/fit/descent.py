@@ -34,14 +34,20 @@ class Derivatives:
     """Derivatives of a simulation, kept from one trial to the next: d(simulated)/dx over all rows."""
 
     def __init__(self, space: Space) -> None:
-        self._space = space
+        self.space = space
         self._last: tuple[Array, Stacked, Stacked] | None = None
         self._fresh: tuple[Array, Stacked, Stacked] | None = None
+
+    def kept(self) -> Derivatives:
+        """Return the last differences for another descent, which corrects them on its own way."""
+        other = Derivatives(self.space)
+        other._last = other._fresh = self._fresh
+        return other
 
     def anew(self, x: Array) -> Stacked:
         """Return the derivatives at a vector by differences."""
         if self._fresh is None or not np.array_equal(self._fresh[0], x):
-            self._fresh = (x.copy(), *self._space.around(x))
+            self._fresh = (x.copy(), *self.space.around(x))
         self._last = self._fresh
         return self._fresh[2]
 
@@ -53,7 +59,7 @@ class Derivatives:
         step = x - before
         if not step.any():
             return slopes
-        simulated = self._space.simulated(x)
+        simulated = self.space.simulated(x)
         moved = {name: column - there[name] for name, column in simulated.items()}
         off = {name: change - slopes[name] @ step for name, change in moved.items()}
         if weighing.size(off) > max(_BENT * weighing.size(moved), _NOTHING):
@@ -71,7 +77,7 @@ class Derivatives:
         if self._fresh is None:
             return False
         begun, there, slopes = self._fresh
-        simulated = self._space.simulated(x)
+        simulated = self.space.simulated(x)
         moved = {name: column - there[name] for name, column in simulated.items()}
         off = {name: change - slopes[name] @ (x - begun) for name, change in moved.items()}
         way = weighing.size(moved)
@@ -125,7 +131,7 @@ def descend(
     Parameters
     ----------
     noise : by which each output is whitened
-    known : derivatives that were found before; they are kept up
+    derivatives : found before, or empty; they are kept up
     """
     from scipy.optimize import least_squares
 

@@ -134,6 +134,7 @@ def fit(
     noise: dict[str, Autoregression] | None = None,
     rounds: int = _OUTER,
     plain: bool | None = None,
+    derivatives: Derivatives | None = None,
 ) -> Fit:
     """Fit a hypothesis.
 
@@ -144,9 +145,12 @@ def fit(
     rows : rows of all runs on which it is fitted; the simulation is free over whole runs in any case
     noise : from which the whitening starts; None for white noise first
     plain : ordinary least squares, or not; None lets a specification test decide
+    derivatives : those at the start, of a fit to other rows; then nobody asks for a covariance
     """
-    space = Space.of(problem, tuple(active))
-    derivatives = Derivatives(space)
+    intervals = derivatives is None
+    if derivatives is None:
+        derivatives = Derivatives(Space.of(problem, tuple(active)))
+    space = derivatives.space
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
     solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives)
@@ -165,7 +169,9 @@ def fit(
         simulated=chosen.simulated,
         noise=chosen.noise,
         log_posterior=chosen.score,
-        covariance=_covariance(space, chosen, None if plain else alternative, layouts, plain=plain),
+        covariance=_covariance(space, chosen, None if plain else alternative, layouts, plain=plain)
+        if intervals
+        else np.zeros((0, 0)),
         rows=rows,
         plain=plain,
     )

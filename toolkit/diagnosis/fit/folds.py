@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.fit.descent import Derivatives
 from toolkit.diagnosis.fit.fit import Fit, fit, jacobian
 from toolkit.diagnosis.fit.run_scatter import UnseenRun, scattered_scores
+from toolkit.diagnosis.fit.space import Space
 from toolkit.diagnosis.policy import ROWS
 from toolkit.effects.applied import AppliedEffect
 
@@ -89,11 +91,15 @@ class HeldOut:
 def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], start: Fit) -> HeldOut:
     """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
     fits = []
+    # Every fold starts where all rows led: the simulation's derivatives there are the same for all of them.
+    around = Derivatives(Space.of(problem, tuple(active)))
+    around.anew(around.space.begin(start.p))
     simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
     for mask in folds.held:
         trained = fit(
-            problem, active, start=start.p, rows=~mask, noise=start.noise, rounds=2, plain=start.plain
-        )
+            problem, active, start=start.p, rows=~mask, noise=start.noise, rounds=2, plain=start.plain,
+            derivatives=around.kept(),
+        )  # fmt: skip
         fits.append(trained)
         for name in problem.names:
             simulated[name][mask] = trained.simulated[name][mask]

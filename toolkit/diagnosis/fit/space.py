@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Stacked = dict[str, Array]
 
 _STEP = 1e-4  # of a parameter's size, for differences
+_REMEMBERED = 16  # simulations: a descent asks for the same vector from several sides
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +34,7 @@ class Space:
     sizes: Array
     low: Array
     high: Array
+    _seen: dict[bytes, Stacked] = field(default_factory=dict)
 
     @staticmethod
     def of(problem: Problem, active: tuple[AppliedEffect, ...]) -> Space:
@@ -90,8 +92,17 @@ class Space:
         FitError
             the simulation gives no usable output there
         """
+        key = x.tobytes()
+        return self._seen[key] if key in self._seen else self._anew(x, key)
+
+    def _anew(self, x: Array, key: bytes) -> Stacked:
         p, active = self.split(x)
-        return self.problem.simulate(p, active)
+        simulated = self.problem.simulate(p, active)
+        self._seen.pop(key, None)
+        while len(self._seen) >= _REMEMBERED:
+            del self._seen[next(iter(self._seen))]
+        self._seen[key] = simulated
+        return simulated
 
     def residual(self, simulated: Stacked) -> Stacked:
         """Return recorded less simulated."""
@@ -110,11 +121,11 @@ class Space:
         points = self._moved(x)
         # Together they have the same steps: what these leave is then no part of a difference.
         self.problem.prepare([self.split(point) for point in (x, *points)])
-        simulated = self.simulated(x)
+        simulated = self._anew(x, x.tobytes())
         slopes = {name: np.empty((len(column), len(x))) for name, column in simulated.items()}
         for i, moved in enumerate(points):
             try:
-                trial = self.simulated(moved)
+                trial = self.problem.simulate(*self.split(moved))
             except FitError:
                 trial = simulated
             for name, column in trial.items():

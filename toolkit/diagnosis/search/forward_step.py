@@ -11,10 +11,14 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.policy import PRIORS, STEP
+from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.effects.applied import AppliedEffect, EffectKey
+from toolkit.effects.effect import STAGES, Stage
 from toolkit.errors import FitError
+
+# What a simulation leaves out, then what surrounds it, then what only shows it.
+_LIKELIEST: tuple[Stage, ...] = ("dynamics", "tire", "road", "carriage", "load_cells", "acquisition")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,16 +50,17 @@ class Joint:
 
 
 def step_groups(
-    ranked: Sequence[Scored], hidden: frozenset[EffectKey], least: float
+    ranked: Sequence[Scored], hinted: Sequence[Scored], hidden: frozenset[EffectKey], least: float
 ) -> list[tuple[Sequence[Scored], float]]:
     """Return candidates in the order of joint fits, with the least share of the error that each must take.
 
     Those far behind the first cannot win against it; where none of the first can be fitted, they stand for
     themselves, and have to explain most of what is left. A later effect has to be seen beside the first,
-    whose own model is never exact.
+    whose own model is never exact. What is only hinted at comes last, and has to explain nearly all.
     """
+    last = [(hinted[: STEP.refined], STEP.shown)] if hinted else []
     if not ranked:
-        return []
+        return last
     near = min(STEP.far_behind * ranked[0].gain, ranked[0].gain - STEP.near)
     first = [scored for scored in ranked if scored.gain > near][: STEP.refined]
     # What the refit may have absorbed is fitted with the first, however small it looks from there.
@@ -67,11 +72,15 @@ def step_groups(
     behind = [scored for scored in ranked if all(scored is not near_best for near_best in first)][
         : STEP.refined
     ]
-    return [(first, least), *([(behind, STEP.least_behind)] if behind else [])]
+    return [(first, least), *([(behind, STEP.least_behind)] if behind else []), *last]
 
 
 def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tuple[Joint, ...]:
-    """Return candidates fitted jointly with what is there, the best first."""
+    """Return candidates fitted jointly with what is there, the best first; of equals the likeliest.
+
+    The data do not prefer one of two that are nearly as good: then what the simulation leaves out of the
+    physics is likelier than an instrument that imitates it.
+    """
     weight = _weight(problem)
     joints = []
     for scored in promising:
@@ -79,7 +88,13 @@ def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tupl
         if fitted is not None:
             penalty = weight * sum(not parameter.ends_count for parameter in scored.active.searched)
             joints.append(Joint(scored=scored, fit=fitted, score=fitted.log_posterior - penalty))
-    return tuple(sorted(joints, key=lambda joint: -joint.score))
+    best = max((joint.score for joint in joints), default=0.0)
+
+    def order(joint: Joint) -> tuple[int, float]:
+        equal = joint.score > best - VERDICT.close
+        return _LIKELIEST.index(joint.scored.active.effect.stage) if equal else len(STAGES), -joint.score
+
+    return tuple(sorted(joints, key=order))
 
 
 def best_step(
@@ -169,7 +184,7 @@ def joint_fit(problem: Problem, base: Fit, added: Sequence[AppliedEffect]) -> Fi
     """
     starts = [base.p]
     moved = float(np.abs(problem.off_priors(base.p)).max(initial=0.0))
-    if moved > PRIORS.moved and any(effect.effect.reshapes for effect in added):
+    if moved > PRIORS.moved and any(effect.effect.misleads for effect in added):
         starts.append(tuple(parameter.value for parameter in problem.free))
     fits = [_fitted(problem, base, added, start) for start in starts]
     return max((fitted for fitted in fits if fitted), key=lambda fitted: fitted.log_posterior, default=None)

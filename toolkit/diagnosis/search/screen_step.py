@@ -12,7 +12,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, noise_of
 from toolkit.diagnosis.fit.noise import log_likelihood
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.policy import PRIORS, SCREENING
+from toolkit.diagnosis.policy import PRIORS, SCREENING, STEP
 from toolkit.diagnosis.search.candidates import CandidateEffect
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
 from toolkit.effects.applied import EffectKey
@@ -84,6 +84,7 @@ def _log_p(statistic: NDArray[np.float64], dof: int) -> NDArray[np.float64]:
 class Look:
     """What was seen: ``significant`` are candidates by their best start, the best first.
 
+    ``hinted`` are those that a short coloured series neither shows nor rules out, the best first;
     ``p_of`` has the p-value of every entry of ``scored``, by its identity; ``candidates`` are those that
     were looked at.
     """
@@ -92,6 +93,7 @@ class Look:
     candidates: tuple[CandidateEffect, ...]
     scored: tuple[Scored, ...]
     significant: tuple[Scored, ...]
+    hinted: tuple[Scored, ...]
     p_of: dict[int, float]
 
 
@@ -116,8 +118,10 @@ def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn
         screen, [trial.block for trial in scored], [trial.gain * trial.trust for trial in scored], seed
     )
     p_of = {id(trial): p for trial, p in zip(scored, p_values, strict=True)}
-    significant = tuple(score for score in best_of(scored) if p_of[id(score)] < SCREENING.alpha)
-    return Look(screen, tuple(candidates), tuple(scored), significant, p_of)
+    best = best_of(scored)
+    significant = tuple(score for score in best if p_of[id(score)] < SCREENING.alpha)
+    hinted = tuple(score for score in best if SCREENING.alpha <= p_of[id(score)] < STEP.hinted)
+    return Look(screen, tuple(candidates), tuple(scored), significant, hinted, p_of)
 
 
 def _is_sought(candidate: CandidateEffect, turn: int) -> bool:
@@ -142,7 +146,7 @@ def from_declared(problem: Problem, base: Fit, view: Look) -> Look:
     reshaping = [
         candidate
         for candidate in view.candidates
-        if candidate.active.effect.reshapes and candidate.key not in ranked
+        if candidate.active.effect.misleads and candidate.key not in ranked
     ]
     if not reshaping or np.abs(problem.off_priors(base.p)).max(initial=0.0) < PRIORS.moved:
         return view

@@ -173,7 +173,9 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 break
             outcome = None
             hidden = masked(problem, base, view.candidates) if view.significant else frozenset()
-            for promising, least in step_groups(view.significant, hidden, STEP.later if turn else STEP.first):
+            hinted = view.hinted if folds.by_run and len(problem.runs) >= STEP.runs else ()
+            share = STEP.later if turn else STEP.first
+            for promising, least in step_groups(view.significant, hinted, hidden, share):
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in promising))
                 budget.check(f"step {turn + 1}: joint fits of {names}")
                 joint = joint_fits(problem, base, promising)
@@ -189,8 +191,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             if not structure or turn + 2 > STEP.most_effects:
                 break
             budget.check(f"step {turn + 1}: pairs of candidates")
-            least = STEP.later if turn else STEP.first
-            both = best_pair(problem, folds, base, held_base, screen, scored, least)
+            both = best_pair(problem, folds, base, held_base, screen, scored, share)
             if both is None:
                 break
             base, held_base, pair = both

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import importlib
 import math
 import pickle
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -115,6 +116,14 @@ class CaseCode:
         )
         return arrays
 
+    def learn(self, runs: Sequence[Run]) -> None:
+        """Take further runs than those of the case; the next question begins a worker that knows them."""
+        fresh = tuple(run for run in runs if run not in self._runs)
+        if fresh:
+            self._case = dataclasses.replace(self._case, predict=(*self._case.predict, *fresh))
+            self._runs |= {run: len(self._runs) + place for place, run in enumerate(fresh)}
+            self.end()
+
     def number(self, run: Run) -> int:
         """Return the number by which a run is known in the worker."""
         return self._runs[run]
@@ -161,8 +170,6 @@ class CaseCode:
             raise
 
     def _begun(self) -> Worker:
-        import dataclasses
-
         assert self._make is not None  # noqa: S101  nobody asks before
         plain = dataclasses.replace(self._case, effects=())
         return Worker(self._make, (plain,), self._limits, self.until)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Largest, Pattern
+    from toolkit.effects.facts import ForceHook, Values
     from toolkit.effects.signals import Setting
 
 _LENGTHS, _SPEEDS = ("length", "angle"), ("speed", "rad/s", "angular_speed")
@@ -152,13 +153,19 @@ class Motion:
             x0, v0 = 0.0, float(spline(t[0]))
             acceleration = spline.derivative(1)
         x, v = np.empty(run.rows), np.empty(run.rows)
-        x[0], v[0] = x0, v0
-        for i in range(run.rows - 1):
-            h = (t[i + 1] - t[i]) / _SUBSTEPS
-            a, b, at = x[i], v[i], t[i]
-            for _ in range(_SUBSTEPS):
-                a, b = _step(acceleration, forces, at, h, a, b)
-                at += h
+        x[0], v[0] = a, b = x0, v0
+        steps = np.diff(t) / _SUBSTEPS
+        # What is known of the way beforehand is asked once: at the ends and the middle of every step.
+        stages = t[:-1, None] + steps[:, None] * np.arange(2 * _SUBSTEPS + 1) / 2
+        accelerations = np.asarray(acceleration(stages), dtype=np.float64).tolist()
+        terms = [
+            (force.effect.term.force, force.values)
+            for force in forces
+            if force.effect.term is not None and force.effect.term.force is not None
+        ]
+        for i, h in enumerate(steps.tolist()):
+            for k in range(0, 2 * _SUBSTEPS, 2):
+                a, b = _step(accelerations[i][k : k + 3], terms, h, a, b)
             x[i + 1], v[i + 1] = a, b
         result = dict(simulated)
         result[self.output] = x if is_position else v
@@ -208,28 +215,21 @@ class AlongMotion(ABC):
 
 
 def _step(
-    acceleration: Callable[[float], object],
-    forces: Sequence[AppliedEffect],
-    t: float,
-    h: float,
-    x: float,
-    v: float,
+    acceleration: Sequence[float], terms: Sequence[tuple[ForceHook, Values]], h: float, x: float, v: float
 ) -> tuple[float, float]:
-    """Return position and velocity after a step of Runge and Kutta's fourth order."""
-    terms = [
-        (force.effect.term.force, force.values)
-        for force in forces
-        if force.effect.term is not None and force.effect.term.force is not None
-    ]
+    """Return position and velocity after a step of Runge and Kutta's fourth order.
 
-    def rate(at: float, position: float, speed: float) -> tuple[float, float]:
-        pull = sum(force(position, speed, values) for force, values in terms)
-        return speed, float(cast("float", acceleration(at))) - pull
+    ``acceleration`` (3,) is that without the terms, at the beginning, the middle and the end of the step.
+    """
 
-    k1 = rate(t, x, v)
-    k2 = rate(t + h / 2, x + h / 2 * k1[0], v + h / 2 * k1[1])
-    k3 = rate(t + h / 2, x + h / 2 * k2[0], v + h / 2 * k2[1])
-    k4 = rate(t + h, x + h * k3[0], v + h * k3[1])
+    def rate(undisturbed: float, position: float, speed: float) -> tuple[float, float]:
+        return speed, undisturbed - sum(force(position, speed, values) for force, values in terms)
+
+    start, middle, end = acceleration
+    k1 = rate(start, x, v)
+    k2 = rate(middle, x + h / 2 * k1[0], v + h / 2 * k1[1])
+    k3 = rate(middle, x + h / 2 * k2[0], v + h / 2 * k2[1])
+    k4 = rate(end, x + h * k3[0], v + h * k3[1])
     return (
         x + h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
         v + h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +20,13 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
-    from toolkit.diagnosis.simulators.simulator import Largest, Model, Pattern
+    from toolkit.diagnosis.simulators.simulator import Model, Pattern
     from toolkit.effects.effect import Effect
     from toolkit.worker.serve import Handlers
 
     Arrays = dict[str, NDArray[np.float64]]
     Crossing = tuple[tuple[Any, ...], ...]
+    Place = tuple[str | None, str | None]
 
 _USABLE = "\0usable"  # one for each set that could be simulated; no channel has such a name
 _SIZES = ("force", "speed", "place", "fastest", "farthest", "level")
@@ -39,7 +41,8 @@ class OdeApart:
         self.outputs = tuple(
             Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
         )
-        self._facts: dict[tuple[str, ...], Any] = {}
+        # Asked once and at the start: what an answer needs is then there, whatever has become of the worker.
+        self._places, self._motions = _facts_of(code.value("facts"))
         self._prepared: dict[Run, dict[Any, Arrays]] = {}
         self.capability = Capability(
             nominal_load_N=None,
@@ -49,7 +52,11 @@ class OdeApart:
             repeats=None,
             together=self._together,
             motion=Moving(
-                integrates=True, sizes=self._sizes, units=self._units, way=self._way, pushed=self._pushed
+                integrates=True,
+                sizes=lambda channel, _: self._motions[str(channel)].sizes,
+                units=lambda channel: self._motions[str(channel)].units,
+                way=lambda channel: self._motions[str(channel)].way,
+                pushed=self._pushed,
             ),
         )
 
@@ -73,15 +80,7 @@ class OdeApart:
             outputs = [(output.name, output.unit) for output in self.outputs]
             drivers = [(driver.name, driver.unit) for driver in self.case.drivers]
             return channel_places(effect, outputs, drivers, {name for name, _ in drivers})
-        pairs = self._fact("places", effect.name)
-        if not (isinstance(pairs, list) and all(_texts(pair, 2) for pair in pairs)):
-            raise _unfit("places of an effect")
-        return [(channel, source) for channel, source in pairs]
-
-    def _fact(self, *question: str) -> Any:
-        if question not in self._facts:
-            self._facts[question] = self._code.value(*question)
-        return self._facts[question]
+        return self._places[effect.name]
 
     def _together(
         self,
@@ -106,24 +105,6 @@ class OdeApart:
                     output.name: answers[output.name][k, end - run.rows : end] for output in self.outputs
                 }
                 self._prepared[run][_key(*points[k])] = outputs
-
-    def _sizes(self, channel: str | None, _: Largest) -> MotionSizes:
-        sizes = self._fact("sizes", str(channel))
-        if not (isinstance(sizes, list) and len(sizes) == len(_SIZES) + 1 and _numbers(sizes)):
-            raise _unfit("sizes of a motion")
-        return MotionSizes(**dict(zip(_SIZES, map(float, sizes), strict=False)), has_position=bool(sizes[-1]))
-
-    def _units(self, channel: str | None) -> tuple[str, str, str]:
-        units = self._fact("units", str(channel))
-        if not _texts(units, 3) or None in units:
-            raise _unfit("units of a motion")
-        return units[0], units[1], units[2]
-
-    def _way(self, channel: str | None) -> tuple[float, float]:
-        way = self._fact("way", str(channel))
-        if not (isinstance(way, list) and len(way) == 2 and _numbers(way)):
-            raise _unfit("way of a motion")
-        return float(way[0]), float(way[1])
 
     def _pushed(
         self,
@@ -151,9 +132,21 @@ def handlers_of(case: Case, model: Model) -> Handlers:
     assert together is not None  # noqa: S101  of every equation
     assert moving is not None  # noqa: S101
 
-    def sizes(channel: str) -> list[float]:
-        motion = moving.sizes(channel, lambda _: 1.0)
-        return [*(float(getattr(motion, name)) for name in _SIZES), float(motion.has_position)]
+    def facts() -> list[Any]:
+        places = {
+            effect.name: [list(place) for place in model.places(effect)]
+            for effect in effects().values()
+            if effect.term is not None
+        }
+        motions = {}
+        for channel in {str(channel) for pairs in places.values() for channel, _ in pairs}:
+            motion = moving.sizes(channel, lambda _: 1.0)
+            motions[channel] = [
+                [*(float(getattr(motion, name)) for name in _SIZES), float(motion.has_position)],
+                list(moving.units(channel)),
+                [float(length) for length in moving.way(channel)],
+            ]
+        return [places, motions]
 
     def prepared(
         _: int,
@@ -187,11 +180,54 @@ def handlers_of(case: Case, model: Model) -> Handlers:
         "simulate": lambda run, p, active: Numbers(model.simulate(runs[run], p, _crossed(active))),
         "together": prepared,
         "pushed": pushed,
-        "places": lambda name: [list(place) for place in model.places(effects()[name])],
-        "sizes": sizes,
-        "units": lambda channel: list(moving.units(channel)),
-        "way": lambda channel: [float(length) for length in moving.way(channel)],
+        "facts": facts,
     }
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """What moves at one state: sizes of its motion, units of force, velocity and position, and its ways."""
+
+    sizes: MotionSizes
+    units: tuple[str, str, str]
+    way: tuple[float, float]
+
+
+def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion]]:
+    """Return the places of every effect in an equation and the motion at each of them.
+
+    Raises
+    ------
+    FitError
+        the worker did not answer them: what its code left of it tells nothing
+    """
+    try:
+        listed, moving = facts
+        places: dict[str, list[Place]] = {}
+        for name in (name for name, effect in effects().items() if effect.term is not None):
+            places[name] = [(_text(channel), _text(source)) for channel, source in listed[name]]
+        motions = {str(channel): _motion(*parts) for channel, parts in moving.items()}
+        missing = {str(channel) for pairs in places.values() for channel, _ in pairs} - set(motions)
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise _unfit("places and motion of the effects") from error
+    if missing:
+        raise _unfit(f"motion of {', '.join(sorted(missing))}")
+    return places, motions
+
+
+def _motion(sizes: Sequence[float], units: Sequence[str], way: Sequence[float]) -> _Motion:
+    *numbers, has_position = map(float, sizes)
+    force, velocity, position = map(str, units)
+    longest, usual = map(float, way)
+    return _Motion(
+        sizes=MotionSizes(**dict(zip(_SIZES, numbers, strict=True)), has_position=bool(has_position)),
+        units=(force, velocity, position),
+        way=(longest, usual),
+    )
+
+
+def _text(value: object) -> str | None:
+    return None if value is None else str(value)
 
 
 def _crossing(active: Sequence[AppliedEffect]) -> Crossing:
@@ -218,18 +254,6 @@ def _crossed(active: Crossing) -> list[AppliedEffect]:
 def _key(p: Mapping[str, float], active: Sequence[AppliedEffect]) -> tuple[Any, ...]:
     effects = ((applied.key, tuple(applied.values.items()), applied.condition) for applied in active)
     return tuple(p.items()), tuple(effects)
-
-
-def _texts(value: object, count: int) -> bool:
-    return (
-        isinstance(value, list)
-        and len(value) == count
-        and all(text is None or isinstance(text, str) for text in value)
-    )
-
-
-def _numbers(values: Sequence[object]) -> bool:
-    return all(isinstance(value, int | float) for value in values)
 
 
 def _unfit(content: str) -> FitError:

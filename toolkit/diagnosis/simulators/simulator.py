@@ -143,9 +143,10 @@ class Supervised:
         self._simulate: Callable[[Run, Parameters, Sequence[AppliedEffect]], Arrays] = guarded(simulate)
         self.outputs, self.parameters = plain.outputs, plain.parameters
         known = plain.capability
-        together, motion = known.together, known.motion
+        together, motion, repeats = known.together, known.motion, known.repeats
         self.capability = dataclasses.replace(
             known,
+            repeats=None if repeats is None else guarded(repeats),
             together=None if together is None else guarded(together),
             motion=None if motion is None else dataclasses.replace(motion, pushed=guarded(motion.pushed)),
         )

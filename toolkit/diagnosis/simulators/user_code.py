@@ -16,6 +16,7 @@ from typing import Any, TextIO, cast
 import numpy as np
 
 from toolkit.errors import ConfigError
+from toolkit.files import real_path
 from toolkit.inputs import CODE_FILE, read_regular
 
 
@@ -27,11 +28,11 @@ def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
     ConfigError
         the file raises or ends the process, or has no such function
     """
-    space = types.ModuleType(f"simulator_{abs(hash(path.resolve()))}")
+    space = types.ModuleType(f"simulator_{abs(hash(real_path(path)))}")
     space.__file__ = str(path)
     # Dataclasses and pickles look their module up by name.
     sys.modules[space.__name__] = space
-    folder = str(path.resolve().parent)
+    folder = str(real_path(path).parent)
     if folder not in sys.path:
         sys.path.append(folder)
     try:

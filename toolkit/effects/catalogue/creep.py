@@ -39,7 +39,7 @@ EFFECT = Effect(
             unit="1",
             text="of the load, that creeps",
             typical=(0.0002, 0.02),
-            bounds=(-0.9, 0.9),
+            bounds=(-0.02, 0.9),  # against the load only as far as a gauge over-compensates its element
         ),
         EffectParameter(
             name="time_constant",

@@ -47,7 +47,7 @@ _FILES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AuditView:
-    """What the page shows. ``rules``: rule id -> what it means and what to do.
+    """What the page shows. ``rules``: rule id -> what it means and what to do; ``headline``: its first line.
 
     ``uses``: the records in force by which repairs were computed.
     """
@@ -61,6 +61,7 @@ class AuditView:
     drifted: Sequence[DriftedFile] = ()
     drifted_tests: Sequence[DriftedTest] = ()
     uses: tuple[CalibrationUse, ...] = ()
+    headline: str = ""
 
 
 def write_page(path: Path, view: AuditView) -> None:
@@ -77,6 +78,7 @@ def page(view: AuditView) -> Iterator[str]:
         mark=mark_of(view.uses),
         signature=signature_text(view.uses),
         audit=view.made,
+        headline=view.headline,
         timelines=((versions.instrument, timeline(versions)) for versions in view.timelines),
         file_columns=_FILES,
         file_rows=_file_rows(view),

@@ -52,7 +52,7 @@ def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: 
     simulated = any(entry.simulated for entry in comparison.entries)
     words = (*(use.word for use in comparison.uses), "SIMULATED" if simulated else None)
     mark = " - ".join(dict.fromkeys(word for word in words if word))
-    title = figure.title + (f", {drawn.series_label}, drum forward" if drawn.scope == "direction" else "")
+    title = figure.title + (f", {drawn.series_label}, forward" if drawn.scope == "direction" else "")
     title = title[:1].upper() + title[1:]
     return Plot(
         name=figure.name,

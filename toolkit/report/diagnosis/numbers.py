@@ -47,13 +47,15 @@ def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, st
 
 
 def over(channel: str, variables: Sequence[str]) -> str:
-    """Return what an output's mismatch depends on; where only its size tells, that it is too large.
+    """Return what an output's mismatch depends on; where only its size or its slowness tells, these.
 
-    >>> over("FY", ["SA", "FZ"]), over("FY", ["more than its stated noise"])
-    ('FY over SA and FZ', 'FY is off by more than its stated noise')
+    >>> over("FY", ["SA", "FZ"]), over("FY", ["more than its stated noise"]), over("FY", ["a slow rest"])
+    ('FY over SA and FZ', 'FY is off by more than its stated noise', 'FY leaves a slow rest')
     """
     names = " and ".join(variables)
-    return f"{channel} is off by {names}" if names.startswith("more than") else f"{channel} over {names}"
+    words = {"more than": "is off by", "a ": "leaves"}
+    verb = next((verb for start, verb in words.items() if names.startswith(start)), "over")
+    return f"{channel} {verb} {names}"
 
 
 # How small a chance is said to be: none is zero.

@@ -105,6 +105,11 @@ def data(value: str, text: str) -> Markup:
     return Markup('<data value="{}">{}</data>').format(value, text)
 
 
+def drawn(text: str) -> Markup:
+    """Return what a template of `environment` drew, to stand in another page as it is."""
+    return Markup(text)  # noqa: S704  the template has escaped it
+
+
 def facts(title: str, texts: Mapping[str, str]) -> Markup:
     """Return named texts as a small table for a notebook; a fact without a text is left out."""
     parts: Any = environment(KIT).get_template("parts.html.j2").module

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from toolkit.characteristics.catalogue import columns, summary, tables
+from toolkit.characteristics.catalogue import columns, tables
 from toolkit.characteristics.characteristic import COLUMNS as BUDGET
+from toolkit.characteristics.summary import summary_estimates as estimates_of_summary
+from toolkit.characteristics.summary import summary_load as load_of_summary
 from toolkit.estimate import round_to_uncertainty
 from toolkit.report.content import Cell
 from toolkit.report.document import DeclaredTable, Rows
@@ -21,8 +23,6 @@ if TYPE_CHECKING:
     from toolkit.pipeline import TestResult
 
 Cells = dict[str, Cell]
-# Loads within this part of a summary's load are its load.
-_SAME_LOAD = 0.04
 
 
 def put(cells: dict[str, Cell], name: str, estimate: Estimate | None, factor: float = 1.0) -> None:
@@ -166,26 +166,12 @@ def _to_place(value: float, total: float, style: Style) -> str:
 
 def summary_load(result: TestResult) -> float | None:
     """Return the load [N] of a report's summary: the one nearest the rated load, else the middle one."""
-    loads, rated = result.characteristics.loads_N, result.reduced.info.rated_load_N
-    if not loads:
-        return None
-    return min(loads, key=lambda load: abs(load - rated)) if rated else loads[len(loads) // 2]
+    return load_of_summary(result.characteristics, result.reduced.info.rated_load_N)
 
 
 def summary_estimates(result: TestResult) -> dict[str, Estimate | None]:
     """Return the values of the summary by their names, in printed units; of directions the forward run."""
-    load = summary_load(result)
-    estimates: dict[str, Estimate | None] = {}
-    for characteristic in summary():
-        rotation = "forward" if characteristic.scope == "direction" else None
-        rows = result.characteristics.of(characteristic.name, rotation=rotation)
-        near = (row for row in rows if load is not None and abs(row.load_N - load) <= _SAME_LOAD * load)
-        row = next(near, None)
-        estimate = None if row is None else row.estimate
-        estimates[str(characteristic.summary)] = (
-            None if estimate is None else estimate.scaled(characteristic.factor, "")
-        )
-    return estimates
+    return estimates_of_summary(result.characteristics, result.reduced.info.rated_load_N)
 
 
 WIDE_TABLES = tuple(wide_table(table) for table in tables())

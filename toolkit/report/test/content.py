@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.use import DRAFT, UNVERIFIED, CalibrationUse
 from toolkit.characteristics.catalogue import columns
 from toolkit.characteristics.characteristic import PULL, STIFFNESS
 from toolkit.files import sha256_bytes
-from toolkit.report.content import IMPOSSIBLE, ReportContent, say_plot, say_table, say_values
+from toolkit.report.content import IMPOSSIBLE, ReportContent
 from toolkit.report.document import Chapter, Document
 from toolkit.report.style import Style
 
@@ -121,25 +121,17 @@ def build_content(
         identity=report_id(result, report.details),
         subject="Tire force and moment",
         issued=report.issued,
+        people=_people(report),
     )
-    content = _in_words_of(style, content) if style.words or style.alt else content
     return replace(content, title=str(content.values["report.title"].value))
 
 
-def _in_words_of(style: Style, content: ReportContent) -> ReportContent:
-    """Return a content with the terms that the toolkit prints in the organisation's words."""
-    words = dict(style.words)
-    plots = {name: say_plot(plot, words, dict(style.alt)) for name, plot in content.plots.items()}
-    captions = {
-        f"caption.{name}": replace(content.values[f"caption.{name}"], value=plot.caption)
-        for name, plot in plots.items()
-    }
-    return replace(
-        content,
-        plots=plots,
-        values=say_values(content.values | captions, words),
-        tables={name: say_table(table, words) for name, table in content.tables.items()},
-    )
+def _people(report: ReportedTest) -> frozenset[str]:
+    """Return what people wrote into the test and its report."""
+    opinions = (text for opinion in report.details.opinions for text in (opinion.statement, opinion.basis))
+    parts = (report.info, report.details)
+    stated = (getattr(part, field.name) for part in parts for field in fields(part))
+    return frozenset(text for text in (*stated, *opinions) if isinstance(text, str))
 
 
 def report_id(result: TestResult, details: ReportDetails | None = None) -> str:

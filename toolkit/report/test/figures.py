@@ -155,7 +155,7 @@ class _Plots:
                     )
         what = _SYMBOLS[channel]
         how = f"reversed by {TURNED}" if self.result.reduced.info.reversal == "tire" else "reversed"
-        turned = f"; filled: drum forward, open and dashed: {how}" if len(self._rotations()) > 1 else ""
+        turned = f"; filled: forward, open and dashed: {how}" if len(self._rotations()) > 1 else ""
         curves_text = ", fitted curves as lines" if lines else ""
         return self._plot(
             f"{channel.lower()}_vs_slip",

@@ -48,7 +48,7 @@ def _slip_angles(t: ReportedTest, _style: Style) -> str | None:
 
 
 def _directions(t: ReportedTest, _style: Style) -> str:
-    """Return the directions, and what was turned for the reversed run where it was not the drum."""
+    """Return the directions, and what was turned for the reversed run where it was not the road."""
     directions = [r for r in ("forward", "reverse") if any(c.rotation == r for c in t.used)]
     turned = "reverse" in directions and t.info.reversal == "tire"
     return " and ".join(directions) + (f", {TURNED}" if turned else "")
@@ -93,8 +93,13 @@ VALUES = (
     _text("test.operator", "operator", lambda t, _: t.info.operator),
     _text("test.requestor", "requestor (customer)", lambda t, _: t.info.requestor),
     _text("test.special", "what is special about the test", lambda t, _: t.info.special),
-    _text("test.surface", "surface of the drum", lambda t, _: t.info.surface),
-    _text("test.machine", "test machine", lambda t, _: t.info.machine),
+    _text("test.surface", "surface of the road", lambda t, _: t.info.surface),
+    _text("test.machine", "name of the test machine", lambda t, _: t.info.machine),
+    _text(
+        "machine.title",
+        "the test machine as its definition calls it, else its name",
+        lambda t, _: t.result.reduced.machine_title or t.info.machine,
+    ),
     _text("test.pressure", "test pressure in psi and bar", _pressure),
     _text("test.loads", "the loads of the test, means of the blocks", _loads),
     _text("test.slip_angles", "the slip-angle steps of the test", _slip_angles),
@@ -209,7 +214,7 @@ VALUES = (
     ),
     _number(
         "test.speed",
-        "speed of the drum surface",
+        "speed of the road's surface",
         lambda t, _: _scaled(t.info.speed_m_s, 3.6),
         unit="km/h",
         spec=".2f",

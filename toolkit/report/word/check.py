@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.style import Style
 from toolkit.report.tags import format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
+from toolkit.report.word.advice import advice, placeholders
 from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import (
@@ -45,7 +46,7 @@ from toolkit.report.word.xml import (
 def check_template(
     template: Template, style: Style, vocabularies: Mapping[str, Vocabulary], *, fonts: bool = True
 ) -> tuple[LintFinding, ...]:
-    """Return what is wrong with a template, errors first, in document order.
+    """Return what is wrong with a template, errors first, in document order; notes are advice.
 
     Parameters
     ----------
@@ -56,8 +57,9 @@ def check_template(
     """
     package = open_package(template)
     parts = stories(package)
-    vocabulary = vocabulary_of(scan(parts), vocabularies)
-    return check_stories(package, parts, style, vocabulary, fonts=fonts)
+    sites = scan(parts)
+    vocabulary = vocabulary_of(sites, vocabularies)
+    return (*check_stories(package, parts, style, vocabulary, fonts=fonts), *advice(sites))
 
 
 def check_stories(
@@ -75,6 +77,7 @@ def check_stories(
         *_tables(sites, words),
         *_broken(parts),
         *surroundings(package, parts, style),
+        *placeholders(parts, style),
     ]
     if fonts:
         findings += [

@@ -13,7 +13,7 @@ from pathlib import Path
 from lxml import etree
 
 from toolkit.errors import RenderError
-from toolkit.report.content import ReportContent, say
+from toolkit.report.content import ReportContent
 from toolkit.report.word.contents_pages import poppler
 from toolkit.report.word.xml import W_P, W_SDT, W_T, Element, new_run, q
 from toolkit.trust.seal.qr import Place
@@ -38,9 +38,8 @@ def close(body: Element, content: ReportContent, *, signed: bool) -> list[tuple[
     It stands before the words by which a template ends the document, where these name it. ``signed``: the
     template has a place of its own for the signatures.
     """
-    words = dict(content.style.words)
-    texts = [] if signed else [("signature", f"{say(LABEL, words)}: {content.signature}")]
-    texts += [("proof", say(CAPTION, words))] if content.symbol else []
+    texts = [] if signed else [("signature", f"{content.style.say(LABEL)}: {content.signature}")]
+    texts += [("proof", content.style.say(CAPTION))] if content.symbol else []
     paragraphs = [_paragraph(text) for _, text in texts] + ([_space()] if content.symbol else [])
     at = _end(body, content.identity)
     body[at:at] = paragraphs
@@ -58,7 +57,7 @@ def place_of_symbol(pdf: Path, page: int, content: ReportContent) -> Place:
     listing = poppler(["pdftotext", "-bbox", "-f", str(page), "-l", str(page), str(pdf), "-"])
     rows = _WORD.findall(listing)
     boxes, texts = [tuple(map(float, row[:4])) for row in rows], [html.unescape(row[4]) for row in rows]
-    caption = say(CAPTION, dict(content.style.words)).split()
+    caption = content.style.say(CAPTION).split()
     size = _PAGE.search(listing)
     at = next((at for at in reversed(range(len(texts))) if texts[at : at + len(caption)] == caption), None)
     if at is None or size is None:

@@ -23,6 +23,14 @@ from toolkit.report.word.xml import SDT_CONTENT, SDT_PR, W_P, W_R, W_SDT, W_T, E
 
 Edit = Callable[[Element], None]
 _STORY = re.compile(r"word/[\w.-]+\.xml")
+_STYLES = re.compile(r"word/styles\d*\.xml")
+# The standard structure types that are no kind of text (ISO 32000-1, 14.8.4); LibreOffice writes the name of
+# a style of one's own as the type of its paragraphs.
+_ELEMENTS = frozenset(
+    "Document Part Art Sect Div TOC TOCI Index NonStruct Private L LI Lbl LBody Table TR TH TD THead TBody "
+    "TFoot Reference BibEntry Link Annot Ruby Warichu Figure Formula Form".split()
+)
+_ELEMENT_NAME = re.compile(rf'<w:name w:val="(?:{"|".join(sorted(_ELEMENTS))})"')
 _FIELDS = (q("w:fldChar"), q("w:fldSimple"), q("w:hyperlink"))
 _LABEL = r"[\s.…·‥_\-]*?(\d+|[ivxlcdmIVXLCDM]+|[A-Z]{1,2})(?=\s|$)"
 
@@ -32,7 +40,9 @@ def for_printing(docx: bytes, part: str, *, contents: bool) -> bytes:
 
     Tables of contents become plain lines, whose pages it updates. Controls around paragraphs or cells with
     fields go, in every part: of a control around one paragraph LibreOffice 7.4 prints the codes of the
-    fields in it, ``PAGE ?`` in a footer. ``contents`` tells that the main part has tables of contents.
+    fields in it, ``PAGE ?`` in a footer. ``contents`` tells that the main part has tables of contents. A
+    style that is named like an element of the PDF's structure gets another name: its paragraphs would be
+    figures or tables to those who hear the document.
     """
 
     def unwrap(root: Element) -> None:
@@ -53,9 +63,20 @@ def for_printing(docx: bytes, part: str, *, contents: bool) -> bytes:
             for name in source.namelist()
             if _STORY.fullmatch(name) and _in_control(source.read(name))
         }
+        edits |= {
+            name: _unlike_elements
+            for name in source.namelist()
+            if _STYLES.fullmatch(name) and _ELEMENT_NAME.search(source.read(name).decode("utf-8", "replace"))
+        }
     if contents:
         edits[part] = unwrap
     return _edited(docx, edits) if edits else docx
+
+
+def _unlike_elements(styles: Element) -> None:
+    for name in styles.iter(q("w:name")):
+        if name.get(q("w:val")) in _ELEMENTS:
+            name.set(q("w:val"), f"{name.get(q('w:val'))} paragraph")
 
 
 def _in_control(xml: bytes) -> bool:

@@ -36,6 +36,10 @@ RULES = {
     "contents": "a table of contents or an index is of a kind that is not updated",
     "missing-style": "a style that the style file names is not in the template",
     "font-unavailable": "a font is not installed and will be replaced",
+    "placeholder": "a text stands for what somebody was to write there",
+    "header-row": "the header row of a table is not repeated on the next page",
+    "split-row": "a row of a table may break across pages",
+    "table-paragraph": "the paragraph of a table tag holds other text",
 }
 
 
@@ -44,7 +48,7 @@ class LintFinding:
     """One finding: rule, level, the part of the package, the place in it, and a sentence."""
 
     rule: str
-    level: Literal["error", "warning"]
+    level: Literal["error", "warning", "note"]
     part: str
     place: str
     message: str

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import signal
 import subprocess
 import tempfile
 import time
@@ -17,6 +16,7 @@ from types import TracebackType
 
 from toolkit.errors import RenderError
 from toolkit.inputs import PDF_FILE, read_regular
+from toolkit.system import can_fork, end_group
 
 # A guard that outlives its parent: after a kill -9 no LibreOffice runs on, and no folder is left behind.
 
@@ -45,19 +45,25 @@ class Guard:
 
     def __init__(self, folder: Path) -> None:
         """Start the guard; ``folder`` must have a name that no other process is called with."""
-        self._process = subprocess.Popen(
-            ["/bin/sh", "-c", _WAIT_AND_CLEAN],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # an interrupt at the keyboard ends the parent, which then cleans up
+        self._process = (
+            None
+            if not can_fork()
+            else subprocess.Popen(
+                ["/bin/sh", "-c", _WAIT_AND_CLEAN],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,  # an interrupt at the keyboard ends the parent, which then cleans up
+            )
         )
-        if self._process.stdin is not None:
+        if self._process is not None and self._process.stdin is not None:
             self._process.stdin.write(f"{folder}\n".encode())
             self._process.stdin.flush()
 
     def dismiss(self) -> None:
         """Send the guard away: the parent has cleaned up itself."""
+        if self._process is None:  # a system without shells that outlive their parent
+            return
         self._process.kill()
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):
@@ -68,10 +74,11 @@ class Guard:
 # ruff: noqa: E501  the profile is written as LibreOffice writes it
 
 
-# PDF/A-2b and tagged, pictures as they are. LibreOffice ignores options that are not typed like this.
+# PDF/A-2b and PDF/UA-1, pictures as they are. LibreOffice ignores options that are not typed like this.
 _OPTIONS = (
     'pdf:writer_pdf_Export:{"SelectPdfVersion":{"type":"long","value":"2"},'
     '"UseTaggedPDF":{"type":"boolean","value":"true"},'
+    '"PDFUACompliance":{"type":"boolean","value":"true"},'
     '"UseLosslessCompression":{"type":"boolean","value":"true"},'
     '"ReduceImageResolution":{"type":"boolean","value":"false"},'
     '"ExportBookmarks":{"type":"boolean","value":"true"}}'
@@ -290,7 +297,7 @@ def _processor_s(groups: set[int]) -> float:
             fields = stat.read_text().rpartition(")")[2].split()
             if int(fields[2]) in groups:
                 ticks += int(fields[11]) + int(fields[12])
-    return ticks / os.sysconf("SC_CLK_TCK")
+    return ticks / os.sysconf("SC_CLK_TCK") if ticks else 0.0
 
 
 def time_for(documents: Sequence[Path], each_s: float) -> float:
@@ -360,6 +367,5 @@ def find_soffice() -> str:
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
     """End soffice and its children: the launcher's own end leaves soffice.bin behind."""
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
+    end_group(process)
     process.communicate()

@@ -88,8 +88,8 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
             ),
             Check(
                 name="archive",
-                ok=b"pdfaid" in data and "yes" in _line(info, "Tagged"),
-                message="PDF/A-2 and tagged" if b"pdfaid" in data else "not PDF/A",
+                ok=b"pdfaid" in data and b"pdfuaid" in data and "yes" in _line(info, "Tagged"),
+                message="PDF/A-2 and PDF/UA-1, tagged" if b"pdfaid" in data else "not PDF/A",
             ),
         ),
         pages,

@@ -23,11 +23,12 @@ from cryptography.hazmat.primitives.serialization import (
 )
 
 from toolkit.errors import TrustError
+from toolkit.files import real_path
 from toolkit.inputs import CERTIFICATE_FILE, read_regular
 from toolkit.trust.seal.x509 import read_certificates, subject, weak_certificate
 
-Ask = Callable[[], bytes]
-"""Asks a person for the passphrase of the key file."""
+Ask = Callable[[Path], str]
+"""Asks a person for the passphrase of a key file."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +72,7 @@ def open_key(
         ``seal-key``: the file cannot be read, or lies in the home; ``seal-certificate``: no certificate
         belongs to the key, or one that has expired, or too weak a key
     """
-    if home is not None and path.resolve().is_relative_to(home.resolve()):
+    if home is not None and real_path(path).is_relative_to(real_path(home)):
         raise _refused(
             "the key lies in the laboratory's home", path, "a private key in a folder that is copied",
             "a key file elsewhere",
@@ -82,7 +83,7 @@ def open_key(
         private, certificates = _parts(data, None)
     except TypeError:
         try:
-            private, certificates = _parts(data, ask())
+            private, certificates = _parts(data, ask(path).encode())
         except (ValueError, TypeError) as error:
             raise _refused(
                 "the key file cannot be opened", path, "not by this passphrase", "the key's passphrase",

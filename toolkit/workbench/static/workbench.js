@@ -22,6 +22,7 @@ function draw(element) {
   charts.push([element, plot]);
 }
 function drawAll(root) {
+  charts.splice(0, charts.length, ...charts.filter(([element]) => element.isConnected));
   if (typeof uPlot === "undefined") return;
   root.querySelectorAll(".chart[data-chart]:empty").forEach(draw);
 }

@@ -1,0 +1,85 @@
+"""`toolkit compare --laboratories`: answer, figures, and every refusal with exit code 2."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_calibrate import run as run_command
+from toolkit.cli import compare
+from toolkit.errors import ToolkitError
+
+TEXT = """measurand,laboratory,value [N],U [N]
+conicity,A,10.1,0.4
+conicity,A,9.9,0.4
+conicity,B,10.4,0.5
+conicity,B,10.2,0.5
+conicity,C,9.7,0.3
+conicity,C,9.9,0.3
+conicity,D,10.0,
+plysteer,A,101,4
+plysteer,B,99,4
+plysteer,C,104,4
+"""
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    return run_command(*arguments, of=compare.command)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "laboratories.csv"
+    path.write_text(TEXT)
+    return path
+
+
+def test_every_measurand_is_answered_and_drawn(path: Path, tmp_path: Path) -> None:
+    code, said = run("--laboratories", path, "--figures", tmp_path / "figures", "--json")
+    answer = json.loads(said)
+    assert code == 0
+    assert answer["schema"] == 1
+    assert [measurand["name"] for measurand in answer["measurands"]] == ["conicity", "plysteer"]
+    conicity = answer["measurands"][0]
+    assert conicity["precision"]["n"] == 7
+    assert [score["laboratory"] for score in conicity["scores"]] == ["A", "B", "C", "D"]
+    assert conicity["scores"][3]["En"] is None
+    assert answer["measurands"][1]["precision"]["s_r"] is None
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {
+        "laboratories_1.png", "laboratories_2.png"
+    }  # fmt: skip
+
+
+def test_people_get_scores_and_precision(path: Path) -> None:
+    code, said = run("--laboratories", path, "--reference", "A", "--sigma", "0.2")
+    assert code == 0
+    assert "s_R" in said
+    assert "E_n" in said
+    assert "few-laboratories" not in said
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--sigma", "0"),
+        ("--sigma", "nan"),
+        ("--reference", "D"),
+        ("--reference", "nobody"),
+        ("--out", "x"),
+        ("other",),
+    ],
+)
+def test_what_cannot_be_compared_is_an_error(path: Path, arguments: tuple[str, ...]) -> None:
+    with pytest.raises(ToolkitError) as refused:
+        run("--laboratories", path, *arguments)
+    assert refused.value.exit_code == 2
+    assert refused.value.next_step
+
+
+def test_nothing_to_compare_is_an_error() -> None:
+    with pytest.raises(ToolkitError):
+        run()
+    with pytest.raises(ToolkitError):
+        run("A", "B", "--sigma", "1")

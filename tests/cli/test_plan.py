@@ -1,0 +1,177 @@
+"""`toolkit plan test`: a plan that the machine's own commands can use."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import toolkit
+from tests.planning.class_factory import answer, found, write_case
+from tests.planning.planning_factory import earlier
+from toolkit.cli.main import _register, app
+from toolkit.diagnosis.answer.serial import as_json
+from toolkit.errors import ConfigError
+from toolkit.lab import protocol_plan
+
+ROOT = Path(toolkit.__file__).resolve().parents[1]
+CALIBRATIONS = ROOT / "calibrations"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("TOOLKIT_HOME", raising=False)
+    _register()
+
+    def call(*arguments):
+        return CliRunner().invoke(app, [*map(str, arguments)], standalone_mode=False)
+
+    return call
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """An earlier test that takes no time to simulate."""
+    monkeypatch.setattr(protocol_plan, "_virtual", lambda _order: earlier())
+
+
+def test_the_plan_of_a_tire_file_is_simulated_and_processed_without_a_finding(run, tmp_path):
+    tire = ROOT / "toolkit" / "examples" / "virtual" / "tire.tir"
+    asked = ["--u", "conicity", "--u", "slope_cornering=2 %", "--load", "567 lbf", "--load", "833 lbf"]
+    planned = run(
+        "plan", "test", "--like", tire, *asked, "--out", "p", "--calibrations", CALIBRATIONS, "--json"
+    )
+    assert planned.return_value == 0, planned
+    answer = json.loads(planned.stdout)
+    assert answer["schema"] == 1
+    assert answer["feasible"] is True
+    assert sorted(answer["files"].values()) == ["plan.toml", "protocol.toml"]
+    assert answer["plan"]["rows"] < answer["protocol"]["rows"] == 130
+    assert run("simulate", "p/plan.toml", "--out", "t", "--calibrations", CALIBRATIONS).return_value == 0
+    done = run("process", "t", "--protocol", "p/protocol.toml", "--calibrations", CALIBRATIONS, "--json")
+    assert done.return_value == 0
+    test = json.loads(done.stdout)
+    assert test["findings"] == []
+    assert len(test["conditions"]) == answer["plan"]["rows"]
+    # What was planned is what the test says: the scatter of one test is sure to a third.
+    pull = {round(entry["load_N"], -2): entry for entry in test["characteristics"]["pull"]}
+    for value in answer["values"]:
+        if value["name"] == "conicity":
+            U = pull[round(value["load_N"], -2)]["conicity"]["expanded_uncertainty"]
+            assert U == pytest.approx(value["planned_U"], rel=0.5)
+
+
+def test_the_text_says_what_is_assumed_and_given_up(run, quick):
+    shown = run("plan", "test", "--u", "slope_cornering=3 %", "--load", "833 lbf")
+    assert shown.return_value == 0, shown
+    for part in ("U by protocol", "assumed:", "given up:", "the reversed runs", "no calibration record"):
+        assert part in shown.stdout
+
+
+def test_what_cannot_be_reached_names_the_nearest_plan_and_writes_nothing(run, quick, tmp_path):
+    failed = run("plan", "test", "--u", "plysteer=1 N", "--load", "833 lbf", "--minutes", 20, "--out", "p")
+    error = failed.exception
+    assert isinstance(error, ConfigError)
+    assert error.rule == "plan-infeasible"
+    assert "slip angle zero" in str(error.expected)
+    assert "rows" in str(error.next_step)
+    assert not (tmp_path / "p").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "rule"),
+    [
+        (["--load", "833"], "plan-load"),
+        (["--load", "2 t"], "plan-load"),
+        (["--load", "9999 lbf"], "plan-load"),
+        (["--u", "conicity=1 N", "--u", "conicity=2 N"], "plan-demand"),
+        (["--u", "conicity=1 furlong"], "plan-demand"),
+        (["--minutes", "0.5"], "plan-infeasible"),
+        (["--between-files", "inf"], "plan-infeasible"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused_by_its_rule(run, quick, arguments, rule):
+    failed = run("plan", "test", *arguments)
+    assert isinstance(failed.exception, ConfigError)
+    assert failed.exception.rule == rule
+
+
+def test_a_tire_file_that_is_not_there(run):
+    failed = run("plan", "test", "--like", "none.tir", "--calibrations", CALIBRATIONS)
+    assert failed.exception is not None
+    assert failed.exception.exit_code == 2
+
+
+@pytest.fixture
+def diagnosed(tmp_path):
+    """A case, and an answer that leaves a late and a lagging channel as one class."""
+    from toolkit.diagnosis.case.reader import read_case
+
+    case = write_case(tmp_path / "case")
+    folder = tmp_path / "answer"
+    folder.mkdir()
+    leaves = answer(read_case(case).sha256, found("channel_delay", "filter_lag"))
+    (folder / "diagnosis.json").write_text(json.dumps({"schema": 1, **as_json(leaves)}), encoding="utf-8")
+    (folder / "model.toml").write_text('[answer]\ncase = "../case/CASE.toml"\n', encoding="utf-8")
+    return folder
+
+
+def test_the_next_run_is_written_with_what_each_member_predicts(run, diagnosed, tmp_path):
+    planned = run("plan", "next", diagnosed, "--out", "n", "--json")
+    assert planned.return_value == 0, planned
+    plan = json.loads(planned.stdout)
+    assert set(plan["members"]) == {"channel_delay on F", "filter_lag on F"}
+    assert plan["power"] > 0.9 > plan["power_of_repeat"]
+    assert plan["complete"] is True
+    assert sorted(plan["files"]) == ["next.csv", "next_F.png", "operator.txt", "predictions.csv"]
+    header, *rows = (tmp_path / "n" / "next.csv").read_text().splitlines()
+    assert header == "t,u"
+    assert len(rows) == 500
+    predicted = (tmp_path / "n" / "predictions.csv").read_text().splitlines()[0]
+    assert set(predicted.split(",")) == {"t", "F_channel_delay_on_F", "F_filter_lag_on_F"}
+    assert re.search(r"times as fast", (tmp_path / "n" / "operator.txt").read_text())
+
+
+def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
+    shown = run("plan", "next", diagnosed)
+    assert shown.return_value == 0, shown
+    for part in ("if true", "channel_delay on F", "by a repeat", "assumed:"):
+        assert part in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--limit", "u=2..1"], "NAME=LOW..HIGH"),
+        (["--limit", "w=1..2"], "of u"),
+        (["--limit", "u=a..b"], "NAME=LOW..HIGH"),
+    ],
+)
+def test_a_limit_that_cannot_be_read(run, diagnosed, arguments, part):
+    failed = run("plan", "next", diagnosed, *arguments)
+    assert failed.exception.rule == "plan-next"
+    assert part in str(failed.exception.expected)
+
+
+def test_another_case_than_the_answers_is_refused(run, diagnosed, tmp_path):
+    case = tmp_path / "case" / "CASE.toml"
+    case.write_text(case.read_text() + "# another one\n", encoding="utf-8")
+    failed = run("plan", "next", diagnosed, "--out", "n")
+    assert failed.exception.rule == "plan-next"
+    assert not (tmp_path / "n").exists()
+
+
+def test_an_answer_without_its_model_asks_for_the_case(run, diagnosed):
+    (diagnosed / "model.toml").unlink()
+    failed = run("plan", "next", diagnosed)
+    assert "--case" in str(failed.exception.next_step)
+
+
+def test_a_file_that_is_no_answer(run, tmp_path):
+    (tmp_path / "diagnosis.json").write_text("{}", encoding="utf-8")
+    failed = run("plan", "next", tmp_path / "diagnosis.json")
+    assert failed.exception.rule == "not-a-diagnosis"

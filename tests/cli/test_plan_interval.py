@@ -1,0 +1,67 @@
+"""`toolkit plan interval`: a cell that drifts over its sessions is due the sooner the faster; refusals."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.calibration.control_factory import enter, put_in_force
+from tests.cli.test_calibrate import run as run_command
+from toolkit.calibration.registry.registry import Registry
+from toolkit.cli import plan
+from toolkit.errors import ToolkitError
+
+
+def home_of(folder: Path, spans: list[float]) -> Path:
+    """Return a home with a session each year, all of which were put in force on their day."""
+    registry = Registry(folder / "calibrations")
+    for number, span in enumerate(spans):
+        day = dt.date(2018 + number, 3, 1)
+        made = enter(registry, folder / f"session {number}", day, span=span)
+        put_in_force(registry, made, recall="12 months")
+    return folder
+
+
+def run(home: Path, *arguments: object) -> tuple[int, dict[str, Any]]:
+    code, said = run_command("cell", "--home", home, "--json", *arguments, of=plan.interval)
+    return code, json.loads(said)
+
+
+def test_a_faster_drift_is_due_sooner(tmp_path: Path) -> None:
+    """The span grows by 0.2 and by 0.9 permille a year; the tolerance is one permille at full scale."""
+    answers = []
+    for name, rate in (("slow", 0.0002), ("fast", 0.0009)):
+        code, answer = run(home_of(tmp_path / name, [1 + rate * i for i in range(7)]), "--tests", "100")
+        assert code in (0, 1)
+        answers.append(answer)
+    slow, fast = answers
+    # At the check load of 950 N, by the tolerance of 1 N.
+    assert slow["trend_per_year"] == pytest.approx(0.0002 * 950, rel=0.05)
+    assert fast["trend_per_year"] == pytest.approx(0.0009 * 950, rel=0.05)
+    assert fast["limiting"] == "FY at FY 950 N"
+    assert 0 < fast["days"] < slow["days"]
+    assert fast["chosen"]["beyond"] <= 0.05
+    assert fast["chosen"]["recalled_a_year"] == pytest.approx(100 * fast["chosen"]["beyond"])
+    assert slow["next"] == (dt.date(2024, 3, 1) + dt.timedelta(days=slow["days"])).isoformat()
+    assert slow["in_use"] == "12 months"
+
+
+def test_what_cannot_be_planned_is_an_error(tmp_path: Path) -> None:
+    home = home_of(tmp_path, [1.0, 1.0002])
+    with pytest.raises(ToolkitError) as short:
+        run(home)
+    assert short.value.rule == "plan-history"
+    for arguments in (
+        ("--reliability", "1"),
+        ("--reliability", "0.2"),
+        ("--reliability", "nan"),
+        ("--tests", "-1"),
+    ):
+        with pytest.raises(ToolkitError) as refused:
+            run(home, *arguments)
+        assert refused.value.rule == "plan-demand"
+        assert refused.value.exit_code == 2

@@ -1,0 +1,151 @@
+"""`toolkit session|machine|test|case|plan new`: from an empty folder to a file that its command accepts."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from toolkit.cli.main import run
+from toolkit.declared import read
+from toolkit.errors import ConfigError
+from toolkit.lab.starters import FORMS, form_of
+from toolkit.machine import load_machine
+from toolkit.recording.folder import read_test_folder
+from toolkit.simulation.plan import read_plan
+
+BELT = [
+    "name=belt-2", "title=Flat belt 2", "kind=real", "axes=ISO-W", 'rotations=["forward"]',
+    "drum.surface=flat belt", 'drum.speed={value=60,unit="km/h"}',
+    'drum.speed_tolerance={value=1,unit="km/h"}', "protocol.source=own",
+    'protocol.slip_angles={value=[-4,0,4],unit="deg"}', 'protocol.loads={value=[2,4],unit="kN"}',
+    'protocol.slip_angle_tolerance={value=0.5,unit="deg"}', "protocol.load_tolerance=0.05",
+    "protocol.settle_revolutions=1", "protocol.average_revolutions=1", "protocol.acquisition=after_settling",
+]  # fmt: skip
+LOADS = "run,direction,gx [mV/V],gy (mV/V),FY [kN],MZ [N*m],remark\n" + "".join(
+    f"{i // 6 + 1},up,{x},{y},{2 * x + 0.01 * y + 1e-5 * (-1) ** i},{30 * y - x + 1e-3 * (-1) ** (i // 2)},\n"
+    for i, (x, y) in enumerate([(0, 0), (1, 0), (0, 1), (1, 1), (2, -1), (-1, 2)] * 6)
+)
+
+
+def command(*words: object) -> int:
+    with pytest.raises(SystemExit) as caught:
+        run([str(word) for word in words])
+    return int(caught.value.code or 0)
+
+
+def answered(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, dict[str, Any]]:
+    capsys.readouterr()
+    code = command(*words, "--json")
+    return code, json.loads(capsys.readouterr().out)
+
+
+def sets(entries: list[str]) -> list[str]:
+    return [word for entry in entries for word in ("--set", entry)]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("word", FORMS)
+def test_what_is_missing_is_told_all_at_once_by_the_command_and_by_the_reader(
+    word: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, told = answered(capsys, word, "new", "f.toml")
+    assert code == 0
+    assert told["open"]
+    with pytest.raises(ConfigError) as caught:
+        read(form_of(word), folder / "f.toml")
+    assert all(name in str(caught.value) for name in told["open"])
+
+
+@pytest.mark.parametrize("word", FORMS)
+def test_nothing_is_written_over_and_nothing_wrong_is_written(
+    word: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "mine.toml").write_text("mine")
+    for words, rule in (
+        (["mine.toml"], "not-writable"),
+        (["new.txt"], "not-writable"),
+        (["new.toml", "--set", "nonsense=1"], "unknown-key"),
+        (["new.toml", "--set", "nonsense"], "usage"),
+    ):
+        code, told = answered(capsys, word, "new", *words)
+        assert (code, told["error"]["rule"]) == (2, rule), told
+    assert {path.name for path in folder.iterdir()} == {"mine.toml"}
+    assert (folder / "mine.toml").read_text() == "mine"
+
+
+def test_a_session_of_a_table_is_accepted_by_calibrate(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "data").mkdir()
+    (folder / "data" / "loads.csv").write_text(LOADS.replace(",remark", "").replace(",\n", "\n"))
+    assert command("init", ".") == 0
+    words = ["--set", "instrument=press-7", "--set", "date=2026-02-03", "--set", "operator=first person"]
+    code, told = answered(capsys, "session", "new", "SESSION.toml", "--from", "data/loads.csv", *words)
+    assert (code, told["open"], told["not_guessed"]) == (0, [], [])
+    assert told["guessed"] == {
+        "data": "data/loads.csv", "indications": ["gx", "gy"], "loads": ["FY", "MZ"],
+    }  # fmt: skip
+    code, told = answered(capsys, "calibrate", "SESSION.toml")
+    assert code in (0, 1), told
+    assert told["record"]["id"] == "press-7-r1"
+
+
+def test_what_no_header_tells_is_said_and_left_out(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "loads.csv").write_text(LOADS)
+    _, told = answered(capsys, "session", "new", "s.toml", "--from", "loads.csv")
+    assert told["not_guessed"] == ["remark: no unit that is known; write 'NAME [unit]'"]
+    assert told["open"] == ["instrument", "date", "operator"]
+    # Cells that are read in units of force: no unit tells them from the loads.
+    (folder / "lbf.csv").write_text("run,direction,A [lbf],B [lbf],FY [N]\n1,up,0,0,0\n")
+    _, told = answered(capsys, "session", "new", "t.toml", "--from", "lbf.csv")
+    assert set(told["guessed"]) == {"data"}
+    assert {"indications", "loads"} <= set(told["open"])
+
+
+def test_a_belt_by_a_recording_of_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "run_01.csv").write_text("Fz [kN],SA [deg],gx [mV/V],gy [mV/V],FY [N]\n1,0,0,0,0\n")
+    code, told = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
+    assert (code, told["open"]) == (0, [])
+    machine = load_machine("belt.toml")
+    roles = {column.symbol: (column.unit, column.role) for column in machine.columns}
+    assert roles == {
+        "FZ": ("kN", "load"), "SA": ("deg", "slip_angle"), "gx": ("mV/V", "indication"),
+        "gy": ("mV/V", "indication"), "FY": ("N", "acquired"),
+    }  # fmt: skip
+    assert command("machine", "show", "belt.toml") == 0
+    assert command("test", "new", "test.toml", "--set", "machine=belt.toml", "--set", "date=2026-03-17") == 0
+    assert load_machine(read_test_folder(folder).info.machine).name == "belt-2"
+
+
+def test_a_plan_is_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, told = answered(capsys, "plan", "new", "plan.toml")
+    entries = ["date=2026-03-17", "tire.file=tire.tir", "tire.size=205/55R16", "seed=7"]
+    examples = Path(load_machine.__code__.co_filename).parents[1] / "examples" / "virtual"
+    (folder / "tire.tir").write_bytes((examples / "tire.tir").read_bytes())
+    needed = [entry for entry in entries if entry.partition("=")[0] in told["open"]]
+    _, told = answered(capsys, "plan", "new", "whole.toml", *sets(needed))
+    assert told["open"] == []
+    assert read_plan(folder / "whole.toml").seed is not None
+
+
+def test_a_person_is_asked_for_what_must_be_stated(folder: Path) -> None:
+    words = [sys.executable, "-m", "toolkit", "session", "new", "s.toml", "--ask", "--set", "instrument=rig"]
+    done = subprocess.run(
+        words, input="2026-02-03\nfirst person\n\n\n\n", capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "operator: a text" in done.stderr
+    text = (folder / "s.toml").read_text()
+    assert "date = 2026-02-03\n" in text
+    assert '\noperator = "first person"\n' in text
+    assert "\n#data = " in text

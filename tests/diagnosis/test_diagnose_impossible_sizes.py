@@ -1,0 +1,88 @@
+"""What no instrument does is not named after one, and a sign that a parameter's bound forbids is found."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.diagnosis.cases import write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
+
+NEWTON = """
+import numpy as np
+import pandas as pd
+def simulate(inputs, p):
+    fall = np.exp(-inputs["t"].to_numpy() / p["time_constant"])
+    return pd.DataFrame({"T": p["room"] + p["excess"] * fall})
+"""
+MUG = """schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.room]
+value = 21.0
+unit = "degC"
+sd = 3.0
+[simulation.parameters.excess]
+value = 60.0
+unit = "K"
+sd = 20.0
+[simulation.parameters.time_constant]
+value = 2000.0
+unit = "s"
+sd = 1000.0
+bounds = [60.0, 36000.0]
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+T = { unit = "degC", role = "output" }
+[[recording.run]]
+file = "r0.csv"
+"""
+DASHPOT = """
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"F": p["c"] * inputs["v"]})
+"""
+DAMPER = """schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.c]
+value = 5.0
+unit = "N*s/m"
+sd = 3.0
+bounds = [0.0, 50.0]
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+v = { unit = "m/s", role = "input" }
+F = { unit = "N", role = "output" }
+"""
+
+
+def test_a_mug_that_takes_up_heat_does_not_creep(tmp_path):
+    """Water and mug are two thermal masses: two decays, in closed form, where Newton's law has one."""
+    t = np.arange(220) * 30.0
+    heat = 22.0 + 52.0 * np.exp(-t / 3200.0) + 22.0 * np.exp(-t / 420.0)
+    shown = heat + np.random.default_rng(0).normal(0, 0.1, t.size)
+    case = write_case(tmp_path, MUG, simulator=NEWTON, r0__csv=pd.DataFrame({"t": t, "T": shown}))
+    answer = diagnose(read_case(case), None).diagnosis
+    assert answer.verdict == "unknown"
+    assert not answer.effects
+
+
+def test_a_wrong_sign_is_found_although_a_bound_forbids_it(tmp_path):
+    """Refitted with c >= 0 the simulation stands still, and from there a sign changes nothing."""
+    frames = {}
+    for k in range(3):
+        t = np.arange(200) * 0.05
+        v = np.sin(1.3 * t + k) + 0.4 * np.sin(4.1 * t)
+        noise = np.random.default_rng(k).normal(0, 0.3, t.size)
+        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "v": v, "F": -6.0 * v + noise})
+    toml = DAMPER + "".join(f'[[recording.run]]\nfile = "r{k}.csv"\n' for k in range(3))
+    answer = diagnose(read_case(write_case(tmp_path, toml, simulator=DASHPOT, **frames)), None).diagnosis
+    assert [effect.name for effect in answer.effects] == ["channel_sign"]
+    assert answer.nominal_parameters[0].after == pytest.approx(6.0, abs=0.1)

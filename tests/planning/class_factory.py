@@ -1,0 +1,94 @@
+"""A case whose recordings leave a class: a slow sine, in which late and lagging are alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.effects.applied import EffectKey
+
+SIMULATOR = """import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"F": p["gain"] * inputs["u"]})
+"""
+CASE = """schema = 1
+title = "a late force"
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.gain]
+value = 100.0
+unit = "N/mm"
+sd = 5.0
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+u = { unit = "mm", role = "input" }
+F = { unit = "N", role = "output", sd = 1.0 }
+[[recording.run]]
+file = "r0.csv"
+[[recording.run]]
+file = "r1.csv"
+"""
+DELAY = 0.03
+FREQUENCY = 0.2
+T = np.arange(500) * 0.02
+
+
+def late(u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The plant: 102 N/mm, late, 1 N of noise."""
+    return np.asarray(102 * np.interp(T - DELAY, T, u) + rng.normal(0, 1.0, len(T)))
+
+
+def write_case(folder: Path, **more: pd.DataFrame) -> Path:
+    """Write the case; ``more`` are further runs by name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = CASE
+    for number in range(2):
+        # From rest: neither member has to know what was before.
+        u = (2.0 - 0.5 * number) * np.sin(2 * np.pi * FREQUENCY * T) * np.minimum(T, 1.0)
+        run = pd.DataFrame({"t": T, "u": u, "F": late(u, np.random.default_rng(number))})
+        run.to_csv(folder / f"r{number}.csv", index=False)
+    for name, run in more.items():
+        run.to_csv(folder / f"{name}.csv", index=False)
+        text += f'[[recording.run]]\nfile = "{name}.csv"\n'
+    (folder / "sim.py").write_text(SIMULATOR, encoding="utf-8")
+    case = folder / "CASE.toml"
+    case.write_text(text, encoding="utf-8")
+    return case
+
+
+def problem(case: Path) -> Problem:
+    """The problem of the case, its code run in this process."""
+    read = read_case(case)
+    return problem_of(read, model_of(read, None))
+
+
+def found(name: str, *others: str, channel: str | None = "F") -> FoundEffect:
+    """An effect of an answer, with the others of its class."""
+    return FoundEffect(
+        key=EffectKey(name, channel), stage="acquisition", statement="", equation="", reference="",
+        parameters=(), equivalent_to=others, rejected=(), held_out_log_score_gain=100.0, p_value=0.0,
+    )  # fmt: skip
+
+
+def answer(case_sha256: str, *effects: FoundEffect) -> Diagnosis:
+    """An answer with effects."""
+    return Diagnosis(
+        title="t", case_sha256=case_sha256, verdict="equivalent", remaining="nothing", mismatch=(),
+        effects=effects, nominal_parameters=(), held_out=(), held_out_by="runs", depends_on=(), not_found=(),
+        next_measurements=(), findings=(), complete=True, skipped=(), recordings=(),
+    )  # fmt: skip
+
+
+def with_run(folder: Path, u: np.ndarray, seed: int) -> Problem:
+    """The problem with one more run, as the plant answers its inputs."""
+    more = pd.DataFrame({"t": T, "u": u, "F": late(u, np.random.default_rng(seed))})
+    return problem(write_case(folder, more=more))

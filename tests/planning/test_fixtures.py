@@ -1,0 +1,91 @@
+"""Fixtures become loads in the record's units, inside the limits, and nothing else does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.declared import read
+from toolkit.errors import ConfigError
+from toolkit.planning.fixtures import FeasibleLoads, LoadingFixtures, loads_of_fixtures
+from toolkit.planning.knowledge import Knowledge
+
+TEXT = """schema = 1
+instrument = "m15-virtual"
+[limit]
+FY = { value = 4448.2216152605, unit = "N" }
+[[fixture]]
+name = "lateral pull"
+per_newton = { FY = 1.0 }
+weights = { value = [500, 1000, 1500], unit = "lbf" }
+minutes = 3
+[[fixture]]
+name = "couple"
+per_newton = { MZ = 0.5, FY = 0.1 }
+weights = { value = [100], unit = "N" }
+both = false
+"""
+
+
+def made(folder: Path, knowledge: Knowledge, text: str = TEXT) -> FeasibleLoads:
+    path = folder / "fixtures.toml"
+    path.write_text(text)
+    return loads_of_fixtures(read(LoadingFixtures, path), knowledge.record, path)
+
+
+def test_weights_become_loads_in_the_records_units(tmp_path: Path, knowledge: Knowledge) -> None:
+    feasible = made(tmp_path, knowledge)
+    FY = feasible.loads[:, 0]
+    # The record is in lbf and lbf·ft: 500 and 1000 lbf both ways, 1500 lbf is beyond 1000 lbf (4448.2 N).
+    assert np.sort(FY)[:2] == pytest.approx([-1000, -500])
+    assert np.sort(FY)[-2:] == pytest.approx([500, 1000])
+    assert feasible.refused == 2
+    couple = feasible.mount.index("couple")
+    assert feasible.loads[couple, 1] == pytest.approx(100 * 0.5 / (4.4482216152605 * 0.3048))
+    assert feasible.loads[couple, 0] == pytest.approx(10 / 4.4482216152605)
+    assert feasible.mount[0] == ""
+    assert not feasible.loads[0].any()
+
+
+def test_the_top_of_a_mount_is_not_reached_from_above(tmp_path: Path, knowledge: Knowledge) -> None:
+    feasible = made(tmp_path, knowledge)
+    below = feasible.unloadable()
+    assert sorted(np.abs(feasible.loads[below, 0]).round().tolist()) == [0, 500, 500]
+
+
+def test_loads_of_a_session_are_those_it_put_on(knowledge: Knowledge, feasible: FeasibleLoads) -> None:
+    names = list(knowledge.names)
+    rows = np.concatenate([knowledge.loads.matrix(names), knowledge.check.matrix(names)])  # type: ignore[union-attr]
+    largest = np.abs(rows).max(axis=0)
+    for load in feasible.loads[1:]:
+        assert (np.abs(rows - load) / largest).max(axis=1).min() == 0
+    distance = np.abs(rows[:, None] / largest - feasible.loads / largest).max(axis=2).min(axis=1)
+    assert distance.max() < 0.021  # every load that was put on is there, within what counts as one load
+    assert feasible.minutes is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("per_newton = { FY = 1.0 }", "per_newton = { FX = 1.0 }", "FX"),
+        ("per_newton = { FY = 1.0 }", "per_newton = { FY = 0.0 }", "makes no load"),
+        ('weights = { value = [100], unit = "N" }', 'weights = { value = [], unit = "N" }', "weights"),
+        ('weights = { value = [100], unit = "N" }', 'weights = { value = [-1], unit = "N" }', "weights"),
+        ('name = "couple"', 'name = "lateral pull"', "lateral pull"),
+        ("value = 4448.2216152605", "value = 0.001", "limits leave no weight"),
+    ],
+)
+def test_fixtures_that_cannot_serve_are_refused(
+    tmp_path: Path, knowledge: Knowledge, old: str, new: str, said: str
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        made(tmp_path, knowledge, TEXT.replace(old, new))
+    assert said in str(refused.value)
+
+
+def test_an_empty_list_of_fixtures_is_refused(tmp_path: Path, knowledge: Knowledge) -> None:
+    with pytest.raises(ConfigError) as refused:
+        made(tmp_path, knowledge, 'schema = 1\ninstrument = "m15-virtual"\nfixture = []\n')
+    assert "fixture" in str(refused.value)

@@ -1,0 +1,78 @@
+"""Members of a class: fitted in each other's place, apart by what a run would show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.planning.class_factory import DELAY, answer, found, problem, write_case
+from toolkit.diagnosis.fit.noise import Autoregression
+from toolkit.errors import ConfigError
+from toolkit.planning.members import Predicted, class_of, expected_log_evidence, members_of
+
+
+def gaussian(mean: np.ndarray, spread: np.ndarray) -> Predicted:
+    return Predicted(outputs={"F": mean}, spread={"F": spread})
+
+
+def member(sd: float) -> Any:
+    return SimpleNamespace(fit=SimpleNamespace(noise={"F": Autoregression(reflection=(), sd=sd)}))
+
+
+RUN: Any = SimpleNamespace(t=np.arange(6.0), rows=6)
+
+
+def test_the_expected_log_evidence_is_the_divergence_of_two_gaussians() -> None:
+    # Kullback and Leibler's divergence with full covariance matrices, by its definition.
+    rng = np.random.default_rng(3)
+    means, spreads = rng.normal(size=(2, 6)), [rng.normal(size=(6, 2)), rng.normal(size=(6, 3))]
+    sd = 0.7
+    S = [sd**2 * np.eye(6) + W @ W.T for W in spreads]
+    gap = means[0] - means[1]
+    inverse = np.linalg.inv(S[1])
+    expected = 0.5 * (
+        np.trace(inverse @ S[0]) - 6 + gap @ inverse @ gap + np.log(np.linalg.det(S[1]) / np.linalg.det(S[0]))
+    )
+    true, other = (gaussian(mean, W) for mean, W in zip(means, spreads, strict=True))
+    assert expected_log_evidence(RUN, [member(sd)], true, other) == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_a_parameter_may_absorb_does_not_part() -> None:
+    shift = np.ones(6)
+    still, free = gaussian(np.zeros(6), np.zeros((6, 1))), gaussian(shift, 100 * shift[:, None])
+    bound = gaussian(shift, np.zeros((6, 1)))
+    assert expected_log_evidence(RUN, [member(0.1)], still, bound) == pytest.approx(300.0)
+    # The width of the open parameter costs its logarithm, and no more.
+    assert expected_log_evidence(RUN, [member(0.1)], still, free) < 10
+
+
+def test_the_noise_counts_under_which_two_are_less_apart() -> None:
+    a, b = gaussian(np.zeros(6), np.zeros((6, 0))), gaussian(np.ones(6), np.zeros((6, 0)))
+    assert expected_log_evidence(RUN, [member(0.1), member(1.0)], a, b) == pytest.approx(3.0)
+
+
+def test_members_are_fitted_in_each_others_place(tmp_path: Path) -> None:
+    posed = problem(write_case(tmp_path))
+    effect = found("channel_delay", "filter_lag")
+    members = members_of(posed, answer(posed.case.sha256, effect), effect)
+    assert {m.label for m in members} == {"channel_delay on F", "filter_lag on F"}
+    delay = next(m for m in members if m.label.startswith("channel_delay"))
+    assert delay.fit.active[-1].values["delay"] == pytest.approx(DELAY, abs=0.002)
+
+
+def test_an_answer_without_a_class_is_refused() -> None:
+    with pytest.raises(ConfigError) as error:
+        class_of(answer("0" * 64, found("relaxation")), "diagnosis.json")
+    assert error.value.rule == "plan-next"
+
+
+def test_a_class_of_which_one_member_can_be_fitted_is_refused(tmp_path: Path) -> None:
+    posed = problem(write_case(tmp_path))
+    effect = found("channel_delay", "conicity")  # there is no tire here
+    with pytest.raises(ConfigError) as error:
+        members_of(posed, answer(posed.case.sha256, effect), effect)
+    assert error.value.rule == "plan-next"

@@ -1,0 +1,97 @@
+"""The run that parts a class: faster where late and lagging are alike, and then the true one is ahead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.planning.class_factory import T, answer, found, problem, with_run, write_case
+from toolkit.planning.members import members_of
+from toolkit.planning.next_run import Change, RunSearch, changed, movable, power_of, reach
+
+EFFECT = found("channel_delay", "filter_lag")
+
+
+@pytest.fixture(scope="module")
+def search(tmp_path_factory: pytest.TempPathFactory) -> RunSearch:
+    posed = problem(write_case(tmp_path_factory.mktemp("class")))
+    members = members_of(posed, answer(posed.case.sha256, EFFECT), EFFECT)
+    return RunSearch(problem=posed, members=members, limits={})
+
+
+def test_the_proposed_run_is_faster_and_names_the_true_member(search: RunSearch, tmp_path: Path) -> None:
+    change = search.best()
+    assert change.rate > 1
+    chosen, repeat = search.judge(change), search.judge(Change(run=change.run))
+    assert chosen is not None
+    assert repeat is not None
+    assert chosen.power > max(repeat.power, 0.9)
+    assert chosen.together == ()
+    more = with_run(tmp_path, chosen.run.columns["u"], seed=9)
+    first, second = members_of(more, answer(more.case.sha256, EFFECT), EFFECT)
+    assert first.label == "channel_delay on F"
+    assert first.fit.log_posterior - second.fit.log_posterior > 3
+
+
+def test_inputs_stay_within_what_was_recorded_or_the_limits(search: RunSearch) -> None:
+    low, high = reach(search.problem, "u")
+    twice = Change(run="r0.csv", sizes=(("u", 2.0),))
+    assert changed(search.problem, twice, {}) is None
+    run = changed(search.problem, twice, {"u": (2 * low, 2 * high)})
+    assert run is not None
+    assert np.ptp(run.columns["u"]) == pytest.approx(
+        2 * np.ptp(search.problem.runs[0].columns["u"]), rel=1e-3
+    )
+
+
+def test_a_change_of_nothing_is_a_repeat(search: RunSearch) -> None:
+    run = changed(search.problem, Change(run="r1.csv"), {})
+    assert run is not None
+    np.testing.assert_allclose(run.columns["u"], search.problem.runs[1].columns["u"], atol=1e-12)
+
+
+def test_faster_inputs_come_again_there_and_back(search: RunSearch) -> None:
+    run = changed(search.problem, Change(run="r0.csv", rate=2.0), {})
+    assert run is not None
+    recorded = search.problem.runs[0].columns["u"]
+    np.testing.assert_allclose(run.columns["u"][:250], recorded[::2], atol=1e-9)
+    assert run.columns["u"][-1] == pytest.approx(recorded[0], abs=0.2)
+
+
+def test_a_rate_of_change_stays_that_of_its_channel(tmp_path: Path) -> None:
+    from tests.diagnosis.cases import carriage
+    from tests.diagnosis.cases import write_case as carriage_case
+
+    posed = problem(carriage_case(tmp_path, r0__csv=carriage(rows=400), r1__csv=carriage(seed=1, rows=400)))
+    assert dict(movable(posed)) == {"v": None, "a": "v"}
+    wide = {"v": (-9.0, 9.0), "a": (-9.0, 9.0)}
+    run = changed(posed, Change(run="r0.csv", rate=2.0, sizes=(("v", 0.5),)), wide)
+    assert run is not None
+    inner = slice(5, 180)  # before the way back
+    rate = np.gradient(run.columns["v"], run.t)
+    np.testing.assert_allclose(run.columns["a"][inner], rate[inner], atol=0.05)
+
+
+def test_the_power_is_that_of_the_nearest_of_the_others() -> None:
+    near = power_of([("a", "b", 3.0), ("a", "c", 300.0), ("b", "a", 300.0), ("c", "a", 300.0)])
+    assert near == pytest.approx((0.5 + 1 + 1) / 3, abs=1e-6)
+    assert power_of([("a", "b", 0.0), ("b", "a", -1e-9)]) == 0.0
+
+
+def test_the_operator_is_told_what_to_do() -> None:
+    change = Change(
+        run="r0.csv", rate=4.0, sizes=(("u", 0.0), ("v", 1.0)), conditions=(("mounting", "turned"),)
+    )
+    assert change.words() == (
+        "drive the inputs of r0.csv", "4 times as fast", "u held at its middle", "mounting: turned",
+    )  # fmt: skip
+
+
+def test_the_budget_ends_the_search(tmp_path: Path) -> None:
+    posed = problem(write_case(tmp_path))
+    members = members_of(posed, answer(posed.case.sha256, EFFECT), EFFECT)
+    spent = RunSearch(problem=posed, members=members, limits={}, until=lambda: False)
+    assert spent.best() == Change(run="r0.csv")
+    assert len(T) == posed.runs[0].rows

@@ -1,0 +1,97 @@
+"""The search for the least test: demands met by the whole budget, in fewer rows than the protocol."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from tests.characteristics.tire_factory import C_FY, M15, at_load
+from tests.planning.planning_factory import LOADS, earlier
+from toolkit.errors import ConfigError
+from toolkit.planning.demands import parse_demand
+from toolkit.planning.design import Design, Pace, standard
+from toolkit.planning.protocol_search import ProtocolSearch, Question, least_plan, load_sets
+
+PACE = Pace(condition_s=5.0, between_files_s=30.0)
+PROTOCOL = standard(M15, M15.rotations)
+
+
+def question(*demands: str, loads: tuple[float, ...] = LOADS) -> Question:
+    parsed = tuple(map(parse_demand, demands))
+    return Question.beside(PROTOCOL, earlier=earlier(), demands=parsed, loads_N=loads)
+
+
+def test_the_uncertainties_of_the_protocol_are_reached_in_fewer_rows() -> None:
+    asked = question("conicity", "plysteer", "slope_cornering", "peak")
+    found = least_plan(asked, PACE)
+    assert found.worst <= 1.0
+    assert found.design.rows < PROTOCOL.rows
+    # What is offered is judged by the whole budget, not by the screen.
+    again = asked.reaches(found.design)
+    assert max(reach.U / reach.limit for reach in again) == pytest.approx(found.worst)
+
+
+def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
+    asked = question("conicity=2 N", "slope_cornering=2 %")
+    search = ProtocolSearch(asked, PACE, LOADS)
+    for size in (8, 11, 14):
+        found = search.best(size)
+        screened = search._screen.criterion(search._best[size])
+        assert screened == pytest.approx(found.worst, rel=0.05)
+
+
+def test_more_slip_angles_are_never_worse() -> None:
+    search = ProtocolSearch(question("conicity"), PACE, LOADS)
+    worst = [search.best(size).worst for size in (7, 9, 11, 13)]
+    assert worst == sorted(worst, reverse=True)
+
+
+def test_a_demand_of_one_direction_needs_no_reversed_run() -> None:
+    found = least_plan(question("slope_cornering=3 %", loads=LOADS[2:3]), PACE)
+    assert found.design.rotations == ("forward",)
+
+
+def test_every_plan_measures_a_curve_to_its_peak_on_both_sides() -> None:
+    asked = question("conicity")
+    degrees = np.degrees(least_plan(asked, PACE).design.slip_angles_rad)
+    assert degrees.min() <= -8
+    assert degrees.max() >= 8
+    narrow = tuple(i for i, angle in enumerate(asked.candidates_rad) if abs(angle) < math.radians(3.5))
+    assert len(narrow) == 7
+    assert not asked.covers(narrow)
+
+
+def test_no_test_makes_smaller_what_all_rows_share() -> None:
+    floor = least_plan(question("plysteer=1 N", loads=LOADS[2:3]), PACE, minutes=60)
+    (reach,) = floor.reaches
+    assert floor.worst > 1
+    # 0.05 deg of the steering's zero by the cornering stiffness, k = 1.96.
+    stiffness = C_FY * at_load(LOADS[2])[0]
+    assert reach.U == pytest.approx(1.96 * math.radians(0.05) * stiffness, rel=0.05)
+
+
+def test_a_time_that_holds_no_curve_is_refused_with_the_least_that_does() -> None:
+    with pytest.raises(ConfigError) as error:
+        least_plan(question("conicity"), PACE, minutes=1.0)
+    assert error.value.rule == "plan-infeasible"
+    smallest = Design(slip_angles_rad=(0.0,) * 7, loads_N=LOADS, rotations=("forward", "reverse"))
+    assert f"{math.ceil(10 * PACE.minutes(smallest)) / 10} min" in str(error.value.expected)
+
+
+def test_further_loads_are_tried_the_nearest_first() -> None:
+    asked = question("conicity", loads=LOADS[2:3])
+    sets = load_sets(asked)
+    assert sets[0] == LOADS[2:3]
+    assert [len(loads) for loads in sets] == [1, 2, 3, 4, 5]
+    assert set(sets[2]) == set(LOADS[1:4])
+
+
+def test_a_demand_without_a_size_is_the_protocols() -> None:
+    asked = question("conicity")
+    for reach in asked.reaches(PROTOCOL):
+        assert reach.ratio == pytest.approx(1 / 1.05)
+    stricter = dataclasses.replace(asked, demands=(parse_demand("conicity=0.5 N"),))
+    assert {reach.limit for reach in stricter.reaches(PROTOCOL)} == {0.5}

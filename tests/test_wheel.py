@@ -1,0 +1,146 @@
+"""The wheel as a laboratory has it: everything in it, installed without root, used from another folder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tarfile
+import tomllib
+import venv
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.version import DISTRIBUTION, __version__
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "statsmodels", "pint", "openpyxl", "docx", "lxml", "rich"}
+
+
+def files_below(folder: Path) -> set[str]:
+    files = (path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    return {path.relative_to(folder).as_posix() for path in files}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from hatchling.builders.sdist import SdistBuilder
+    from hatchling.builders.wheel import WheelBuilder
+
+    folder = tmp_path_factory.mktemp("dist")
+    for builder in (WheelBuilder, SdistBuilder):
+        list(builder(str(ROOT)).build(directory=str(folder), versions=["standard"]))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def environment(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A new environment with nothing of the toolkit but the wheel; its libraries are those of this one."""
+    folder = tmp_path_factory.mktemp("environment")
+    venv.create(folder, with_pip=False)
+    site = next(folder.glob("lib/python*/site-packages"))
+    libraries = Path(np.__file__).parents[1]
+    # A folder that a .pth file names is searched; .pth files in it, an editable install's too, are not read.
+    (site / "libraries.pth").write_text(f"{libraries}\n")
+    wheel = next(built.glob("*.whl"))
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        str(folder / "bin" / "python"),
+        "--disable-pip-version-check",
+    ]
+    subprocess.run(
+        [*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)], check=True, env=clean(folder)
+    )
+    return folder
+
+
+def clean(home: Path) -> dict[str, str]:
+    """Return this process's variables without those that could lead back to the checkout."""
+    gone = {"PYTHONPATH", "TOOLKIT_HOME", "VIRTUAL_ENV"}
+    return {name: text for name, text in os.environ.items() if name not in gone} | {"HOME": str(home)}
+
+
+def test_the_name_is_stated_everywhere() -> None:
+    assert PROJECT["name"] == DISTRIBUTION
+    assert f'pip install "{DISTRIBUTION}[' in (ROOT / "README.md").read_text()
+    assert f"{DISTRIBUTION}[tdms]" in (ROOT / "toolkit" / "lab" / "rules.toml").read_text()
+
+
+def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) -> None:
+    (wheel,) = built.glob("*.whl")
+    assert wheel.name == f"{DISTRIBUTION.replace('-', '_')}-{__version__}-py3-none-any.whl"
+    with zipfile.ZipFile(wheel) as archive:
+        inside = {name for name in archive.namelist() if ".dist-info/" not in name}
+        metadata = archive.read(f"{wheel.name.rsplit('-', 3)[0]}.dist-info/METADATA").decode()
+    expected = {f"toolkit/{name}" for name in files_below(ROOT / "toolkit")}
+    for home in ("calibrations", "report_templates"):
+        expected |= {f"toolkit/_home/{home}/{name}" for name in files_below(ROOT / home)}
+    assert inside == expected
+    assert f"Name: {DISTRIBUTION}\n" in metadata
+    assert {f"Provides-Extra: {extra}" for extra in ("tdms", "mdf", "parquet", "cluster")} <= set(
+        metadata.splitlines()
+    )
+
+
+def test_the_source_distribution_holds_what_builds_and_tests_it(built: Path) -> None:
+    (source,) = built.glob("*.tar.gz")
+    with tarfile.open(source) as archive:
+        inside = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"pyproject.toml", "README.md", "LICENSE", "Makefile", "requirements.lock"} <= inside
+    assert {f"toolkit/{name}" for name in files_below(ROOT / "toolkit")} <= inside
+    assert {f"calibrations/{name}" for name in files_below(ROOT / "calibrations")} <= inside
+    assert "tests/test_wheel.py" in inside
+
+
+def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path) -> None:
+    """Init, a session, its approval, a test, its report and the demonstration, by the installed command."""
+    program = environment / "bin" / "toolkit"
+
+    def run(*words: object, codes: tuple[int, ...] = (0,)) -> str:
+        done = subprocess.run(
+            [program, *map(str, words)], cwd=tmp_path, env=clean(tmp_path), capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
+        assert done.returncode in codes, f"{words}\n{done.stdout}{done.stderr}"
+        return done.stdout
+
+    python = [environment / "bin" / "python", "-c", "import toolkit; print(toolkit.__file__)"]
+    place = subprocess.run(
+        python, cwd=tmp_path, env=clean(tmp_path), capture_output=True, text=True, check=True
+    )
+    assert Path(place.stdout.strip()).is_relative_to(environment)
+    assert run("--version").strip() == f"toolkit {__version__}"
+    assert "--no-browser" in run("open", "--help")
+    examples = Path(place.stdout.strip()).parent / "examples" / "virtual"
+    run("init", "lab")
+    run("simulate", examples / "session_plan.toml", "--out", "session", "--home", "lab")
+    run("calibrate", "session/SESSION.toml", "--home", "lab")
+    run("calibration", "approve", "m15-virtual-r1", "--in-force-from", "2026-03-03", "--checked-by",
+        "second person", "--reason", "the first record of this home", "--home", "lab")  # fmt: skip
+    run("simulate", examples / "test_plan.toml", "--out", "test", "--home", "lab")
+    run("process", "test", "--out", "test.xlsx", "--home", "lab", codes=(1,))
+    run("report", "test.xlsx", "--template", "lab/report_templates/org.docx", "--out", "out", "--home", "lab",
+        codes=(1,))  # fmt: skip
+    assert {path.suffix for path in (tmp_path / "out").iterdir()} >= {".docx", ".pdf"}
+    assert "verified: True" in run("demo", "--out", "demo")
+
+
+def test_help_needs_no_library_of_numbers_or_documents() -> None:
+    words = [["--help"], ["--version"], *([group, "--help"] for group in ("calibration", "fit", "open"))]
+    for each in words:
+        code = (
+            f"import sys; sys.argv[1:] = {each}\nfrom toolkit.__main__ import main\n"
+            "try: main()\nexcept SystemExit: pass\n"
+            "print(*sorted(sys.modules), file=sys.stderr)"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout
+        assert HEAVY.isdisjoint(done.stderr.split()), each
+    assert "typer" in done.stderr.split()

@@ -1,0 +1,281 @@
+"""A session that is typed or dropped: kept, tried as `calibrate --dry-run`, entered as by `calibrate`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_calibration_control import session
+from tests.workbench.conftest import Served, plain
+from tests.workbench.test_signing_page import People, people
+from toolkit.calibration.registry.registry import Registry
+from toolkit.cli.main import run as run_toolkit
+from toolkit.lab.drafts import open_draft
+
+__all__ = ["people"]
+Capture = pytest.CaptureFixture[str]
+
+
+def files_of(path: Path) -> dict[str, bytes]:
+    return {name: path.with_name(name).read_bytes() for name in (path.name, "loads.csv", "check.csv")}
+
+
+def dropped(bench: Served, path: Path) -> str:
+    """Drop the files of a session; return the id of its draft."""
+    files = [("files", name, data) for name, data in files_of(path).items()]
+    answer = bench.upload("/session", files, **{"from": "files"})
+    assert answer.status == 303, plain(answer.body)
+    return answer.headers["location"].rpartition("/")[2]
+
+
+def typed(bench: Served, draft: str) -> dict[str, str]:
+    """Return what the form of a draft holds."""
+    content = open_draft(bench.home, draft)
+    return {"session": content.session, **{key: text or "" for key, text in content.grids.items()}}
+
+
+def command(capsys: Capture, *words: object) -> dict[str, object]:
+    capsys.readouterr()
+    with pytest.raises(SystemExit):
+        run_toolkit([*map(str, words), "--json"])
+    answer: dict[str, object] = json.loads(capsys.readouterr().out)
+    return answer
+
+
+def registry_files(home: Path) -> dict[str, bytes]:
+    folder = home / "calibrations" / "cell"
+    return {
+        path.name: path.read_bytes()
+        for path in folder.iterdir()
+        if path.is_file() and path.name not in ("ledger.jsonl", "head.json")
+    }
+
+
+def test_dropped_files_are_entered_with_the_bytes_that_the_command_enters(
+    own: Served, tmp_path: Path, capsys: Capture
+) -> None:
+    path = session(tmp_path / "new", 2025, 0.1)
+    shutil.copytree(own.home, tmp_path / "other")
+    draft = dropped(own, path)
+    for name, data in files_of(path).items():
+        assert (own.home / "drafts" / draft / name).read_bytes() == data
+    done = own.send(f"/session/{draft}/enter", typed(own, draft))
+    assert (done.status, done.headers["location"]) == (303, f"{own.place}/record/cell-r8")
+    by_command = command(capsys, "calibrate", path, "--home", tmp_path / "other")
+    assert by_command["record"]["id"] == "cell-r8"  # type: ignore[index]
+    assert registry_files(own.home) == registry_files(tmp_path / "other")
+    assert not (own.home / "drafts" / draft).exists()
+    assert (own.home / "sessions" / "cell-r8" / "loads.csv").read_bytes() == path.with_name(
+        "loads.csv"
+    ).read_bytes()
+    assert own.page(f"/session/{draft}").status == 404
+
+
+def test_what_is_tried_is_what_the_dry_run_says(own: Served, tmp_path: Path, capsys: Capture) -> None:
+    path = session(tmp_path / "new", 2025, 0.8)
+    before = registry_files(own.home)
+    draft = dropped(own, path)
+    part = own.send(f"/session/{draft}/rehearse", typed(own, draft), HX_Request="true")
+    assert part.status == 200
+    dry = command(capsys, "calibrate", path, "--home", own.home, "--dry-run", "--full")
+    assert 'data-record="cell-r8"' in part.body
+    for finding in dry["findings"]:  # type: ignore[attr-defined]
+        assert finding["message"] in plain(part.body).replace("&#39;", "'").replace("&#34;", '"')
+    fit = dry["loads"]["FY"]["report"]  # type: ignore[index]
+    values = [float(value) for value in part.data(load="FY")]
+    for term in fit["coefficients"].values():
+        assert {term["value"], term["standard_error"]} <= set(values)
+    assert set(fit["rows"]["residual"]) <= set(values)
+    assert set(fit["rows"]["cook"]) <= set(values)
+    for name in ("gates", "responses", "fit", "budget", "as_found"):
+        assert f'data-part="{name}"' in part.body
+    assert "compared with cell-r1" in plain(part.body).lower()
+    assert registry_files(own.home) == before, "a dry run makes nothing"
+
+
+def test_rows_pasted_with_tabs_and_decimal_commas_are_read(own: Served, tmp_path: Path) -> None:
+    path = session(tmp_path / "new", 2025, 0.0)
+    answer = own.send("/session", {"instrument": "cell", "date": "2025-03-01", "operator": "A"})
+    draft = answer.headers["location"].rpartition("/")[2]
+    content = typed(own, draft)
+    assert content["data"] == "S [mV/V]\tFY [N]\trun\tdirection\n"
+    assert "polarity" not in content["session"], "a reading of the last session is none of this one"
+    rows = path.with_name("loads.csv").read_text().splitlines()[1:]
+    pasted = [row.replace(",", "\t").replace(".", ",") for row in rows]
+    content["data"] += "\r\n".join(pasted) + "\r\n"
+    assert "check" not in content["session"]
+    content["session"] += '[[polarity]]\nload = "FY"\nvalue = { value = 500, unit = "N" }\n'
+    content["session"] += 'indications = { S = { value = 1.01, unit = "mV/V" } }\n'
+    content["check"] = "S [mV/V]\tFY [N]\n0,9\t450\n"
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    assert 'data-record="cell-r8"' in part.body, plain(part.body)
+    values = [float(value) for value in part.data(load="FY")]
+    assert min(abs(value - 500.0) for value in values) < 0.01, "0.002 mV/V per N: 500 N per mV/V"
+    # The form still holds the statements as they were typed, without the check loads' own.
+    for _ in range(2):
+        part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+        assert "no-check" not in part.body
+    assert own.send(f"/session/{draft}/enter", content).status == 303
+    record = own.registry.load("cell-r8")
+    assert record.data_file("check") is not None
+    assert record.load("FY").coefficients[0] == pytest.approx(500, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("line", "column", "text"), [(4, 0, "1,2,3"), (2, 1, ""), (8, 1, "x"), (5, 2, "1.5")]
+)
+def test_an_error_is_told_at_its_cell(own: Served, tmp_path: Path, line: int, column: int, text: str) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    content = typed(own, draft)
+    rows = [row.split("\t") for row in content["data"].splitlines()]
+    rows[line - 1][column] = text
+    content["data"] = "\n".join("\t".join(row) for row in rows)
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    fault = part.body.partition('data-fault="')[2].partition('"')[0].replace("&#34;", '"')
+    assert json.loads(fault) == {"table": "data", "line": line, "column": column}
+    # It is kept as it was typed, and refused at the entry too, with the same reason.
+    assert typed(own, draft)["data"] == content["data"] + "\n"
+    refused = own.send(f"/session/{draft}/enter", content)
+    assert (refused.status, "holds no usable value" in plain(refused.body)) == (400, True)
+    assert "cell-r8" not in own.registry.ids("cell")
+
+
+def test_statements_that_are_no_toml_are_kept_and_told(own: Served, tmp_path: Path) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    for statements in ("= nothing", "schema = 1\nunknown = 2\n", "\x00", ""):
+        content = typed(own, draft) | {"session": statements}
+        part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+        assert part.status == 200
+        assert "next step" in plain(part.body)
+        # Where it can be read, the check loads that are typed are stated before it.
+        assert open_draft(own.home, draft).session.removeprefix('check = "check.csv"\n') == statements
+        assert own.page(f"/session/{draft}").status == 200
+        assert own.page("/agenda/drafts").data(count="drafts") == ["1"]
+
+
+def test_what_is_typed_outlives_the_browser_and_the_server(own: Served, tmp_path: Path) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    content = typed(own, draft)
+    content["data"] = content["data"].replace("0.2", "0.3", 1)
+    assert own.send(f"/session/{draft}/save", content).status == 204
+    assert own.page(f"/session/{draft}").body.count("0.3") > 0
+    assert typed(own, draft) == content
+    # What was not changed keeps its bytes: commas stay commas.
+    assert "," in (own.home / "drafts" / draft / "check.csv").read_text()
+
+
+def test_a_workbook_is_read_as_it_lies_there(own: Served, tmp_path: Path) -> None:
+    from openpyxl import Workbook
+
+    path = session(tmp_path / "new", 2025, 0.0)
+    book = Workbook()
+    for row in path.with_name("loads.csv").read_text().splitlines():
+        book.active.append([float(cell) if cell[0].isdigit() else cell for cell in row.split(",")])
+    book.save(tmp_path / "loads.xlsx")
+    draft = dropped(own, path)
+    answer = own.upload(
+        f"/session/{draft}/files", [("files", "loads.xlsx", (tmp_path / "loads.xlsx").read_bytes())]
+    )
+    assert answer.status == 303
+    content = typed(own, draft)
+    content["session"] = content["session"].replace("loads.csv", "loads.xlsx")
+    content.pop("data")
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    assert 'data-record="cell-r8"' in part.body, plain(part.body)
+    assert (own.home / "drafts" / draft / "loads.xlsx").read_bytes() == (tmp_path / "loads.xlsx").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "name", ["../people.toml.csv", "/etc/x.csv", ".hidden", "a/b.csv", "", "x" * 300, "a\\b.csv"]
+)
+def test_a_file_of_a_foreign_name_is_refused(own: Served, tmp_path: Path, name: str) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    answer = own.upload(f"/session/{draft}/files", [("files", name, b"a,b\n1,2\n")])
+    assert answer.status == 400
+    assert len(list((own.home / "drafts" / draft).iterdir())) == 3
+
+
+@pytest.mark.parametrize(
+    "path", ["/session/draft-9", "/session/..%2f..", "/session/draft-1%2f..", "/session/x"]
+)
+def test_no_address_of_a_draft_names_a_folder(own: Served, path: str) -> None:
+    assert own.page(path).status == 404
+    assert own.send(f"{path}/discard", {}).status == 404
+
+
+def test_statements_never_lead_the_tables_out_of_the_draft(own: Served, tmp_path: Path) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    (own.home / "secret.csv").write_text("S [mV/V],FY [N]\n1,2\n")
+    content = typed(own, draft)
+    content["session"] = content["session"].replace('"loads.csv"', '"../../secret.csv"')
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    assert "outside" in part.body
+    assert (own.home / "secret.csv").read_text() == "S [mV/V],FY [N]\n1,2\n"
+
+
+def test_sessions_that_begin_at_once_are_two_and_one_cut_off_is_empty(own: Served) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    form = {"instrument": "cell", "date": "2025-03-01", "operator": "A"}
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: own.send("/session", form), range(4)))
+    assert [answer.status for answer in answers] == [303] * 4
+    assert len({answer.headers["location"] for answer in answers}) == 4
+    (own.home / "drafts" / "draft-9").mkdir()
+    (own.home / "drafts" / "draft-10").mkdir()
+    (own.home / "drafts" / "draft-10" / "SESSION.toml").mkdir()
+    assert own.page("/agenda/drafts").data(count="drafts") == ["6"]
+    assert own.page("/session").status == 200
+    assert own.page("/session/draft-9").status == 200
+    assert own.page("/session/draft-10").status == 400
+    for name in ("draft-9", "draft-10"):
+        assert own.send(f"/session/{name}/discard", {}).status == 303
+
+
+def test_a_draft_is_removed_when_asked(own: Served, tmp_path: Path) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    assert own.send(f"/session/{draft}/discard", {}).status == 303
+    assert not (own.home / "drafts" / draft).exists()
+
+
+def test_a_session_that_is_recorded_leads_to_its_record(own: Served) -> None:
+    path = own.home / "sessions" / "s0" / "SESSION.toml"
+    draft = dropped(own, path)
+    part = own.send(f"/session/{draft}/rehearse", typed(own, draft), HX_Request="true")
+    assert 'data-existing="true"' in part.body
+    done = own.send(f"/session/{draft}/enter", typed(own, draft))
+    assert done.headers["location"].endswith("/record/cell-r1")
+    assert "cell-r8" not in own.registry.ids("cell")
+
+
+def test_where_people_are_enrolled_the_entry_is_requested_and_signed(people: People, tmp_path: Path) -> None:
+    bench = people.bench
+    draft = dropped(bench, session(tmp_path / "new", 2025, 0.0))
+    requested = bench.send(f"/session/{draft}/enter", typed(bench, draft))
+    assert requested.headers["location"].endswith(f"/session/{draft}#decision")
+    body = bench.page(f"/session/{draft}").body
+    assert "to be signed" in plain(body).lower()
+    # What is signed stays what was requested.
+    bench.send(f"/session/{draft}/save", typed(bench, draft) | {"session": "changed"})
+    assert "changed" not in open_draft(bench.home, draft).session
+    assert bench.send(f"/session/{draft}/discard", {}).status == 400
+    answer = people.signed("carl", bench.page(f"/request/{draft}").body)
+    forged = people.hand_in(answer.replace('"by": "carl"', '"by": "anna"'), draft)
+    assert (forged.status, "a signature proves nothing" in plain(forged.body)) == (400, True)
+    done = people.hand_in(answer, draft)
+    assert done.headers["location"].endswith("/record/cell-r8"), plain(done.body)
+    entry = Registry(bench.registry.folder).ledger("cell").entries[-1]
+    assert (entry.id, entry.signatures[0]["by"]) == ("cell-r8", "carl")
+    assert not (bench.home / "drafts" / draft).exists()
+
+
+def test_hostile_words_of_a_draft_stay_text(own: Served, tmp_path: Path) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    hostile = '</textarea><script>alert(1)</script>{{ 7*7 }}"'
+    own.send(f"/session/{draft}/save", {"session": f"# {hostile}", "data": hostile, "check": hostile})
+    body = own.page(f"/session/{draft}").body
+    assert "<script>alert" not in body
+    assert "{{ 7*7 }}" in body

@@ -1,0 +1,79 @@
+"""Groups of commands that build the command that is called and no other: ``--help`` needs no options."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+from collections.abc import Callable, Iterator, MutableMapping
+from functools import partial
+from typing import Any
+
+from typer import Typer
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command_from_info, get_command_name, get_group_from_info
+from typer.models import CommandInfo, TyperInfo
+
+Finish = Callable[[Any], None]
+"""What is done to each command once it is built."""
+
+
+class Group(TyperGroup):
+    """A group whose help is printed from the docstrings of its commands; their options wait."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write each command's name and first sentence."""
+        commands: Any = self.commands
+        titles: Any = {name: TyperCommand(name, help=text) for name, text in commands.titles.items()}
+        TyperGroup(commands=titles, rich_markup_mode=None).format_commands(ctx, formatter)
+
+
+class Commands(MutableMapping[str, Any]):
+    """The commands of a group by name, each built when it is first asked for."""
+
+    def __init__(self, app: Typer, finish: Finish) -> None:
+        self.titles: dict[str, str] = {}
+        self._build: dict[str, Callable[[], Any]] = {}
+        self._built: dict[str, Any] = {}
+        for command in app.registered_commands:
+            name = command.name or get_command_name(getattr(command.callback, "__name__", ""))
+            self.titles[name] = inspect.getdoc(command.callback) or ""
+            self._build[name] = partial(_command, command, finish)
+        for below in app.registered_groups:
+            inner, name = below.typer_instance or Typer(), below.name or ""
+            self.titles[name] = inner.info.help or ""
+            self._build[name] = partial(build_group, inner, finish, name=name)
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._built:
+            self._built[name] = self._build[name]()
+        return self._built[name]
+
+    def __setitem__(self, name: str, command: Any) -> None:
+        raise TypeError("commands are registered, never set")
+
+    def __delitem__(self, name: str) -> None:
+        raise TypeError("commands are registered, never removed")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._build)
+
+    def __len__(self) -> int:
+        return len(self._build)
+
+
+def build_group(app: Typer, finish: Finish, *, name: str | None = None) -> Any:
+    """Return the group of an app; ``finish`` is called with each command once it is built."""
+    bare = copy.copy(app)
+    bare.registered_commands, bare.registered_groups = [], []
+    group = get_group_from_info(
+        TyperInfo(bare, name=name, cls=Group), pretty_exceptions_short=False, rich_markup_mode=None,
+        suggest_commands=app.suggest_commands,
+    )  # fmt: skip
+    group.commands = Commands(app, finish)
+    return group
+
+
+def _command(info: CommandInfo, finish: Finish) -> Any:
+    command = get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
+    finish(command)
+    return command

@@ -1,0 +1,135 @@
+"""`toolkit plan`: what to measure next, from what the laboratory's records know and lack."""
+
+from __future__ import annotations
+
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, KnownAt, Quiet, answer, day, exit_code, into_folder
+from toolkit.errors import ConfigError
+
+app = typer.Typer(help="Plans: what to measure next: sessions, tests, runs, intervals.", no_args_is_help=True)
+
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", callback=into_folder, help="Folder for the plan's files; none of them may exist."),
+]
+
+
+@app.command("session")
+def session(
+    instrument: Annotated[
+        str, typer.Argument(help="Instrument, such as m15: its record in force is the basis.")
+    ],
+    session_file: Annotated[
+        Path | None, typer.Option("--session", metavar="FILE", help="SESSION.toml to plan from instead.")
+    ] = None,
+    fixtures: Annotated[
+        Path | None,
+        typer.Option(
+            "--fixtures",
+            metavar="FILE",
+            help="Loading fixtures (.toml): weights, arms, minutes; default: the loads of the last session.",
+        ),
+    ] = None,
+    demands: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--u", metavar="LOAD=U", help='U asked for at the largest load, "FY=20 N"; once a load.'
+        ),
+    ] = None,
+    minutes: Annotated[
+        float | None, typer.Option("--minutes", help="Time at most, check loads included.")
+    ] = None,
+    loads: Annotated[int | None, typer.Option("--loads", help="Loads at most, check loads apart.")] = None,
+    criterion: Annotated[
+        str, typer.Option("--criterion", help="D, I or G: of what the loads are optimal.")
+    ] = "D",
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Of the search and of the simulated sessions.")
+    ] = 0,
+    on: Annotated[
+        datetime | None,
+        typer.Option(
+            "--on", formats=["%Y-%m-%d"], help="Day whose record in force is taken; default: today."
+        ),
+    ] = None,
+    out: Out = None,
+    known_at: KnownAt = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Plan the loads of the next calibration session, in their order.
+
+    The fewest loads that keep a stated U, or the least U in a stated time or number of loads; without any of
+    these today's U within a twentieth. U is that of 'toolkit calibration budget', with what the record knows
+    of the scatter within runs and between them. Check loads verify the sign of every coefficient by five
+    tolerances.
+
+    --out gets SESSION.toml, loads.csv and check.csv, which 'toolkit calibrate' reads once the readings are
+    filled in, and the operator's sheet.
+
+    Example: toolkit plan session m15-virtual --u "FY=1.2 N" --out next
+    """
+    from toolkit.lab.home import open_registry
+    from toolkit.lab.plan_session import PlanOrder, session_plan_answer
+    from toolkit.planning.row_exchange import CRITERIA
+
+    if criterion not in CRITERIA:
+        raise ConfigError(
+            "an unknown criterion", where="--criterion", got=criterion, expected=", ".join(CRITERIA),
+            next_step="name one of those", rule="usage",
+        )  # fmt: skip
+    started = time.perf_counter()
+    order = PlanOrder(
+        instrument=instrument, session=session_file, fixtures=fixtures, demands=tuple(demands or ()),
+        minutes=minutes, loads=loads, criterion=criterion, seed=seed, on=day(on),
+        known_at=day(known_at), out=out,
+    )  # fmt: skip
+    payload, text, findings = session_plan_answer(open_registry(calibrations, home), order)
+    payload["timing"] = {"seconds": time.perf_counter() - started}
+    answer(payload, text, as_json=json, quiet=quiet)
+    return exit_code(findings)
+
+
+@app.command("interval")
+def interval(
+    instrument: Annotated[
+        str, typer.Argument(help="Instrument, such as m15: by the history of its check loads.")
+    ],
+    reliability: Annotated[
+        float, typer.Option("--reliability", help="Chance to be inside the tolerance at the interval's end.")
+    ] = 0.95,
+    tests: Annotated[
+        float | None, typer.Option("--tests", help="Tests a year, for how many of them are put at risk.")
+    ] = None,
+    load: Annotated[str | None, typer.Option("--load", help="By the errors of this load only.")] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Plan when to calibrate again: the longest interval that keeps a reliability at its end.
+
+    Drift between sessions is a state-space model (level, trend, random walk) of each check load's errors, by
+    the record before; the path that drifts most decides. ILAC-G24's method 2 stands beside it. Nothing is
+    entered: the interval in use is set on approval.
+
+    Example: toolkit plan interval m15-virtual --reliability 0.95 --tests 200
+    """
+    from toolkit.lab.home import open_registry
+    from toolkit.lab.plan_interval import interval_plan_answer
+
+    started = time.perf_counter()
+    payload, text, findings = interval_plan_answer(
+        open_registry(calibrations, home), instrument, reliability=reliability, tests_a_year=tests, load=load
+    )
+    payload["timing"] = {"seconds": time.perf_counter() - started}
+    answer(payload, text, as_json=json, quiet=quiet)
+    return exit_code(findings)

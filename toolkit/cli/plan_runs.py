@@ -1,0 +1,153 @@
+"""`toolkit plan test` and `plan next`: which runs to make next, and how few of them are enough."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import (
+    CalibrationId,
+    Calibrations,
+    Draft,
+    Home,
+    Isolated,
+    Json,
+    Memory,
+    Processes,
+    Quiet,
+    answer,
+    into_folder,
+    progress,
+)
+from toolkit.cli.plan import app
+
+
+@app.command("test")
+def protocol(
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            "--like",
+            metavar="TEST|TIRE",
+            help="Earlier test of such a tire, or a tire file (.tir, model.toml); default: the published "
+            "passenger tire on the virtual machine.",
+        ),
+    ] = None,
+    u: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--u",
+            metavar="NAME=U",
+            help="Largest expanded uncertainty: 'conicity=2 N', 'slope_cornering=2 %', 'FY@8deg=40 N', "
+            "'peak=1 %'; a name alone: that of the machine's protocol. Repeatable; default: "
+            "slope_cornering, conicity, plysteer and peak as by the protocol.",
+        ),
+    ] = None,
+    load: Annotated[
+        list[str] | None,
+        typer.Option("--load", metavar="LOAD", help="At which load, '833 lbf'; repeatable; default: all."),
+    ] = None,
+    minutes: Annotated[
+        float, typer.Option("--minutes", min=0.0, help="Time on the machine at most.")
+    ] = math.inf,
+    between_files: Annotated[
+        float | None,
+        typer.Option("--between-files", metavar="SECONDS", min=0.0,
+                     help="From one recording to the next; default 30."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            callback=into_folder,
+            help="Folder for protocol.toml and the plan.toml of `toolkit simulate`.",
+        ),
+    ] = None,
+    calibration: CalibrationId = None,
+    draft: Draft = False,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:  # fmt: skip
+    """Plan the shortest test that reaches stated uncertainties.
+
+    Slip angles, repeats, loads and directions, by the budget that `toolkit process` prints. A demand that no
+    test meets ends with 2 and the nearest plan that is feasible.
+
+    Example: toolkit plan test --like tests/2019-06-04 --u "conicity=2 N" --load "833 lbf" --out plan
+    """
+    from toolkit.lab.protocol_plan import ProtocolOrder, plan_test
+
+    started = time.perf_counter()
+    order = ProtocolOrder(
+        like=like, demands=tuple(u or ()), loads=tuple(load or ()), minutes=minutes,
+        between_files_s=between_files, calibration=calibration, calibrations=calibrations, home=home,
+        draft=draft,
+    )  # fmt: skip
+    with progress(None, "planning", show=not (json or quiet)) as step:
+        payload, text = plan_test(order, out, tell=step)
+    payload["timing"] = {"seconds": time.perf_counter() - started}
+    answer(payload, text, as_json=json, quiet=quiet)
+    return 0
+
+
+@app.command("next")
+def following(
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its diagnosis.json."),
+    ],
+    case: Annotated[
+        Path | None, typer.Option("--case", help="The case; default: the one that the answer's model names.")
+    ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="NAME=LOW..HIGH",
+            help="What an input may reach, in its unit; repeatable; default: what was recorded.",
+        ),
+    ] = None,
+    budget: Annotated[float, typer.Option("--budget", min=1.0, help="Seconds of the search.")] = 45.0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            callback=into_folder,
+            help="Folder for the inputs, what each member predicts, and the steps.",
+        ),
+    ] = None,
+    isolated: Isolated = False,
+    memory: Memory = None,
+    processes: Processes = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Propose the run that tells the members of a diagnosis' class apart.
+
+    Each member is fitted to the recordings in the others' place. Runs are those that were made, with inputs
+    faster or slower, larger or smaller, one alone, and conditions changed: the one is proposed in which the
+    members' predictions are furthest apart beyond noise and what is open of their parameters.
+
+    Example: toolkit plan next answer --out next
+    """
+    from toolkit.lab.diagnosis import worker_limits
+    from toolkit.lab.next_run import plan_next
+
+    started = time.perf_counter()
+    with progress(None, "planning", show=not (json or quiet)) as step:
+        payload, text = plan_next(
+            source, out, case=case, limits=tuple(limit or ()), budget_s=budget, calibrations=calibrations,
+            home=home, worker=worker_limits(isolated=isolated, memory_GB=memory, processes=processes),
+            tell=step,
+        )  # fmt: skip
+    payload["timing"] = {"seconds": time.perf_counter() - started}
+    answer(payload, text, as_json=json, quiet=quiet)
+    return 0

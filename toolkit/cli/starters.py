@@ -1,0 +1,131 @@
+"""`toolkit session|machine|test|case|plan new`: commented files to fill in, from the declarations."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer
+
+NEW = "new"
+_FILE = typer.Argument(metavar="FILE", help="A new .toml file; nothing is written over.")
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="State an entry; KEY may be TABLE.KEY; once for each entry."
+    ),
+]
+From = Annotated[
+    Path | None,
+    typer.Option("--from", metavar="RECORDING", help="Guess from the columns and units of a recording."),
+]
+Ask = Annotated[
+    bool | None,
+    typer.Option(
+        "--ask/--no-ask",
+        help="Ask for what must be stated; default: on a terminal, without --json and --quiet.",
+    ),
+]
+
+session = typer.Typer(help="Calibration sessions: begin a file.", no_args_is_help=True)
+test = typer.Typer(help="Tests: begin a file.", no_args_is_help=True)
+case = typer.Typer(help="Cases of a diagnosis: begin a file.", no_args_is_help=True)
+
+
+@session.callback()
+@test.callback()
+@case.callback()
+def _group() -> None:
+    pass
+
+
+@session.command(NEW)
+def new_session(
+    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
+    json: Json = False, quiet: Quiet = False,
+) -> int:  # fmt: skip
+    """Begin a session file; --from takes loads and indications from a table's headers and units.
+
+    Example: toolkit session new SESSION.toml --from loads.csv --set instrument=press-7
+    """
+    return _begin("session", file, entries, recording, ask=ask, json=json, quiet=quiet)
+
+
+def new_machine(
+    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
+    json: Json = False, quiet: Quiet = False,
+) -> int:  # fmt: skip
+    """Begin a machine definition; --from takes the columns from a recording's headers and units.
+
+    Example: toolkit machine new belt.toml --from run_01.csv --set name=belt-2
+    """
+    return _begin("machine", file, entries, recording, ask=ask, json=json, quiet=quiet)
+
+
+@test.command(NEW)
+def new_test(
+    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
+    quiet: Quiet = False,
+) -> int:  # fmt: skip
+    """Begin the test.toml of a folder of recordings.
+
+    Example: toolkit test new test.toml --set machine=m15 --set date=2026-03-17
+    """
+    return _begin("test", file, entries, None, ask=ask, json=json, quiet=quiet)
+
+
+@case.command(NEW)
+def new_case(
+    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
+    quiet: Quiet = False,
+) -> int:  # fmt: skip
+    """Begin a case: a simulation and the recordings that it is held against.
+
+    Example: toolkit case new CASE.toml
+    """
+    return _begin("case", file, entries, None, ask=ask, json=json, quiet=quiet)
+
+
+def new_plan(
+    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
+    quiet: Quiet = False,
+) -> int:  # fmt: skip
+    """Begin a plan of the virtual machine.
+
+    Example: toolkit plan new plan.toml --set date=2026-03-17
+    """
+    return _begin("plan", file, entries, None, ask=ask, json=json, quiet=quiet)
+
+
+def _begin(
+    word: str, file: Path, words: list[str] | None, recording: Path | None, *, ask: bool | None, json: bool,
+    quiet: bool,
+) -> int:  # fmt: skip
+    from toolkit.lab.starters import entries_of, refuse_existing, start, starter_text
+    from toolkit.publication import write_result
+
+    refuse_existing(file)
+    entries = entries_of(words or ())
+    starter = start(word, entries, recording, file=file)
+    if ask or (ask is None and sys.stdin.isatty() and not (json or quiet)):
+        starter = start(word, entries | _asked(starter.open, starter.helps), recording, file=file)
+    write_result(file, starter.text)
+    payload = {"path": file, "guessed": starter.guess.values, "not_guessed": list(starter.guess.silent)}
+    payload |= {"open": list(starter.open)}
+    answer(payload, starter_text(word, file, starter), as_json=json, quiet=quiet)
+    return 0
+
+
+def _asked(names: tuple[str, ...], helps: dict[str, str]) -> dict[str, Any]:
+    from toolkit.lab.starters import entries_of
+
+    typer.echo("what is left empty stays open in the file", err=True)
+    words = []
+    for name in names:
+        if "[" not in name:
+            text = typer.prompt(f"{name}: {helps[name]}", default="", show_default=False, err=True)
+            words += [f"{name}={text}"] if text.strip() else []
+    return entries_of(words)

@@ -1,0 +1,275 @@
+"""Interlaboratory comparison: ISO 13528 scores of each laboratory, ISO 5725-2 precision of the method.
+
+The assigned value x_pt is that of a reference laboratory, with its stated uncertainty, or the consensus of
+all by algorithm A. With sigma_pt, stated or robust, U = k u:
+
+    z' = (x - x_pt) / sqrt(sigma_pt^2 + u(x_pt)^2)          (9.5)
+    zeta = (x - x_pt) / sqrt(u(x)^2 + u(x_pt)^2)            (9.6)
+    E_n = (x - x_pt) / sqrt(U(x)^2 + U(x_pt)^2)             (9.7)
+
+Precision is the one-way analysis of variance of `precision`, for laboratories with different numbers of
+results too. Cochran's test looks for a laboratory that scatters more, Grubbs' for a mean that lies apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from toolkit.comparison.model import Spread
+from toolkit.comparison.precision import factor_spread, spread
+from toolkit.comparison.robust import algorithm_a
+from toolkit.comparison.significance import grubbs_p
+from toolkit.errors import ConfigError
+from toolkit.findings import Finding
+
+Signal = Literal["action", "warning"]
+K = 2.0
+FEW = 12
+"""Laboratories below which a robust consensus of 13528 is weak (its annex D)."""
+FEWEST = 3
+OUTLIER = 0.01
+LIMIT = 2.8  # 1.96 sqrt(2): between two results
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """What a laboratory reports of a measurand: results, and U of their mean with k (None: not stated)."""
+
+    laboratory: str
+    values: tuple[float, ...]
+    U: float | None = None
+    k: float = K
+
+    @property
+    def mean(self) -> float:
+        """Mean of its results."""
+        return math.fsum(self.values) / len(self.values)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """A laboratory's scores; z' is None without sigma_pt, zeta and E_n where it states no uncertainty.
+
+    ``signal`` is that of z' (beyond 2 a warning, from 3 an action), ``En_signal`` tells an E_n from 1 on.
+    """
+
+    laboratory: str
+    n: int
+    mean: float
+    U: float | None
+    z_prime: float | None
+    zeta: float | None
+    En: float | None
+    signal: Signal | None
+    En_signal: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodPrecision:
+    """Repeatability and reproducibility (ISO 5725-2); without repeats there is no repeatability.
+
+    ``s_r`` with its interval, ``s_L`` between laboratories, ``s_R``; limits r and R between two results;
+    ``cochran_p`` of the laboratory that scatters most, ``grubbs_p`` of the mean farthest off.
+    """
+
+    laboratories: int
+    n: int
+    mean: float
+    s_r: Spread | None
+    s_L: float | None
+    s_R: float
+    r: float | None
+    R: float
+    cochran_p: float | None
+    cochran_laboratory: str | None
+    grubbs_p: float | None
+    grubbs_laboratory: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurand:
+    """The comparison of a measurand: assigned value with its standard uncertainty, sigma_pt, scores.
+
+    ``sigma_pt`` is None where it is not stated and too few laboratories tell it; ``precision`` of one alone.
+    """
+
+    name: str
+    unit: str
+    assigned: float
+    u_assigned: float
+    assigned_by: str
+    sigma_pt: float | None
+    sigma_by: str
+    scores: tuple[Score, ...]
+    precision: MethodPrecision | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaboratoryComparison:
+    """All measurands of a comparison."""
+
+    measurands: tuple[Measurand, ...]
+    findings: tuple[Finding, ...]
+
+
+def compare_laboratories(
+    reported: dict[str, Sequence[Results]], *, unit: str, reference: str | None, sigma: float | None
+) -> LaboratoryComparison:
+    """Compare laboratories in every measurand.
+
+    Parameters
+    ----------
+    reported : the results of every laboratory by measurand
+    unit : of all results
+    reference : the laboratory whose values are the assigned ones; None: the consensus of all
+    sigma : sigma_pt for all measurands; None: the robust standard deviation of the laboratories
+
+    Raises
+    ------
+    ConfigError
+        ``laboratories``: none beside the reference, fewer than three without, a reference without its
+        result or U, results without spread
+    """
+    measurands = []
+    findings: list[Finding] = []
+    for name, results in reported.items():
+        measurand = _measurand(name, results, unit, reference, sigma)
+        measurands.append(measurand)
+        findings += _findings(measurand, reference)
+    return LaboratoryComparison(measurands=tuple(measurands), findings=tuple(findings))
+
+
+def _measurand(
+    name: str, results: Sequence[Results], unit: str, reference: str | None, sigma: float | None
+) -> Measurand:
+    taking_part = [entry for entry in results if entry.laboratory != reference]
+    fewest = FEWEST if reference is None else 1
+    if len(taking_part) < fewest:
+        beside = "" if reference is None else f" beside {reference}"
+        raise _refused(
+            name, "too few laboratories to compare", len(taking_part), f"{fewest} at least{beside}"
+        )
+    robust = algorithm_a(np.array([entry.mean for entry in taking_part])) if len(taking_part) > 1 else None
+    own = next((entry for entry in results if entry.laboratory == reference), None)
+    if own is not None and own.U is not None:
+        assigned, u_assigned, by = own.mean, own.U / own.k, own.laboratory
+    elif reference is None and robust is not None:
+        assigned, u_assigned, by = robust.mean, robust.u, f"consensus of {robust.n} (algorithm A)"
+    else:
+        got = "no result" if own is None else "a result without U"
+        raise _refused(name, "the reference laboratory cannot assign a value", f"{reference}: {got}",
+                       "its result with U")  # fmt: skip
+    sigma_pt: float | None
+    if sigma is None and robust is not None and robust.n >= FEWEST and robust.sd > 0:
+        sigma_pt, sigma_by = robust.sd, "robust standard deviation (algorithm A)"
+    else:
+        sigma_pt, sigma_by = sigma, "stated" if sigma is not None else "not stated, too few to tell"
+    if sigma_pt is None and reference is None:
+        raise _refused(
+            name, "the laboratories' results have no spread to score by", "s* = 0", "--sigma VALUE"
+        )
+    return Measurand(
+        name=name, unit=unit, assigned=assigned, u_assigned=u_assigned, assigned_by=by, sigma_pt=sigma_pt,
+        sigma_by=sigma_by,
+        scores=tuple(_score(entry, assigned, u_assigned, sigma_pt) for entry in taking_part),
+        precision=method_precision(taking_part) if robust is not None else None,
+    )  # fmt: skip
+
+
+def _score(entry: Results, assigned: float, u_assigned: float, sigma_pt: float | None) -> Score:
+    off = entry.mean - assigned
+    z_prime = None if sigma_pt is None else off / math.hypot(sigma_pt, u_assigned)
+    size = 0.0 if z_prime is None else abs(z_prime)
+    zeta = None if entry.U is None else _ratio(off, math.hypot(entry.U / entry.k, u_assigned))
+    En = None if entry.U is None else _ratio(off, math.hypot(K * entry.U / entry.k, K * u_assigned))
+    return Score(
+        laboratory=entry.laboratory, n=len(entry.values), mean=entry.mean, U=entry.U, z_prime=z_prime,
+        zeta=zeta, En=En,
+        signal="action" if size >= 3 else "warning" if size > 2 else None,
+        En_signal=En is not None and abs(En) >= 1,
+    )  # fmt: skip
+
+
+def _ratio(off: float, u: float) -> float:
+    return off / u if u else math.copysign(math.inf, off) if off else 0.0
+
+
+def method_precision(results: Sequence[Results]) -> MethodPrecision:
+    """Return repeatability and reproducibility of laboratories' results, their numbers equal or not."""
+    values = np.array([value for entry in results for value in entry.values])
+    owners = [entry.laboratory for entry in results for _ in entry.values]
+    between = factor_spread(values, owners, factor="laboratory")
+    dof = len(values) - len(results)
+    within = math.sqrt(
+        sum(float(np.sum((np.array(entry.values) - entry.mean) ** 2)) for entry in results) / dof
+    ) if dof else None  # fmt: skip
+    means = np.array([entry.mean for entry in results])
+    cochran = cochran_p(results)
+    return MethodPrecision(
+        laboratories=len(results), n=len(values), mean=float(values.mean()),
+        s_r=None if within is None else spread(within, dof),
+        s_L=between.s_between, s_R=between.s,
+        r=None if within is None else LIMIT * within, R=LIMIT * between.s,
+        cochran_p=None if cochran is None else cochran[1],
+        cochran_laboratory=None if cochran is None else cochran[0],
+        grubbs_p=grubbs_p(means),
+        grubbs_laboratory=results[int(np.argmax(np.abs(means - means.mean())))].laboratory,
+    )  # fmt: skip
+
+
+def cochran_p(results: Sequence[Results]) -> tuple[str, float] | None:
+    """Return the laboratory of the largest variance and the p value of Cochran's C; None without repeats.
+
+    C = s_max^2 / sum s^2 of p laboratories with n results each; p <= p P(F > C (p - 1) / (1 - C)) with
+    n - 1 and (p - 1)(n - 1) degrees of freedom (ISO 5725-2, 7.3.3). Of different numbers the most common is
+    taken for n, as the standard says.
+    """
+    from scipy.special import fdtrc
+
+    sizes = [len(entry.values) for entry in results if len(entry.values) > 1]
+    repeated = [entry for entry in results if len(entry.values) > 1]
+    if len(repeated) < 2:
+        return None
+    variances = np.array([np.var(entry.values, ddof=1) for entry in repeated])
+    if not variances.any():
+        return None
+    n, p = max(set(sizes), key=lambda size: (sizes.count(size), size)), len(repeated)
+    C = float(variances.max() / variances.sum())
+    place = int(np.argmax(variances))
+    F = math.inf if C >= 1 else C * (p - 1) / (1 - C)
+    chance = 0.0 if math.isinf(F) else float(p * fdtrc(n - 1, (p - 1) * (n - 1), F))
+    return repeated[place].laboratory, min(1.0, chance)
+
+
+def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:
+    findings = []
+    p = measurand.precision
+    tests = () if p is None else (
+        ("Cochran", p.cochran_p, p.cochran_laboratory, "scatters more than the others"),
+        ("Grubbs", p.grubbs_p, p.grubbs_laboratory, "lies apart from the others"),
+    )  # fmt: skip
+    for test, chance, laboratory, what in tests:
+        if chance is not None and chance < OUTLIER:
+            message = f"{laboratory} {what} ({test}, p = {chance:.2g}): s_r and s_R are with it"
+            findings.append(Finding(rule="laboratory-outlier", where=measurand.name, message=message))
+    if reference is None and len(measurand.scores) < FEW:
+        message = (
+            f"a consensus of {len(measurand.scores)} laboratories is weak; ISO 13528 asks for about {FEW}"
+        )
+        findings.append(Finding(rule="few-laboratories", where=measurand.name, message=message, level="note"))
+    if reference is None and any(score.En is not None for score in measurand.scores):
+        message = "the assigned value is made of the scored results too: zeta and E_n come out a little small"
+        findings.append(Finding(rule="consensus-scores", where=measurand.name, message=message, level="note"))
+    return findings
+
+
+def _refused(measurand: str, what: str, got: object, expected: str) -> ConfigError:
+    return ConfigError(
+        what, where=measurand, got=got, expected=expected, next_step="add what is expected",
+        rule="laboratories",
+    )  # fmt: skip

@@ -1,0 +1,215 @@
+"""Answers declared as typed dictionaries: the page that describes one, its schema, and what departs from it.
+
+An answer is what a command prints with ``--json``. The function that makes it returns a `TypedDict`, so that
+the type checker holds its keys and values to the declaration; page and schema are of the same lines:
+
+>>> from typing import Annotated, TypedDict
+>>> class Peak(TypedDict):
+...     "The largest force."
+...     FY_N: Annotated[float, "lateral force"]
+...     at_rad: Annotated[float | None, "slip angle; null where the peak was not reached"]
+>>> print(answer_reference(Peak))
+The largest force.
+<BLANKLINE>
+| key | holds | meaning |
+|---|---|---|
+| `FY_N` | number | lateral force |
+| `at_rad` | number or null | slip angle; null where the peak was not reached |
+<BLANKLINE>
+>>> list(departures({"FY_N": "much"}, Peak))
+["FY_N: 'much' is no number", 'at_rad: missing']
+
+A text beside a type in ``Annotated`` says what the entry means. Keys that not every answer has are
+`NotRequired`.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import inspect
+import pathlib
+import types
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, is_typeddict
+
+_WORDS: dict[Any, tuple[str, str]] = {
+    str: ("text", "string"),
+    float: ("number", "number"),
+    int: ("whole number", "integer"),
+    bool: ("true or false", "boolean"),
+    type(None): ("null", "null"),
+    pathlib.Path: ("path", "string"),
+    dt.date: ("date", "string"),
+}
+"""The word for people and the type of JSON of single values."""
+
+
+def answer_reference(cls: Any) -> str:
+    """Return the description of an answer, Markdown: a table of its keys, then one for each kind of entry."""
+    lines: list[str] = []
+    for number, (place, table) in enumerate(_tables(cls, "", {})):
+        lines += [f"## `{place}`", ""] if number else []
+        lines += [_summary(table), "", "| key | holds | meaning |", "|---|---|---|"]
+        for key, annotation, required in _entries(table):
+            held, meaning = _bare(annotation)
+            cells = (f"`{key}`", _words(held), ("" if required else "not always: ") + meaning)
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def answer_schema(cls: Any) -> dict[str, Any]:
+    """Return the JSON schema (2020-12) of an answer."""
+    definitions = {table.__name__: _table_schema(table) for _, table in _tables(cls, "", {})}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$ref": f"#/$defs/{cls.__name__}",
+        "$defs": definitions,
+    }
+
+
+def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
+    """Yield each place where an answer, as JSON or before it is written, is not what is declared."""
+    annotation = _bare(annotation)[0]
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if annotation is Any:
+        return
+    if is_typeddict(annotation) and isinstance(value, Mapping):
+        entries = {key: (held, required) for key, held, required in _entries(annotation)}
+        for key in (*entries, *(key for key in value if key not in entries)):
+            path = f"{place}.{key}".lstrip(".")
+            if key not in entries:
+                yield f"{path}: not declared"
+            elif key in value:
+                yield from departures(value[key], entries[key][0], path)
+            elif entries[key][1]:
+                yield f"{path}: missing"
+    elif origin in (Union, types.UnionType):
+        tried = [list(departures(value, form, place)) for form in inner]
+        # What comes nearest is what was meant: the form with the fewest departures below the place itself.
+        if all(tried):
+            yield from min(tried, key=lambda faults: (f"{place}: " in faults[0], len(faults)))
+    elif origin is Literal:
+        if value not in inner:
+            yield f"{place}: {value!r} is none of {', '.join(map(str, inner))}"
+    elif _is_mapping(origin) and isinstance(value, Mapping):
+        for key, entry in value.items():
+            yield from departures(entry, inner[1], f"{place}.{key}")
+    elif _is_list(origin) and isinstance(value, Sequence | Iterator) and not isinstance(value, str):
+        for at, entry in enumerate(value):
+            fixed = origin is tuple and inner[-1] is not Ellipsis
+            yield from departures(entry, inner[at] if fixed else inner[0], f"{place}[{at}]")
+    elif not _holds(value, annotation):
+        yield f"{place}: {value!r:.60} is no {_words(annotation)}"
+
+
+def _holds(value: Any, annotation: Any) -> bool:
+    if annotation is float:
+        return isinstance(value, float | int) and not isinstance(value, bool)
+    if annotation in (pathlib.Path, dt.date):
+        return isinstance(value, annotation | str)
+    if annotation is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    return annotation in _WORDS and isinstance(value, annotation)
+
+
+def _entries(cls: Any) -> Iterator[tuple[str, Any, bool]]:
+    for key, annotation in typing.get_type_hints(cls, include_extras=True).items():
+        # `__required_keys__` does not know the marks of annotations that are kept as texts.
+        yield key, annotation, get_origin(annotation) is not typing.NotRequired
+
+
+def _bare(annotation: Any) -> tuple[Any, str]:
+    """Return an annotation without its marks, and the text beside it."""
+    meaning = ""
+    while get_origin(annotation) in (Annotated, typing.NotRequired, typing.Required):
+        meaning = meaning or next((m for m in get_args(annotation)[1:] if isinstance(m, str)), "")
+        annotation = get_args(annotation)[0]
+    return annotation, meaning
+
+
+def _is_mapping(origin: Any) -> bool:
+    return isinstance(origin, type) and issubclass(origin, Mapping)
+
+
+def _is_list(origin: Any) -> bool:
+    return isinstance(origin, type) and issubclass(origin, Sequence | Iterator)
+
+
+def _words(annotation: Any) -> str:
+    annotation = _bare(annotation)[0]
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if annotation is Any:
+        return "any value"
+    if is_typeddict(annotation):
+        return f"`{annotation.__name__}`"
+    if origin in (Union, types.UnionType):
+        return " or ".join(map(_words, inner))
+    if origin is Literal:
+        return " or ".join(f'"{word}"' if isinstance(word, str) else str(word) for word in inner)
+    if _is_mapping(origin):
+        return f"by name: {_words(inner[1])}"
+    if origin is tuple and inner[-1] is not Ellipsis:
+        return f"[{', '.join(map(_words, inner))}]"
+    if _is_list(origin):
+        return f"list of {_words(inner[0])}"
+    return _WORDS[annotation][0]
+
+
+def _table_schema(cls: Any) -> dict[str, Any]:
+    properties, required = {}, []
+    for key, annotation, always in _entries(cls):
+        held, meaning = _bare(annotation)
+        properties[key] = ({"description": meaning} if meaning else {}) | _schema(held)
+        required += [key] if always else []
+    return {
+        "type": "object", "description": _summary(cls), "properties": properties, "required": required,
+        "additionalProperties": False,
+    }  # fmt: skip
+
+
+def _schema(annotation: Any) -> dict[str, Any]:
+    annotation = _bare(annotation)[0]
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if annotation is Any:
+        return {}
+    if is_typeddict(annotation):
+        return {"$ref": f"#/$defs/{annotation.__name__}"}
+    if origin in (Union, types.UnionType):
+        return {"anyOf": [_schema(form) for form in inner]}
+    if origin is Literal:
+        return {"enum": list(inner)}
+    if _is_mapping(origin):
+        return {"type": "object", "additionalProperties": _schema(inner[1])}
+    if origin is tuple and inner[-1] is not Ellipsis:
+        return {"type": "array", "prefixItems": [_schema(form) for form in inner], "maxItems": len(inner)}
+    if _is_list(origin):
+        return {"type": "array", "items": _schema(inner[0])}
+    return {"type": _WORDS[annotation][1]}
+
+
+def _tables(cls: Any, place: str, described: dict[Any, None]) -> Iterator[tuple[str, Any]]:
+    """Yield every typed dictionary of an answer with the place where it first stands."""
+    if cls in described:
+        return
+    described[cls] = None
+    yield place or cls.__name__, cls
+    for key, annotation, _ in _entries(cls):
+        for path, table in _inner(annotation, f"{place}.{key}".lstrip(".")):
+            yield from _tables(table, path, described)
+
+
+def _inner(annotation: Any, place: str) -> Iterator[tuple[str, Any]]:
+    annotation = _bare(annotation)[0]
+    origin = get_origin(annotation)
+    if is_typeddict(annotation):
+        yield place, annotation
+        return
+    path = f"{place}.NAME" if _is_mapping(origin) else f"{place}[]" if _is_list(origin) else place
+    for form in get_args(annotation) if origin is not Literal else ():
+        yield from _inner(form, path)
+
+
+def _summary(cls: Any) -> str:
+    return " ".join((inspect.getdoc(cls) or cls.__name__).split("\n\n")[0].split())

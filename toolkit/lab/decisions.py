@@ -1,0 +1,78 @@
+"""A decision about a session or its record, as data: typed, requested or signed, it is carried out alike."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.approval import Decision
+    from toolkit.calibration.registry.candidate import Candidate
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.status import RecordStatus
+
+Kind = Literal["enter", "approve", "withdraw", "discard"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """A decision and its options, as those of the commands: ``by`` who checked, withdraws or discards.
+
+    ``record`` is the id of what is decided about; ``session`` the file that is entered.
+    """
+
+    action: Kind
+    record: str = ""
+    session: Path = Path("SESSION.toml")
+    by: str = ""
+    approved_by: str | None = None
+    reason: str | None = None
+    on: dt.date | None = None
+    since: dt.date | None = None
+    recall: str | None = None
+
+
+def order_of(body: Mapping[str, Any], session: Path) -> Order:
+    """Return the order whose decision a line of a ledger is: a request says by itself how it was made."""
+
+    def day(key: str) -> dt.date | None:
+        return dt.date.fromisoformat(body[key]) if body.get(key) else None
+
+    return Order(
+        action=body["action"], record=body["id"], session=session, by=body["by"],
+        approved_by=body.get("approved_by"), reason=body.get("reason"), recall=body.get("recall"),
+        on=day("known_on"), since=day("since"),
+    )  # fmt: skip
+
+
+def carry_out(registry: Registry, order: Order) -> Candidate | Decision | RecordStatus:
+    """Make a decision: `calibrate`, `approve`, `withdraw` or `discard`.
+
+    Raises
+    ------
+    ToolkitError
+        as these do; nothing was changed
+    Requested
+        the registry writes a request in place of the decision
+    """
+    from toolkit.calibration.control.calibrate import calibrate
+    from toolkit.calibration.registry.approval import approve, discard, withdraw
+
+    if order.action == "enter":
+        from toolkit.lab.sealing import standards_of
+
+        return calibrate(order.session, registry, standards=standards_of(registry.folder.parent))
+    if order.action == "approve":
+        return approve(
+            registry, order.record, in_force_from=order.since or dt.date.max, checked_by=order.by,
+            approved_by=order.approved_by, reason=order.reason, known_on=order.on, recall=order.recall,
+        )  # fmt: skip
+    if order.action == "withdraw":
+        return withdraw(
+            registry, order.record, on=order.on or dt.date.max, void_from=order.since,
+            reason=order.reason or "", by=order.by,
+        )  # fmt: skip
+    return discard(registry, order.record, reason=order.reason or "", by=order.by)

@@ -1,0 +1,104 @@
+"""`toolkit plan interval`: when an instrument is to be calibrated again, by its check loads."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import ConfigError
+from toolkit.findings import Finding
+from toolkit.lab.answers import findings_text, table
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.planning.interval import IntervalPlan
+
+
+def interval_plan_answer(
+    registry: Registry, instrument: str, *, reliability: float, tests_a_year: float | None, load: str | None
+) -> tuple[dict[str, Any], str, list[Finding]]:
+    """Return the interval of an instrument as JSON and as text, with its findings.
+
+    Raises
+    ------
+    ToolkitError
+        no such instrument, a reliability or a number that cannot be used, too short a history
+    """
+    from toolkit.calibration.control.chart import control_chart
+    from toolkit.calibration.control.recall import due_of
+    from toolkit.declared import answer
+    from toolkit.planning.interval import paths_of, plan_interval
+
+    if not 0.5 <= reliability < 1:
+        raise _wrong("--reliability", reliability, "a share from 0.5 to below 1, such as 0.95")
+    if tests_a_year is not None and not (math.isfinite(tests_a_year) and tests_a_year >= 0):
+        raise _wrong("--tests", tests_a_year, "tests a year, 0 or more")
+    due = due_of(registry, instrument, registry.today())
+    chart = control_chart(registry, instrument, load=load)
+    records = {point.record for series in chart.series for point in series.points}
+    dates = {record: dt.date.fromisoformat(registry.load(record).date) for record in sorted(records)}
+    plan = plan_interval(paths_of(chart, dates), reliability=reliability, tests_a_year=tests_a_year)
+    findings = _findings(plan, instrument)
+    next_date = None if not plan.days else due.session_date + dt.timedelta(days=plan.days)
+    payload = answer(plan) | {
+        "instrument": instrument, "record": due.record, "in_use": due.recall, "next": next_date,
+        "method_2_days": due.recommendation.days, "findings": [finding.as_dict() for finding in findings],
+    }  # fmt: skip
+    payload["next"] = None if next_date is None else next_date.isoformat()
+    return payload, _text(plan, payload, findings), findings
+
+
+def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
+    from toolkit.planning.interval import SHORTEST, STEP
+
+    if not plan.days:
+        message = (
+            f"after {SHORTEST} days {plan.limiting} is beyond its tolerance with a chance of "
+            f"{100 * plan.chosen.beyond:.1f} %: no interval keeps {100 * plan.reliability:g} %"
+        )
+        return [Finding(rule="plan-interval", where=instrument, message=message)]
+    if plan.capped:
+        message = (
+            f"kept at {STEP:g} times the longest gap of {plan.seen_days} days: beyond it nothing was seen"
+        )
+        return [Finding(rule="plan-interval", where=instrument, message=message, level="note")]
+    return []
+
+
+def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) -> str:
+    head = (
+        f"{payload['instrument']}: {plan.days} days, next by {payload['next']}"
+        if plan.days
+        else f"{payload['instrument']}: no interval keeps {100 * plan.reliability:g} %"
+    )
+    lines = [
+        head,
+        f"at its end inside the tolerance with {100 * (1 - plan.chosen.beyond):.1f} %; asked for: "
+        f"{100 * plan.reliability:g} %; in use: {payload['in_use'] or 'none'}; ILAC-G24 method 2: "
+        f"{payload['method_2_days'] or '-'} days",
+        f"{plan.limiting} drifts most, by {plan.readings} readings ({plan.paths} check loads and loads): "
+        f"{plan.trend_per_year:+.2g} tolerances a year, random walk {plan.walk_per_root_year:.2g} in a year",
+        "",
+        table(
+            ["days", "beyond the tolerance", "sessions a year", "tests recalled a year"],
+            [
+                [str(risk.days), f"{100 * risk.beyond:.1f} %", f"{risk.sessions_a_year:.2g}",
+                 "-" if risk.recalled_a_year is None else f"{risk.recalled_a_year:.3g}"]
+                for risk in sorted({*plan.risks, plan.chosen}, key=lambda risk: risk.days)
+            ],
+            align=">>>>",
+        ),
+        "",
+        "it assumes: a steady trend and a random walk go on as they did; a session finds what is beyond, and",
+        "all tests since the session before are then recalled; nothing breaks at once",
+    ]  # fmt: skip
+    found = findings_text(findings)
+    return "\n".join([*lines, *([found] if found else [])])
+
+
+def _wrong(where: str, got: object, expected: str) -> ConfigError:
+    return ConfigError(
+        "a number cannot be used", where=where, got=got, expected=expected, next_step="correct it",
+        rule="plan-demand",
+    )  # fmt: skip

@@ -1,0 +1,249 @@
+"""New settings files: what `toolkit session|machine|test|case|plan new` write, ask, guess and leave open.
+
+A guess rests on a recording's headers and units alone and is named as one, in the file and in the answer.
+What no header can tell is left open; nothing is made up.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from toolkit.channels import CHANNELS
+from toolkit.declared import Source, refuse
+from toolkit.declared.outline import outline
+from toolkit.declared.reading import attempt
+from toolkit.declared.writing import value_text
+from toolkit.errors import ConfigError, OutputError, ToolkitError, UnitError
+from toolkit.inputs import RECORDING_FILE, read_input
+
+FORMS = {
+    "session": "toolkit.calibration.session.session_file:SessionFile",
+    "machine": "toolkit.machine.definition:Machine",
+    "test": "toolkit.recording.details:StatedTest",
+    "case": "toolkit.diagnosis.case.case_file:CaseFile",
+    "plan": "toolkit.simulation.plan_file:PlanFile",
+}
+"""Word of the command -> the class that declares its file."""
+
+_BOOKKEEPING = ("run", "direction", "rotation", "comment")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guess:
+    """What headers say: ``values`` as a file holds them, ``notes`` by entry, texts on what is ``silent``."""
+
+    values: dict[str, Any] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+    silent: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Starter:
+    """A new file: its text, what was guessed, and what each entry is that a person must still state."""
+
+    text: str
+    guess: Guess
+    helps: dict[str, str]
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """The entries that must still be stated."""
+        return tuple(self.helps)
+
+
+def form_of(word: str) -> type:
+    """Return the class that declares a file."""
+    module, _, name = FORMS[word].partition(":")
+    declared: type = getattr(import_module(module), name)
+    return declared
+
+
+def entries_of(words: Sequence[str]) -> dict[str, Any]:
+    """Return entries from ``KEY=VALUE``: a value of TOML, else a text; a key with dots is one of a table.
+
+    >>> entries_of(["instrument=press-7", "date=2026-02-03", "reference.standard=dead weights"])
+    {'instrument': 'press-7', 'date': datetime.date(2026, 2, 3), 'reference': {'standard': 'dead weights'}}
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: no ``=``, or a key that is a value and a table
+    """
+    entries: dict[str, Any] = {}
+    for word in words:
+        key, sign, text = word.partition("=")
+        *tables, name = key.strip().split(".")
+        table = entries
+        for part in tables:
+            table = table.setdefault(part, {}) if isinstance(table, dict) else {}
+        if not (sign and name) or not isinstance(table, dict):
+            raise ConfigError(
+                "an entry cannot be read", where="--set", got=word, expected="KEY=VALUE", rule="usage",
+                next_step="write the entry's name, =, and its value; nothing was written",
+            )  # fmt: skip
+        table[name] = _value(text.strip())
+    return entries
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, KeyError):
+        return text
+
+
+def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file: Path) -> Starter:
+    """Return what a new ``file`` of a format begins with.
+
+    Raises
+    ------
+    ConfigError
+        every entry that is unknown or cannot be used; ``usage``: nothing can be guessed for this format
+    RecordingError
+        the recording cannot be read
+    """
+    guess = Guess() if recording is None else guess_from(word, recording, file.parent)
+    values, cls = {**guess.values, **entries}, form_of(word)
+    # What is given is judged as it was given: an unknown entry has no place in the file.
+    text = outline(cls, {})
+    stated = {key: entry for key, entry in tomllib.loads(text).items() if key == "schema"} | values
+    refuse([fault for fault in attempt(cls, stated)[1] if fault.kind != "missing"], Source(where=file))
+    text = outline(cls, values, {key: note for key, note in guess.notes.items() if key not in entries})
+    _, faults = attempt(cls, tomllib.loads(text))
+    helps = {fault.name: fault.expected for fault in faults}
+    return Starter(text=text, guess=guess, helps=helps)
+
+
+def starter_text(word: str, file: Path, starter: Starter) -> str:
+    """Return what the command says to people."""
+    guess = starter.guess
+    lines = [f"{file}: a new {word} file"]
+    lines += [f"  guessed      {key} = {value_text(value)}" for key, value in guess.values.items()]
+    lines += [f"  not guessed  {text}" for text in guess.silent]
+    lines += [f"  to fill in   {name}: {text}" for name, text in starter.helps.items()]
+    return "\n".join(lines if starter.open else [*lines, "  nothing must be filled in"])
+
+
+def refuse_existing(path: Path) -> None:
+    """Refuse a name that is taken, or is no settings file's.
+
+    Raises
+    ------
+    OutputError
+        ``not-writable``
+    """
+    if path.exists() or path.suffix.lower() != ".toml":
+        raise OutputError(
+            "a new file never replaces another one" if path.exists() else "a settings file is a .toml file",
+            where=path, got="a file that exists" if path.exists() else path.name,
+            expected="a new name that ends with .toml", next_step="choose another name; nothing was written",
+            rule="not-writable",
+        )  # fmt: skip
+
+
+def guess_from(word: str, recording: Path, folder: Path) -> Guess:
+    """Return what a recording's columns and units say of a session or machine, to stand in a folder.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: a file of this format says nothing of columns
+    """
+    guesses = {"session": _session, "machine": _machine}
+    if word not in guesses:
+        raise ConfigError(
+            f"a recording says nothing of a {word}", where="--from", got=recording,
+            expected="--from beside 'session new' or 'machine new'", next_step="leave --from away",
+            rule="usage",
+        )  # fmt: skip
+    name = os.path.relpath(recording.absolute(), folder.absolute())
+    return guesses[word](Path(name).as_posix(), headers_of(recording))
+
+
+def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
+    """Return the columns of a recording: header, name, unit; None for a unit that is not stated.
+
+    Raises
+    ------
+    RecordingError
+        the file cannot be read, or has no header
+    """
+    from toolkit.calibration.session.cells import read_cells
+    from toolkit.recording.columns import split_header
+
+    def is_name(text: str) -> bool:
+        return bool(re.match(r"\s*[^\W\d]", text))
+
+    cells = read_cells(read_input(recording, RECORDING_FILE), is_name, where=recording)
+    columns = []
+    for header in (text.strip() for text in cells.header if text.strip()):
+        name, unit = split_header(header)
+        if unit is None and (match := re.fullmatch(r"(.+?)\s*\(([^()]*)\)", header)) and _dimension(match[2]):
+            name, unit = match[1], match[2]
+        columns.append((header, name, unit))
+    return columns
+
+
+def _dimension(unit: str | None) -> str | None:
+    from toolkit.units import unit as read_unit
+
+    try:
+        return None if unit is None else read_unit(unit).dimension
+    except (UnitError, ToolkitError):
+        return None
+
+
+def _session(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess:
+    stated = [(plain, _dimension(unit)) for _, plain, unit in columns if plain.lower() not in _BOOKKEEPING]
+    loads = [plain for plain, dimension in stated if dimension in ("force", "moment")]
+    indications = [plain for plain, dimension in stated if dimension not in (None, "force", "moment", "time")]
+    silent = [f"{plain}: no unit that is known; write 'NAME [unit]'" for plain, kind in stated if not kind]
+    there = {plain.lower() for _, plain, _ in columns}
+    silent += [f"the file has no column {key}" for key in ("run", "direction") if key not in there]
+    if loads and not indications:  # cells that are read in units of force: which is which, no unit tells
+        silent.append("every column is a force or a moment: which are indications, the file does not tell")
+        loads = []
+    values: dict[str, Any] = {"data": name}
+    values |= {key: names for key, names in (("indications", indications), ("loads", loads)) if names}
+    basis = f"guessed from {name}: columns with a unit of "
+    notes = {"loads": f"{basis}force or moment", "indications": f"{basis}another kind"}
+    return Guess(values=values, notes={k: n for k, n in notes.items() if k in values}, silent=tuple(silent))
+
+
+def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess:
+    entries, silent = [], []
+    for header, plain, unit in columns:
+        dimension = _dimension(unit)
+        symbol = _symbol(plain)
+        role = _role(symbol, dimension)
+        if dimension is None or role is None:
+            silent.append(f"{header}: " + ("no unit that is known" if dimension is None else "what it holds"))
+            continue
+        entries.append({"symbol": symbol, "header": plain, "unit": unit, "role": role})
+    silent += ["axes, rotations, drum and protocol: no header tells them"]
+    note = f"guessed from {name}: FZ is the load, other forces and moments are computed by the rig"
+    values = {"column": entries} if entries else {}
+    return Guess(values=values, notes={"column": note} if entries else {}, silent=tuple(silent))
+
+
+def _symbol(name: str) -> str:
+    for channel in CHANNELS.values():
+        if name.casefold() in map(str.casefold, (channel.symbol, *channel.aliases)):
+            return channel.symbol
+    return name
+
+
+def _role(symbol: str, dimension: str | None) -> str | None:
+    known = {"FZ": "load", "SA": "slip_angle", "t": "time"}
+    if symbol in known:
+        return known[symbol]
+    if symbol in CHANNELS:
+        return "acquired" if dimension in ("force", "moment") else "covariate"
+    return "indication"

@@ -1,0 +1,1 @@
+"""Plans: which measurements reach a stated uncertainty, and which part what a recording could not."""

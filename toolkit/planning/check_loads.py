@@ -1,0 +1,107 @@
+"""Check loads that verify every coefficient: full rank, and each term moved by five tolerances.
+
+They are what an approval asks for (`registry.gates.unverifiable`): with fewer a flipped sign passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.registry.gates import VERIFIED
+from toolkit.calibration.terms import INTERCEPT
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.planning.knowledge import Knowledge
+
+MARGIN = 1.2
+"""Of a planned movement over the five tolerances: readings differ from what was planned."""
+_INDEPENDENT = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """Whether check loads show a term: ``movement`` is how many tolerances a load moves by it."""
+
+    load: str
+    term: str
+    movement: float
+    verified: bool
+
+
+def choose_check_loads(
+    knowledge: Knowledge, loads: NDArray[np.float64], avoid: frozenset[int]
+) -> tuple[NDArray[np.intp], tuple[Verification, ...]]:
+    """Return the fewest check loads found among feasible ones (candidates, loads), and what they verify.
+
+    Each step adds the load that verifies most, then those without which as much is verified are taken out.
+    Loads to ``avoid`` are those of the fit; they are taken where nothing else verifies a term.
+    """
+    every = list(range(len(loads)))
+    chosen: list[int] = []
+    for pool in ([at for at in every if at not in avoid], every):
+        chosen = _grown(knowledge, loads, pool, chosen)
+    for at in list(chosen):
+        fewer = [other for other in chosen if other != at]
+        if _value(knowledge, loads, fewer) >= _value(knowledge, loads, chosen) - 1e-12:
+            chosen = fewer
+    order = np.array(chosen, dtype=np.intp)
+    return order, verification(knowledge, loads[order])
+
+
+def verification(knowledge: Knowledge, check: NDArray[np.float64]) -> tuple[Verification, ...]:
+    """Return of every term of every load whether check loads (rows, loads) verify it."""
+    results = []
+    for fit in knowledge.record.loads:
+        terms = knowledge.terms(fit, check)
+        tolerance = fit.tolerance or 1e-3 * fit.largest
+        full = _rank(terms) == len(fit.terms)
+        moved = (
+            np.abs(fit.coefficients) * np.ptp(terms, axis=0) / tolerance
+            if len(check)
+            else np.zeros(len(fit.terms))
+        )
+        results += [
+            Verification(
+                load=fit.load, term=term, movement=float(size),
+                verified=full and (term == INTERCEPT or float(size) > VERIFIED),
+            )
+            for term, size in zip(fit.terms, moved, strict=True)
+        ]  # fmt: skip
+    return tuple(results)
+
+
+def _grown(knowledge: Knowledge, loads: NDArray[np.float64], pool: list[int], chosen: list[int]) -> list[int]:
+    value = _value(knowledge, loads, chosen)
+    while True:
+        gains = [(_value(knowledge, loads, [*chosen, at]), -at) for at in pool if at not in chosen]
+        best, at = max(gains, default=(value, 0))
+        if best <= value + 1e-9:
+            return chosen
+        chosen, value = [*chosen, -at], best
+
+
+def _value(knowledge: Knowledge, loads: NDArray[np.float64], chosen: list[int]) -> float:
+    """Return how far check loads are on their way: rank, and each term's movement up to what is asked."""
+    total = 0.0
+    for fit in knowledge.record.loads:
+        if not chosen:
+            continue
+        terms = knowledge.terms(fit, loads[chosen])
+        asked = MARGIN * VERIFIED * (fit.tolerance or 1e-3 * fit.largest)
+        moved = np.abs(fit.coefficients) * np.ptp(terms, axis=0) / asked
+        slopes = [size for term, size in zip(fit.terms, moved.tolist(), strict=True) if term != INTERCEPT]
+        total += _rank(terms) + sum(min(size, 1.0) for size in slopes)
+    return total
+
+
+def _rank(terms: NDArray[np.float64]) -> int:
+    if not len(terms):
+        return 0
+    length = np.sqrt(np.einsum("ij,ij->j", terms, terms))
+    values = np.linalg.svd(terms / np.where(length > 0, length, 1.0), compute_uv=False)
+    return int(np.count_nonzero(values > _INDEPENDENT * values[0])) if values[0] > 0 else 0

@@ -1,0 +1,211 @@
+"""The members of a diagnosis' class, each fitted in the others' place, and what each predicts of a run.
+
+A prediction is Gaussian: the simulation at the fitted values, the recording's noise, and what the fit leaves
+open of the values, carried along by derivatives. How far two members are apart in a run is then the expected
+log-evidence of one over the other when it is true: the divergence of Kullback and Leibler of their
+predictions, in which each may still move its parameters as far as the recordings allow (the T-criterion of
+Atkinson and Fedorov, Biometrika 62 (1975) 57, with the recordings as prior).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.fit import Fit, fit
+from toolkit.diagnosis.fit.noise import Autoregression, layout, whiten
+from toolkit.diagnosis.search.candidates import CandidateEffect, candidates
+from toolkit.errors import ConfigError, FitError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+    from toolkit.diagnosis.case.case import Run
+    from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.effects.applied import AppliedEffect
+
+    Array = NDArray[np.float64]
+
+_STARTS = 3  # of each place, from the first to the last
+_STEP = 1e-4
+_WIDEST = 3.0  # sd of a parameter that the recordings leave open, in its own size
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Member:
+    """One explanation: its name and place, and the fit with it in the recordings."""
+
+    label: str
+    fit: Fit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Predicted:
+    """What a member says of a run: ``outputs`` by name (n,), and what is open of them.
+
+    ``spread`` by name (n, parameters): the change by one standard deviation of each independent parameter.
+    """
+
+    outputs: dict[str, Array]
+    spread: dict[str, Array]
+
+
+def class_of(diagnosis: Diagnosis, where: object) -> FoundEffect:
+    """Return the first effect of an answer that others explain as well.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-next``: every effect of the answer stands alone
+    """
+    effect = next((effect for effect in diagnosis.effects if effect.equivalent_to), None)
+    if effect is None:
+        raise ConfigError(
+            "the answer has no class to part", where=where, got=f"verdict {diagnosis.verdict}",
+            expected="an effect with others that explain it as well (equivalent_to)",
+            next_step="'next_measurements' of the answer says what would help", rule="plan-next",
+        )  # fmt: skip
+    return effect
+
+
+def members_of(problem: Problem, diagnosis: Diagnosis, effect: FoundEffect) -> tuple[Member, ...]:
+    """Return the members of an effect's class that can be fitted, the likeliest first.
+
+    The other effects of the answer stay beside each.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-next``: fewer than two can be
+    """
+    listed = [candidate for candidate in candidates(problem) if candidate.active.runs is None]
+    others = tuple(
+        _at_answer(candidate, found)
+        for found in diagnosis.effects
+        if found is not effect
+        for candidate in listed
+        if candidate.key[:3] == found.key[:3]
+    )
+    members = []
+    for name in (effect.name, *effect.equivalent_to):
+        places = [
+            c for c in listed if c.name == name and (name != effect.name or c.key[:3] == effect.key[:3])
+        ]
+        fits = [fitted for place in places for fitted in _fits(problem, place, others)]
+        if fits:
+            best = max(fits, key=lambda fitted: fitted.log_posterior)
+            members.append(Member(label=best.active[-1].key.label, fit=best))
+    if len(members) < 2:
+        raise ConfigError(
+            "fewer than two members of the class can be fitted", where=problem.case.path,
+            got=", ".join(member.label for member in members) or "none",
+            expected=", ".join((effect.name, *effect.equivalent_to)),
+            next_step="diagnose the case again with this version", rule="plan-next",
+        )  # fmt: skip
+    return tuple(sorted(members, key=lambda member: -member.fit.log_posterior))
+
+
+def _at_answer(candidate: CandidateEffect, found: FoundEffect) -> AppliedEffect:
+    values = {p.name: p.value for p in found.parameters if isinstance(p.value, float)}
+    return dataclasses.replace(candidate.active, values=candidate.starts[0].values | values)
+
+
+def _fits(problem: Problem, place: CandidateEffect, others: Sequence[AppliedEffect]) -> Iterator[Fit]:
+    at = np.unique(np.linspace(0, len(place.starts) - 1, min(_STARTS, len(place.starts))).astype(int))
+    for start in (place.starts[i] for i in at):
+        active = dataclasses.replace(place.active, values=start.values)
+        try:
+            yield fit(problem, (*others, active))
+        except FitError:  # beyond what the simulation runs with: another start, or another place
+            continue
+
+
+def predict(problem: Problem, member: Member, run: Run) -> Predicted | None:
+    """Return what a member says of a run; None where its simulation gives no number."""
+    fitted = member.fit
+    centre = _simulated(problem, run, fitted.p, fitted.active)
+    if centre is None:
+        return None
+    places = [(None, parameter.name) for parameter in problem.free] + [
+        (i, parameter.name) for i, applied in enumerate(fitted.active) for parameter in applied.searched
+    ]
+    covariance = _tamed(fitted, places)
+    slopes = {name: np.zeros((run.rows, len(places))) for name in centre}
+    for at, (i, name) in enumerate(places):
+        size = float(np.sqrt(covariance[at, at]))
+        value = fitted.p[at] if i is None else fitted.active[i].values[name]
+        step = min(size, _STEP * max(abs(value), size)) or _STEP
+        p, active = list(fitted.p), list(fitted.active)
+        if i is None:
+            p[at] = value + step
+        else:
+            active[i] = dataclasses.replace(active[i], values={**active[i].values, name: value + step})
+        moved = _simulated(problem, run, p, active)
+        for output, column in (moved or {}).items():
+            slopes[output][:, at] = (column - centre[output]) / step
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    return Predicted(outputs=centre, spread={name: columns @ root for name, columns in slopes.items()})
+
+
+def _tamed(fitted: Fit, places: Sequence[tuple[int | None, str]]) -> Array:
+    """Return the covariance of a fit; what the recordings leave open altogether is as wide as its size."""
+    values = np.array(
+        [fitted.p[at] if i is None else fitted.active[i].values[name] for at, (i, name) in enumerate(places)]
+    )
+    sd = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))
+    limit = _WIDEST * np.maximum(np.abs(values), 1e-9)
+    shrink = np.where(sd > limit, limit / np.where(sd > 0, sd, 1.0), 1.0)
+    return np.asarray(fitted.covariance * np.outer(shrink, shrink))
+
+
+def _simulated(
+    problem: Problem, run: Run, p: Sequence[float], active: Sequence[AppliedEffect]
+) -> dict[str, Array] | None:
+    values = dict(problem.known)
+    values.update(zip((parameter.name for parameter in problem.free), map(float, p), strict=True))
+    try:
+        outputs = problem.model.simulate(run, values, tuple(active))
+    except FitError:
+        return None
+    numbers = {name: outputs[name] for name in problem.names}
+    return numbers if all(np.isfinite(column).all() for column in numbers.values()) else None
+
+
+def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, other: Predicted) -> float:
+    """Return the mean log-evidence of a true member over another one, in a run that is yet to be made.
+
+    The divergence of two Gaussians with covariances I + W W^T in the noise's standard deviations (Woodbury's
+    identity). Each fit has taken what it does not explain for noise: the noise counts under which the two
+    are less apart.
+
+    Parameters
+    ----------
+    members : those of the two predictions
+    """
+    return min(_divergence(run, member.fit.noise, true, other) for member in members)
+
+
+def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, other: Predicted) -> float:
+    gap = _white(run, {name: true.outputs[name] - column for name, column in other.outputs.items()}, noise)
+    own, others = _white(run, true.spread, noise), _white(run, other.spread, noise)
+    inner, of_own = (np.eye(w.shape[1]) + w.T @ w for w in (others, own))
+    through, crossed = others.T @ gap, others.T @ own
+    squares = float(gap @ gap - through @ np.linalg.solve(inner, through))
+    trace = float(np.sum(own**2) - np.sum(others * (others @ np.linalg.inv(inner))))
+    trace -= float(np.sum(crossed * np.linalg.solve(inner, crossed)))
+    logs = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(of_own)[1])
+    return 0.5 * (squares + trace + logs)
+
+
+def _white(run: Run, values: dict[str, Array], noise: dict[str, Autoregression]) -> Array:
+    """Return columns of every output (n,) or (n, k), one below the other, in standard deviations."""
+    where = layout([run.t], [np.ones(run.rows, dtype=bool)])
+    return np.concatenate(
+        [whiten(column[where.index], where, noise[name]) for name, column in values.items()]
+    )

@@ -1,0 +1,268 @@
+"""The plan of a test: what it will reach, beside the machine's own protocol, and what it gives up."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date
+from typing import TYPE_CHECKING, Annotated, Any
+
+from toolkit.channels import Rotation
+from toolkit.declared import Entry, toml_text
+from toolkit.planning.demands import Demand
+from toolkit.planning.design import Design, Pace, ordered, standard
+from toolkit.planning.protocol_search import Found, ProtocolSearch, Question, least_plan
+from toolkit.planning.reach import Reach
+from toolkit.tires.fit import MIN_POINTS
+from toolkit.units import from_si
+
+if TYPE_CHECKING:
+    from toolkit.machine import Machine, Protocol
+    from toolkit.planning.expectation import EarlierTest
+
+_SEED = 25  # of the order in which the slip angles are measured
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedValue:
+    """One characteristic at one load, in the direction in which the plan knows it least."""
+
+    name: Annotated[str, Entry("of the catalogue, or peak")]
+    load_N: Annotated[float, Entry("nominal load")]
+    rotation: Annotated[str, Entry("forward, reverse or both")]
+    SA_deg: Annotated[float | None, Entry("slip angle; null for what is at none")]
+    unit: Annotated[str, Entry("SI, of the values and uncertainties")]
+    value: Annotated[float, Entry("by the earlier test")]
+    demanded_U: Annotated[float, Entry("largest expanded uncertainty, 95 %")]
+    planned_U: Annotated[float, Entry("by the plan")]
+    planned_U_low: Annotated[float, Entry("where the scatter is one standard uncertainty smaller")]
+    planned_U_high: Annotated[float, Entry("where it is one larger")]
+    protocol_U: Annotated[float | None, Entry("by the machine's protocol")]
+    same_time_U: Annotated[float | None, Entry("by the best design of the protocol's time")]
+    sources: Annotated[
+        tuple[tuple[str, float], ...], Entry("the plan's budget: source and standard uncertainty")
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedDesign:
+    """A design in the units of people, slip angles in the order in which they are to be measured."""
+
+    slip_angles_deg: Annotated[tuple[float, ...], Entry("each direction's recordings, in their order")]
+    loads_N: Annotated[tuple[float, ...], Entry("in each recording")]
+    rotations: Annotated[tuple[Rotation, ...], Entry("directions of the drum")]
+    rows: Annotated[int, Entry("conditions of the reduced test")]
+    minutes: Annotated[float, Entry("time on the machine")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProtocolPlan:
+    """The answer of ``toolkit plan test``.
+
+    ``feasible`` False says that no design meets the demands: ``plan`` is then the nearest.
+    """
+
+    feasible: Annotated[bool, Entry("whether every demand is met")]
+    machine: Annotated[str, Entry("its name")]
+    like: Annotated[str, Entry("the test that the plan goes by")]
+    calibration: Annotated[str | None, Entry("record of that test; null without")]
+    plan: Annotated[PlannedDesign, Entry("the plan")]
+    protocol: Annotated[PlannedDesign, Entry("the machine's own protocol")]
+    alike: Annotated[PlannedDesign | None, Entry("the shortest test with the protocol's uncertainties")]
+    same_time: Annotated[PlannedDesign | None, Entry("the best test of the protocol's time")]
+    values: Annotated[tuple[PlannedValue, ...], Entry("what is demanded, and what it will be")]
+    assumptions: Annotated[tuple[str, ...], Entry("what the plan rests on")]
+    gives_up: Annotated[tuple[str, ...], Entry("what the protocol would have given and the plan will not")]
+
+
+def plan_protocol(
+    earlier: EarlierTest,
+    demands: tuple[Demand, ...],
+    loads_N: tuple[float, ...],
+    *,
+    own: Machine,
+    pace: Pace,
+    like: str,
+    minutes: float = math.inf,
+    tell: Callable[[str], None] = lambda _text: None,
+) -> ProtocolPlan:
+    """Return the plan of a test.
+
+    Parameters
+    ----------
+    earlier : what is known of the tire, the machine and their scatter
+    demands, loads_N : what is asked for, at which nominal loads of the earlier test
+    own : the machine with its own protocol, which the plan is compared with
+    minutes : the time on the machine at most
+
+    Raises
+    ------
+    ConfigError
+        ``plan-infeasible``: the time does not hold the smallest design
+    """
+    protocol = protocol_design(earlier, own)
+    question = Question.beside(protocol, earlier=earlier, demands=demands, loads_N=loads_N)
+    tell("the protocol")
+    of_protocol = Found(design=protocol, reaches=question.reaches(protocol), minutes=pace.minutes(protocol))
+    found = least_plan(question, pace, minutes=minutes, tell=tell)
+    alike, same_time = (None, None) if found.worst > 1 else (found, in_time(question, pace, protocol))
+    open_demands = tuple(Demand(name=demand.name, SA_rad=demand.SA_rad) for demand in demands)
+    if alike is not None and (open_demands != demands or not math.isinf(minutes)):
+        tell("the protocol's uncertainties in fewer rows")
+        as_protocol = Question.beside(protocol, earlier=earlier, demands=open_demands, loads_N=loads_N)
+        alike = least_plan(as_protocol, pace, tell=tell)
+    return ProtocolPlan(
+        feasible=found.worst <= 1,
+        machine=own.name,
+        like=like,
+        calibration=None if earlier.shared.record is None else earlier.shared.record.id,
+        plan=_shown(found.design, found.minutes),
+        protocol=_shown(protocol, of_protocol.minutes, in_order=True),
+        alike=None if alike is None or alike.worst > 1 else _shown(alike.design, alike.minutes),
+        same_time=None if same_time is None else _shown(same_time.design, same_time.minutes),
+        values=_values(question, found, of_protocol, same_time),
+        assumptions=_assumptions(earlier, pace),
+        gives_up=_gives_up(found.design, protocol),
+    )
+
+
+def protocol_design(earlier: EarlierTest, own: Machine) -> Design:
+    """Return the design of the machine's protocol, at the earlier test's loads where these are others."""
+    design = standard(own, own.rotations)
+    known = set(design.loads_N) <= set(earlier.loads_N)
+    return design if known else dataclasses.replace(design, loads_N=earlier.loads_N)
+
+
+def in_time(question: Question, pace: Pace, protocol: Design) -> Found | None:
+    """Return the best design at the protocol's loads that takes no longer; None where it has no curve."""
+    search = ProtocolSearch(question, pace, tuple(sorted(protocol.loads_N)))
+    most = search.most_within(pace.minutes(protocol))
+    return search.best(most) if most >= MIN_POINTS else None
+
+
+def _shown(design: Design, minutes: float, *, in_order: bool = False) -> PlannedDesign:
+    angles = design.slip_angles_rad if in_order else ordered(design.slip_angles_rad, seed=_SEED)
+    return PlannedDesign(
+        slip_angles_deg=tuple(round(math.degrees(a), 6) + 0.0 for a in angles),
+        loads_N=tuple(float(load) for load in design.loads_N),
+        rotations=design.rotations,
+        rows=design.rows,
+        minutes=minutes,
+    )
+
+
+def _values(
+    question: Question, found: Found, protocol: Found, same_time: Found | None
+) -> tuple[PlannedValue, ...]:
+    low = {_key(reach): reach.U for reach in question.reaches(found.design, shift=-1.0)}
+    high = {_key(reach): reach.U for reach in question.reaches(found.design, shift=1.0)}
+    by_protocol = {_key(reach): reach.U for reach in protocol.reaches}
+    in_same_time = {} if same_time is None else {_key(reach): reach.U for reach in same_time.reaches}
+    return tuple(
+        PlannedValue(
+            name=reach.demand.label,
+            load_N=float(reach.load_N),
+            rotation=reach.rotation,
+            SA_deg=None if reach.SA_rad is None else round(math.degrees(reach.SA_rad), 6),
+            unit=reach.unit,
+            value=reach.value,
+            demanded_U=reach.limit,
+            planned_U=reach.U,
+            planned_U_low=low.get(_key(reach), reach.U),
+            planned_U_high=high.get(_key(reach), reach.U),
+            protocol_U=by_protocol.get(_key(reach)),
+            same_time_U=in_same_time.get(_key(reach)),
+            sources=reach.sources,
+        )
+        for reach in found.reaches
+    )
+
+
+def _key(reach: Reach) -> tuple[str, float]:
+    return reach.demand.label, reach.load_N
+
+
+def _assumptions(earlier: EarlierTest, pace: Pace) -> tuple[str, ...]:
+    angle = math.degrees(math.sqrt(earlier.variances[3]))
+    statements = [
+        "the tire is like that of the earlier test: its curves say where the slip angles are needed",
+        "blocks scatter about the curves as in that test: "
+        f"{math.sqrt(earlier.variances[0]):.2g} N in FY, {math.sqrt(earlier.variances[1]):.2g} N·m in MZ, "
+        f"{math.sqrt(earlier.variances[2]):.2g} N in the load and {angle:.2g} deg in the slip angle (1 sd), "
+        f"and their loads stand {100 * earlier.load_spread:.2g} % off the common one",
+        "every curve is a Magic Formula; a form that it misses shows only where residuals are left",
+        "what the machine definition states of slip angle, load, pressure and zeros holds",
+        f"a condition takes {pace.condition_s:.1f} s, the next recording {pace.between_files_s:g} s more; "
+        "the time to turn the drum's direction or the tire is not counted",
+    ]
+    if earlier.mirrored:
+        statements.append(
+            f"no run of the earlier test has the drum {' and '.join(earlier.mirrored)}: its curves are taken "
+            "for those of the other direction"
+        )
+    if earlier.shared.record is None:
+        statements.append("no calibration record is at hand: its share of the uncertainty is left out")
+    return tuple(statements)
+
+
+def _gives_up(design: Design, protocol: Design) -> tuple[str, ...]:
+    lost = []
+    loads = [load for load in protocol.loads_N if load not in design.loads_N]
+    if loads:
+        shown = ", ".join(f"{float(from_si(load, 'lbf')):.0f}" for load in loads)
+        lost.append(f"every characteristic at {shown} lbf")
+    if set(design.rotations) < set(protocol.rotations):
+        lost.append("the reversed runs: conicity, plysteer, CRAT and PRAT")
+    steps = sorted(set(protocol.slip_angles_rad) - set(design.slip_angles_rad))
+    if steps:
+        lost.append(f"FY and MZ as measured at {', '.join(f'{math.degrees(a):.4g}' for a in steps)} deg")
+    if any(math.isclose(abs(a), math.radians(1)) for a in steps):
+        lost.append("the ±1 deg secants")
+    spare, usual = (len(d.slip_angles_rad) - MIN_POINTS + 1 for d in (design, protocol))
+    if spare < usual:
+        lost.append(
+            f"{usual - spare} of the {usual} residual freedoms of each curve, by which a wrong block or a "
+            "curve of another form is seen"
+        )
+    return tuple(lost)
+
+
+def protocol_text(plan: ProtocolPlan, own: Protocol) -> str:
+    """Return the protocol file of a plan, as ``process --protocol`` and ``test.toml`` read it."""
+    lines = "# Planned by `toolkit plan test`: measure the slip angles in this order, in each direction.\n"
+    protocol = dataclasses.replace(
+        own,
+        source=f"planned from {plan.like}; all else as in: {own.source}",
+        slip_angles_rad=tuple(math.radians(a) for a in plan.plan.slip_angles_deg),
+        loads_N=_written(plan.plan.loads_N, own.loads_N),
+        rotations=plan.plan.rotations,
+        repeats=1,
+    )
+    return lines + toml_text(protocol)
+
+
+def _written(loads_N: Sequence[float], own: Sequence[float]) -> tuple[float, ...]:
+    """Return loads as the machine's protocol writes them, in its unit."""
+    by_size = {float(load): load for load in own}
+    return tuple(by_size.get(load, load) for load in loads_N)
+
+
+def simulation_text(plan: ProtocolPlan, *, machine: str, on: date, tire: str | None) -> str:
+    """Return the plan file that ``toolkit simulate`` runs."""
+    table: dict[str, Any] = {
+        "schema": 1,
+        "kind": "test",
+        "title": "planned test",
+        "date": on,
+        "machine": machine,
+        "seed": _SEED,
+        "rotations": list(plan.plan.rotations),
+        "slip_angles": {"value": list(plan.plan.slip_angles_deg), "unit": "deg"},
+        "loads": {"value": list(plan.plan.loads_N), "unit": "N"},
+        "acquisition": {"negated": []},
+    }
+    if tire is not None:
+        table["tire"] = {"file": tire}
+    return toml_text(table)

@@ -1,0 +1,230 @@
+"""The least test that meets demands: slip angles, repeats and loads, judged by `expectation`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from toolkit.channels import ROTATIONS, Rotation
+from toolkit.characteristics.catalogue import by_name
+from toolkit.errors import ConfigError
+from toolkit.planning.demands import Demand
+from toolkit.planning.design import Design, Pace, steps_of
+from toolkit.planning.exchange import Exchange, Points
+from toolkit.planning.reach import Reach, is_of, worst
+from toolkit.planning.screen import screen_of
+from toolkit.tires.fit import MIN_POINTS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.planning.expectation import EarlierTest
+
+# A curve that a report prints is measured to its peak, or to the end of the range: within this part of it.
+_PEAK_SHARE = 0.99
+_MOST = 30  # slip angles in each direction
+# A printed U has two digits, and is rounded down by at most this part: within it two are the same.
+_ALIKE = 1.05
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Question:
+    """What is asked: demands at nominal loads [N]; an earlier test says what a design will reach.
+
+    ``protocol_U`` is what the machine's own protocol reaches, by demand and load, and a twentieth more: the
+    limit of a demand without one.
+    """
+
+    earlier: EarlierTest
+    demands: tuple[Demand, ...]
+    loads_N: tuple[float, ...]
+    protocol_U: Mapping[tuple[Demand, float], float] = field(default_factory=dict)
+
+    @classmethod
+    def beside(
+        cls,
+        protocol: Design,
+        *,
+        earlier: EarlierTest,
+        demands: tuple[Demand, ...],
+        loads_N: tuple[float, ...],
+    ) -> Question:
+        """Return a question that knows what the machine's protocol reaches."""
+        bare = cls(earlier=earlier, demands=demands, loads_N=loads_N)
+        reached = {(reach.demand, reach.load_N): _ALIKE * reach.U for reach in bare.reaches(protocol)}
+        return dataclasses.replace(bare, protocol_U=reached)
+
+    @property
+    def rotations(self) -> tuple[Rotation, ...]:
+        """The directions that the demands need: forward alone where none is of both."""
+        both = any(by_name()[demand.characteristic].scope == "load" for demand in self.demands)
+        return ROTATIONS if both else ROTATIONS[:1]
+
+    @cached_property
+    def candidates_rad(self) -> tuple[float, ...]:
+        """The slip angles at which the machine can stand and the earlier test measured [rad]."""
+        low, high = self.earlier.reach_rad
+        slack = self.earlier.machine.protocol.slip_angle_tolerance_rad
+        steps = steps_of(self.earlier.machine.protocol)
+        return tuple(step for step in steps if low - slack <= step <= high + slack)
+
+    def reaches(self, design: Design, *, shift: float = 0.0) -> tuple[Reach, ...]:
+        """Return what a design reaches of every demand at every load asked for; empty where it lacks one."""
+        rows = self.earlier.rows(design, self.demands, shift=shift)
+        reaches = []
+        for demand in self.demands:
+            for load in self.loads_N:
+                at_load = self.earlier.curves[load, "forward"].fit.load_N
+                mine = [row for row in rows if is_of(row, demand, at_load)]
+                reach = worst(demand, mine, load, self.protocol_U.get((demand, load), math.inf))
+                if reach is None:
+                    return ()
+                reaches.append(reach)
+        return tuple(reaches)
+
+    @cached_property
+    def _at_peak(self) -> NDArray[np.bool_]:
+        """Which candidates measure the peak: (loads and sides, candidates)."""
+        every = np.array(self.candidates_rad)
+        rows = []
+        for load in self.loads_N:
+            force = np.abs(self.earlier.force(every, load, "forward"))
+            rows += [
+                side & (force >= _PEAK_SHARE * force[side].max(initial=0.0))
+                for side in (every < 0, every > 0)
+            ]
+        return np.array(rows)
+
+    def covers(self, points: Points) -> bool:
+        """Tell whether candidates give a curve: enough places, to the peak on either side."""
+        chosen = list(dict.fromkeys(points))
+        return len(chosen) >= MIN_POINTS and bool(self._at_peak[:, chosen].any(axis=1).all())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """A design with what it reaches; ``worst`` is the largest of U over demand."""
+
+    design: Design
+    reaches: tuple[Reach, ...]
+    minutes: float
+
+    @property
+    def worst(self) -> float:
+        """The largest of U over what was demanded; at most 1 where all demands are met."""
+        return max((reach.ratio for reach in self.reaches), default=math.inf)
+
+
+class ProtocolSearch:
+    """The search for one question at a choice of loads; what was judged is kept for every size."""
+
+    def __init__(
+        self,
+        question: Question,
+        pace: Pace,
+        loads_N: tuple[float, ...],
+        tell: Callable[[str], None] = lambda _text: None,
+    ) -> None:
+        self.question, self.pace, self.loads_N, self._tell = question, pace, loads_N, tell
+        self.candidates = question.candidates_rad
+        full = self.design(tuple(range(len(self.candidates))))
+        self.full = self.found(full)
+        self._screen = screen_of(question.earlier, full, self.full.reaches)
+        self._exchange = Exchange(self._criterion, len(self.candidates))
+        self._best: dict[int, Points] = {}
+
+    def design(self, points: Points) -> Design:
+        """Return the design of slip angles at the search's loads, in all directions that are needed."""
+        angles = tuple(self.candidates[i] for i in points)
+        return Design(slip_angles_rad=angles, loads_N=self.loads_N, rotations=self.question.rotations)
+
+    def found(self, design: Design) -> Found:
+        """Return a design with what it reaches."""
+        return Found(design=design, reaches=self.question.reaches(design), minutes=self.pace.minutes(design))
+
+    def best(self, size: int) -> Found:
+        """Return the best design of a number of recordings in each direction."""
+        if size not in self._best:
+            self._tell(f"{size} slip angles")
+            larger = min((n for n in self._best if n > size), default=None)
+            start = self._best[larger] if larger else tuple(range(len(self.candidates)))
+            self._best[size] = self._exchange.improved(self._exchange.resized(start, size))
+        return self.found(self.design(self._best[size]))
+
+    def least(self, most: int) -> Found | None:
+        """Return the best design of the fewest slip angles, at most so many, that meets every demand."""
+        low, high = MIN_POINTS, most
+        if high < low or self.best(high).worst > 1:
+            return None
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if self.best(middle).worst <= 1 else (middle + 1, high)
+        return self.best(high)
+
+    def most_within(self, minutes: float) -> int:
+        """Return how many slip angles fit into a time."""
+        of_each = self.pace.minutes(self.design((0,)))
+        return int(min(minutes / of_each + 1e-9, _MOST))
+
+    def _criterion(self, points: Points) -> float:
+        if not self.question.covers(points):
+            return math.inf
+        return self._screen.criterion(points)
+
+
+def least_plan(
+    question: Question,
+    pace: Pace,
+    *,
+    minutes: float = math.inf,
+    tell: Callable[[str], None] = lambda _text: None,
+) -> Found:
+    """Return the shortest design that meets every demand, or the nearest to it that the time allows.
+
+    Further loads beside those that are asked for are tried, nearest first: by its neighbours a block is
+    carried to the load that all blocks share. ``worst`` of what is returned is above 1 where no design
+    meets the demands.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-infeasible``: the time does not hold the smallest design
+    """
+    met, missed, shortest = None, None, math.inf
+    for loads in load_sets(question):
+        tell(f"{len(loads)} loads")
+        search = ProtocolSearch(question, pace, loads, tell)
+        shortest = min(shortest, pace.minutes(search.design((0,) * MIN_POINTS)))
+        points = search.most_within(min(minutes, math.inf if met is None else met.minutes))
+        if points < MIN_POINTS:
+            continue
+        least = search.least(points)
+        if least is not None:
+            met = least if met is None or least.minutes < met.minutes else met
+        elif met is None:
+            nearest = search.best(points)
+            missed = nearest if missed is None or nearest.worst < missed.worst else missed
+    if met is None and missed is None:
+        raise ConfigError(
+            "no test fits into the time", where="--minutes", got=f"{minutes:g} min",
+            expected=f"{math.ceil(10 * shortest) / 10:g} min at least: {MIN_POINTS} slip angles, the fewest "
+            "of a curve",
+            next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
+        )  # fmt: skip
+    return met or cast("Found", missed)
+
+
+def load_sets(question: Question) -> tuple[tuple[float, ...], ...]:
+    """Return the loads that are asked for, then with one more each time, the nearest first."""
+    asked = question.loads_N
+    remaining = sorted(
+        (load for load in question.earlier.loads_N if load not in asked),
+        key=lambda load: min(abs(load - wished) for wished in asked),
+    )
+    return tuple(tuple(sorted((*asked, *remaining[:count]))) for count in range(len(remaining) + 1))

@@ -1,0 +1,150 @@
+"""What of a budget hangs on the slip angles, for many designs at once: what an exchange goes by.
+
+A reading moves with the parameters of its curves by a gradient g, and these with the conditions by J^+, so
+that conditions of variances s² leave (g J^+)² s² of it (`characteristics.reading`). All else in the budget,
+what all rows share, stays as it is whatever the slip angles. The gradient is taken by moving a curve's
+parameters and letting the catalogue read again: no formula of a characteristic stands here. A design that
+comes out of the exchange is judged by the whole budget (`expectation`), not by this.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.characteristics.catalogue import by_name
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction
+from toolkit.characteristics.reading import Reader
+from toolkit.tires.catalog import model
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.planning.design import Design
+    from toolkit.planning.expectation import EarlierTest
+    from toolkit.planning.reach import Reach
+    from toolkit.tires.model import CurveFit
+
+    Array = NDArray[np.float64]
+
+_OWN = ("repeatability", "fit", "slip angle scatter")  # of the budget, what follows the design
+_STEP = 1e-4  # of a parameter's size
+_NO_DATA = 1e-8
+_COVERAGE = 1.96
+_POWER = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Screen:
+    """Demands on the curves of a list of candidate slip angles.
+
+    ``tangents`` (curves, candidates, parameters), scaled, and ``variances`` (curves, candidates) of their
+    conditions; ``gradients`` (readings, curves, parameters) in the same scale; ``fixed`` (readings,) the
+    variances that stay, ``limits`` (readings,) of the expanded uncertainty.
+    """
+
+    tangents: Array
+    variances: Array
+    gradients: Array
+    fixed: Array
+    limits: Array
+
+    def criterion(self, points: Sequence[int]) -> float:
+        """Return the largest U over its limit, where many are alike a little more."""
+        chosen = list(points)
+        pseudo = np.linalg.pinv(self.tangents[:, chosen], rcond=_NO_DATA)
+        weights = np.einsum("rcp,cpn->rcn", self.gradients, pseudo)
+        own = np.einsum("rcn,cn->r", weights**2, self.variances[:, chosen])
+        ratios = _COVERAGE * np.sqrt(self.fixed + own) / self.limits
+        return float(np.sum(ratios**_POWER) ** (1 / _POWER))
+
+
+def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> Screen:
+    """Return the screen of demands.
+
+    Parameters
+    ----------
+    full : the design of every candidate slip angle, ascending, once
+    reaches : what it reaches of each demand at each load, by the whole budget
+    """
+    directions = earlier.directions(full)
+    places: dict[tuple[float, str, str], int] = {}
+    scatter = earlier.expected_scatter(directions)
+    tangents, variances, scales = [], [], []
+    for direction in directions:
+        for channel in CHANNELS:
+            fit = _fit(direction, channel)
+            places[direction.group.load_N, direction.group.rotation, channel] = len(places)
+            jacobian = model(fit.model).jacobian(fit.values, direction.group.SA).T
+            free = np.array([parameter.name not in fit.at_bound for parameter in fit.parameters])
+            size = np.linalg.norm(jacobian, axis=0) * free
+            scale = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
+            tangents.append(jacobian * scale)
+            scales.append(scale)
+            variances.append(direction.group.own_u(channel) ** 2 + scatter.each(direction, channel))
+    gradients = np.zeros((len(reaches), len(tangents), len(scales[0])))
+    for row, reach in enumerate(reaches):
+        for (direction, channel), gradient in _gradients(earlier, directions, reach):
+            at = places[direction.group.load_N, direction.group.rotation, channel]
+            gradients[row, at] = gradient * scales[at]
+    fixed = [sum(u * u for source, u in reach.sources if source not in _OWN) for reach in reaches]
+    return Screen(
+        tangents=np.array(tangents),
+        variances=np.array(variances),
+        gradients=gradients,
+        fixed=np.array(fixed),
+        limits=np.array([reach.limit for reach in reaches]),
+    )
+
+
+def _fit(direction: Direction, channel: Channel) -> CurveFit:
+    fit = direction.curve(channel)
+    if fit is None:  # an earlier test has none without both
+        raise ValueError(f"no curve of {channel} at {direction.group.load_N:g} N")
+    return fit
+
+
+def _gradients(
+    earlier: EarlierTest, directions: Sequence[Direction], reach: Reach
+) -> Iterator[tuple[tuple[Direction, Channel], Array]]:
+    """Yield d value / d parameters of each curve that a reading is read off."""
+    declared = by_name()[reach.demand.characteristic]
+    load = earlier.curves[reach.load_N, "forward"].fit.load_N
+    runs = declared.runs if declared.scope == "load" else (reach.rotation,)
+    read_off = [d for run in runs for d in directions if (d.group.load_N, d.group.rotation) == (load, run)]
+    at = () if reach.SA_rad is None else (reach.SA_rad,)
+    # Of the value alone: what the rows share is not asked for.
+    shared = dataclasses.replace(earlier.shared, record=None)
+
+    def value(moved: Direction | None, place: int) -> float:
+        readers = [
+            Reader(moved if moved is not None and i == place else direction, shared=shared, stepped=False)
+            for i, direction in enumerate(read_off)
+        ]
+        number = declared.read(declared, *readers, *at)
+        return math.nan if number is None else number.value
+
+    for place, direction in enumerate(read_off):
+        for channel in CHANNELS:
+            fit = _fit(direction, channel)
+            slopes = []
+            for i, parameter in enumerate(fit.parameters):
+                step = _STEP * max(abs(parameter.value), 1e-3)
+                ends = []
+                for sign in (1.0, -1.0):
+                    values = list(fit.parameters)
+                    values[i] = dataclasses.replace(parameter, value=parameter.value + sign * step)
+                    changed = dataclasses.replace(fit, parameters=tuple(values))
+                    moved = (
+                        dataclasses.replace(direction.fit, FY=changed)
+                        if channel == "FY"
+                        else dataclasses.replace(direction.fit, MZ=changed)
+                    )
+                    ends.append(value(dataclasses.replace(direction, fit=moved), place))
+                slopes.append((ends[0] - ends[1]) / (2 * step))
+            yield (direction, channel), np.array(slopes)

@@ -1,0 +1,95 @@
+"""The order of planned loads: mounts in turn, each loaded up and then down, against drift and creep.
+
+Least squares takes a drift for a slope where loads rise with time, and creep after a large load for a part of
+the next one. Neither needs a term where the order is such that the coefficients do not answer to it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.planning.fixtures import FeasibleLoads
+
+_SWAPS, _STARTS = 60, 5
+
+
+def visits(
+    rows: NDArray[np.intp], chosen: NDArray[np.intp], feasible: FeasibleLoads, up: NDArray[np.bool_]
+) -> list[NDArray[np.intp]]:
+    """Return the rows of a run by mount, each loaded from the smallest up and then down again.
+
+    ``chosen`` (rows of the session,) is the candidate of each row, ``up`` (rows,) its direction.
+    """
+    by_mount: dict[str, list[int]] = {}
+    for row in rows.tolist():
+        by_mount.setdefault(feasible.mount[chosen[row]], []).append(row)
+    size = feasible.amount[chosen]
+    return [
+        np.array(sorted(group, key=lambda row: (not up[row], size[row] if up[row] else -size[row])))
+        for group in by_mount.values()
+    ]
+
+
+def in_order(
+    runs: list[list[NDArray[np.intp]]],
+    weights: NDArray[np.float64],
+    relative: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the rows of a session in the order that its results answer least to, and what they answer.
+
+    Parameters
+    ----------
+    runs : of each run its visits, as `visits` makes them
+    weights : (results, rows) what a unit error of each row makes of each result
+    relative : (results, rows) the load of each row that creeps, by the largest
+
+    The answers (results, 2) are those to a drift of one unit over a run and to a creep of one unit after the
+    largest load, the sizes of different runs independent of each other.
+    """
+    sequences = [_best_order(groups, weights, relative, rng) for groups in runs]
+    answers = np.sum([_squares(rows, weights, relative) for rows in sequences], axis=0)
+    return np.concatenate(sequences), np.sqrt(answers)
+
+
+def _best_order(
+    groups: list[NDArray[np.intp]],
+    weights: NDArray[np.float64],
+    relative: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> NDArray[np.intp]:
+    """Return a run's rows by swaps of its visits, the best of a few starts."""
+    ends = []
+    for _ in range(_STARTS if len(groups) > 1 else 1):
+        order = rng.permutation(len(groups))
+        lowest = float(_squares(_sequence(groups, order), weights, relative).sum())
+        for _ in range(_SWAPS if len(groups) > 1 else 0):
+            i, j = rng.choice(len(groups), size=2, replace=False)
+            order[[i, j]] = order[[j, i]]
+            size = float(_squares(_sequence(groups, order), weights, relative).sum())
+            if size < lowest:
+                lowest = size
+            else:
+                order[[i, j]] = order[[j, i]]
+        ends.append((lowest, _sequence(groups, order)))
+    return min(ends, key=lambda end: end[0])[1]
+
+
+def _sequence(groups: list[NDArray[np.intp]], order: NDArray[np.intp]) -> NDArray[np.intp]:
+    return np.concatenate([groups[at] for at in order])
+
+
+def _squares(
+    rows: NDArray[np.intp], weights: NDArray[np.float64], relative: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the squared answers (results, 2) of a run's rows in their order."""
+    drift = np.linspace(-0.5, 0.5, len(rows))
+    drift -= drift.mean()
+    share = relative[:, rows]
+    creep = np.diff(share, axis=1, prepend=0.0)  # what the load before leaves: it rises towards the new one
+    return np.stack([(weights[:, rows] @ drift) ** 2, np.sum(weights[:, rows] * creep, axis=1) ** 2], axis=1)

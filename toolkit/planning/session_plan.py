@@ -1,0 +1,257 @@
+"""The plan of a calibration session: its loads in their order, its check loads, and what they will give."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.findings import Finding
+from toolkit.planning.check_loads import Verification, choose_check_loads
+from toolkit.planning.row_exchange import Criterion, loss
+from toolkit.planning.sequence import in_order, visits
+from toolkit.planning.session_search import Demand, Design, SessionSearch
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.session.table import Table
+    from toolkit.planning.fixtures import FeasibleLoads
+    from toolkit.planning.knowledge import Knowledge
+
+_LARGE = 0.5  # of one repeatability: an answer to drift or creep that a reader should know of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedLoad:
+    """A row: its run, mount, what hangs there, the loads in the record's order and units."""
+
+    run: int
+    mount: str
+    label: str
+    direction: str
+    loads: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outlook:
+    """What is expected of one load: U at ``at`` today, as asked, as expected, and in nine of ten sessions.
+
+    ``U_repeated`` is what the last session's own loads are expected to give another time.
+    ``share`` of simulated sessions reach what was asked. ``floor`` is U without the part that more rows can
+    lower; ``visible_misfit`` the misfit that four of five sessions would show; ``drift`` and ``creep``
+    what one repeatability of each makes of the load. All in ``unit``.
+    """
+
+    load: str
+    unit: str
+    at: float
+    U_today: float
+    U_repeated: float
+    U_asked: float | None
+    U: float
+    U_in_nine_of_ten: float
+    share: float | None
+    floor: float
+    visible_misfit: float | None
+    drift: float
+    creep: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SessionPlan:
+    """A planned session: rows in their order, check loads after them, and what it is expected to give."""
+
+    record: str
+    instrument: str
+    source: str
+    criterion: Criterion
+    criterion_value: float
+    runs: int
+    rows: tuple[PlannedLoad, ...]
+    check: tuple[PlannedLoad, ...]
+    outlook: tuple[Outlook, ...]
+    verification: tuple[Verification, ...]
+    minutes: float | None
+    rows_today: int
+    check_today: int
+    replicates: int
+    simulated: int
+    assumptions: tuple[str, ...]
+    gives_up: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+
+def plan_session(knowledge: Knowledge, feasible: FeasibleLoads, demand: Demand) -> SessionPlan:
+    """Return the plan of a session.
+
+    With a demand of U it is the shortest plan that is expected to keep it (by minutes where they are stated,
+    else by loads); with minutes alone the one of least U in them; without either the shortest that keeps
+    today's U within a twentieth.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-infeasible``: no plan keeps the demand; the message has the nearest one
+        ``plan-fixtures``: the feasible loads cannot tell the coefficients
+    """
+    search = SessionSearch(knowledge, feasible, demand)
+    return _Finished(search).plan(search.best())
+
+
+class _Finished:
+    """What a design comes to: its order, its check loads, what is expected, what it rests on."""
+
+    def __init__(self, search: SessionSearch) -> None:
+        self.search, self.demand = search, search.demand
+        self.knowledge, self.feasible = search.knowledge, search.feasible
+        self.asked = search.asked
+
+    def plan(self, design: Design) -> SessionPlan:
+        """Return the plan of a design."""
+        knowledge, feasible = self.knowledge, self.feasible
+        rng = np.random.default_rng([self.demand.seed, 1])
+        load, up = self.search.place[design.chosen], self.search.up[design.chosen]
+        table = self.search.table(design.chosen, design.run)
+        runs = [
+            visits(np.flatnonzero(design.run == number), load, feasible, up) for number in range(design.runs)
+        ]
+        order, answers = in_order(runs, knowledge.weights(table), knowledge.relative(table), rng)
+        check, verified, minutes = self._check_loads(design, load)
+        check = np.array(
+            sorted(check.tolist(), key=lambda at: (feasible.mount[at], feasible.amount[at])), dtype=np.intp
+        )
+        drawn = np.array(
+            [[budget.U for budget in knowledge.simulated(table, rng)] for _ in range(self.demand.simulated)]
+        )
+        outlook = self._outlook(design, table, drawn, answers)
+        replicates = len(load) - len(np.unique(np.column_stack([load, up]), axis=0))
+        return SessionPlan(
+            record=knowledge.record.id,
+            instrument=knowledge.record.instrument,
+            source=feasible.source,
+            criterion=self.demand.criterion,
+            criterion_value=loss(self.search.responses, design.chosen, design.run, self.demand.criterion),
+            runs=design.runs,
+            rows=tuple(
+                self._row(int(load[at]), int(design.run[at]) + 1, bool(up[at])) for at in order.tolist()
+            ),
+            check=tuple(self._row(at, design.runs + 1, True) for at in check.tolist()),
+            outlook=outlook,
+            verification=verified,
+            minutes=minutes,
+            rows_today=knowledge.loads.rows,
+            check_today=0 if knowledge.check is None else knowledge.check.rows,
+            replicates=replicates,
+            simulated=self.demand.simulated,
+            assumptions=self._assumptions(),
+            gives_up=self._gives_up(design, outlook),
+            findings=self._findings(verified, outlook),
+        )
+
+    def _check_loads(
+        self, design: Design, load: NDArray[np.intp]
+    ) -> tuple[NDArray[np.intp], tuple[Verification, ...], float | None]:
+        """Return check loads, what they verify, all minutes; none of the fit where that takes no longer."""
+        search = self.search
+        apart, verified = choose_check_loads(self.knowledge, self.feasible.loads, frozenset(load.tolist()))
+        minutes = search.minutes(design.chosen, design.run, apart)
+        if minutes is not None and design.minutes is not None and minutes > design.minutes:
+            return search.check, search.verified, design.minutes
+        return apart, verified, minutes
+
+    def _row(self, at: int, run: int, up: bool) -> PlannedLoad:
+        return PlannedLoad(
+            run=run, mount=self.feasible.mount[at], label=self.feasible.label[at],
+            direction="up" if up else "down", loads=tuple(self.feasible.loads[at].tolist()),
+        )  # fmt: skip
+
+    def _outlook(
+        self, design: Design, table: Table, drawn: NDArray[np.float64], answers: NDArray[np.float64]
+    ) -> tuple[Outlook, ...]:
+        knowledge = self.knowledge
+        misfits = knowledge.visible_misfit(table)
+        return tuple(
+            Outlook(
+                load=fit.load, unit=fit.unit, at=budget.at, U_today=budget.U,
+                U_repeated=float(self.search.today[at]),
+                U_asked=float(self.asked[at]) if math.isfinite(self.asked[at]) else None,
+                U=float(design.U[at]), U_in_nine_of_ten=float(np.quantile(drawn[:, at], 0.9)),
+                share=float(np.mean(drawn[:, at] <= self.asked[at] * (1 + 1e-9)))
+                if math.isfinite(self.asked[at]) else None,
+                floor=knowledge.floor(at), visible_misfit=misfits[at],
+                drift=float(answers[at, 0]) * own.runs.within, creep=float(answers[at, 1]) * own.runs.within,
+            )
+            for at, (fit, own, budget) in enumerate(
+                zip(knowledge.record.loads, knowledge.scatter, knowledge.today, strict=True)
+            )
+        )  # fmt: skip
+
+    def _assumptions(self) -> tuple[str, ...]:
+        knowledge, record = self.knowledge, self.knowledge.record
+        between = ", ".join(
+            f"{fit.load} {own.within:.3g} within, {own.zero:.3g} zero, {own.gain:.3g} gain {fit.unit}"
+            for fit, own in zip(record.loads, knowledge.runs, strict=True)
+        )
+        told = knowledge.scatter[0].runs.groups
+        return (
+            f"readings scatter as in {record.id}, runs by a standard error more: {between}"
+            + (f", from {told} runs" if told > 1 else "; one run tells nothing of the next"),
+            f"the equations are those of {record.id}, and the cells answer as they did then",
+            "readings are independent of each other but for the zero and the gain of their run",
+            "what the record's budget takes from statements (reference, resolution, creep, zero) stays",
+            "a misfit, a difference of the directions, a zero and a gain of each run are allowed for with "
+            "one repeatability at least, also where the last session showed none",
+        )
+
+    def _gives_up(self, design: Design, outlook: tuple[Outlook, ...]) -> tuple[str, ...]:
+        fewer = self.knowledge.loads.rows - len(design.run)
+        wider = [
+            f"{load.load} by {100 * (load.U / load.U_repeated - 1):.1f} %"
+            for load in outlook
+            if load.U_repeated < load.U
+        ]
+        seen = ", ".join(
+            f"{load.load} {load.visible_misfit:.3g} {load.unit}"
+            for load in outlook
+            if load.visible_misfit is not None
+        )
+        blind = ", ".join(load.load for load in outlook if load.visible_misfit is None)
+        lines = (
+            [f"a misfit of the equation below {seen} passes unseen in one of five sessions"] if seen else []
+        )
+        if blind:
+            lines.append(f"no misfit of the equation of {blind} can be seen: the loads have too few levels")
+        if fewer > 0:
+            lines.append(f"{fewer} readings fewer than {self.knowledge.record.id}: an outlier weighs more")
+        if wider:
+            lines.append(f"U is wider than by the last session's loads: {', '.join(wider)}")
+        return tuple(lines)
+
+    def _findings(
+        self, verified: tuple[Verification, ...], outlook: tuple[Outlook, ...]
+    ) -> tuple[Finding, ...]:
+        record = self.knowledge.record
+        findings = [
+            Finding(
+                rule="plan-unverified", where=f"{record.id}, {entry.load}",
+                message=f"no feasible load moves {entry.load} by {entry.term} as much as five tolerances "
+                f"({entry.movement:.2g} at most): its sign stays unverified",
+            )
+            for entry in verified
+            if not entry.verified
+        ]  # fmt: skip
+        for load, own in zip(outlook, self.knowledge.scatter, strict=True):
+            sizes = {"drift": load.drift, "creep": load.creep}
+            findings += [
+                Finding(
+                    rule="plan-order", where=f"{record.id}, {load.load}", level="note",
+                    message=f"a {name} of one repeatability in every run moves {load.load} by {size:.2g} "
+                    f"{load.unit}: read the zeros before and after each run",
+                )
+                for name, size in sizes.items()
+                if size > _LARGE * own.runs.within
+            ]  # fmt: skip
+        return tuple(findings)

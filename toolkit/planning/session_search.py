@@ -1,0 +1,336 @@
+"""The search for a session's loads: the shortest design that keeps a stated U, or the best one in a time."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.fit.findings import FEW_POINTS
+from toolkit.errors import ConfigError
+from toolkit.planning.check_loads import choose_check_loads
+from toolkit.planning.row_exchange import Criterion, Price, exchange, loss
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.session.table import Table
+    from toolkit.planning.fixtures import FeasibleLoads
+    from toolkit.planning.knowledge import Knowledge
+
+FEWEST_RUNS, MOST_RUNS = 3, 10
+MOST_ROWS = 160
+SLACK = 1.05
+"""Today's U times this is asked for where nothing else is: a twentieth is no second digit of U."""
+_SEARCH_STARTS, _FINAL_STARTS = 1, 4
+_LARGE = 0.5  # of the largest load
+_SHARES = (1.0, 0.3, 0.1)  # of what a minute is worth: as few mounts as the runs' differences allow
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Demand:
+    """What a plan is asked for: U at the largest load [the record's unit] by load; minutes and loads at most.
+
+    The check loads count in the minutes, not in the loads. ``simulated`` sessions tell how sure U is.
+    """
+
+    U: tuple[tuple[str, float], ...] = ()
+    minutes: float | None = None
+    loads: int | None = None
+    criterion: Criterion = "D"
+    seed: int = 0
+    simulated: int = 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Design:
+    """Chosen candidates of the doubled list (up, then down) and the run of each row."""
+
+    chosen: NDArray[np.intp]
+    run: NDArray[np.intp]
+    U: NDArray[np.float64]
+    minutes: float | None
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return int(self.run.max()) + 1
+
+    @property
+    def text(self) -> str:
+        """How many loads, runs and minutes it takes."""
+        time = "" if self.minutes is None else f", {self.minutes:.0f} minutes"
+        return f"{len(self.run)} loads in {self.runs} runs{time}"
+
+
+class SessionSearch:
+    """The search over runs and rows: one exchange for each, their U as the record's own budget has it."""
+
+    def __init__(self, knowledge: Knowledge, feasible: FeasibleLoads, demand: Demand) -> None:
+        self.knowledge, self.feasible, self.demand = knowledge, feasible, demand
+        down = feasible.unloadable()
+        self.place = np.concatenate([np.arange(len(feasible.loads)), down])
+        self.loads = feasible.loads[self.place]
+        self.up = np.arange(len(self.place)) < len(feasible.loads)
+        self.responses = knowledge.responses(self.loads, self.up)
+        self.asked = np.array([dict(demand.U).get(name, math.inf) for name in knowledge.names])
+        self.today = np.array([budget.U for budget in knowledge.repeated()])
+        if not demand.U and not self.limited:
+            self.asked = SLACK * self.today
+        self.check, self.verified = choose_check_loads(knowledge, feasible.loads, frozenset())
+        self._designs: dict[tuple[int, int], Design] = {}
+        if demand.loads is not None and demand.loads < FEW_POINTS:
+            raise ConfigError(
+                "too few loads for a session", where="--loads", got=demand.loads,
+                expected=f"{FEW_POINTS} loads at least, as ASTM E74 asks for",
+                next_step=f"nearest: --loads {FEW_POINTS}", rule="plan-infeasible",
+            )  # fmt: skip
+        if demand.minutes is not None and feasible.minutes is None:
+            raise ConfigError(
+                "nobody stated how long a load takes", where="--minutes", got=feasible.source,
+                expected="fixtures with minutes and setup_minutes",
+                next_step="state them in a file of fixtures: --fixtures FILE", rule="plan-fixtures",
+            )  # fmt: skip
+        self._refuse_what_cannot_be_told()
+
+    def _refuse_what_cannot_be_told(self) -> None:
+        for fit, response in zip(self.knowledge.record.loads, self.responses, strict=True):
+            terms = response.common[:, : response.wanted]
+            if np.linalg.matrix_rank(terms, tol=1e-6) < response.wanted:
+                absent = [
+                    self.knowledge.names[at]
+                    for at in range(self.feasible.loads.shape[1])
+                    if not self.feasible.loads[:, at].any()
+                ]
+                lacking = f", none of {', '.join(absent)}" if absent else f" for the terms of {fit.load}"
+                raise ConfigError(
+                    "the feasible loads cannot tell the coefficients apart", where=self.feasible.source,
+                    got=f"{len(self.feasible.loads)} loads{lacking}",
+                    expected="loads that move every term by itself",
+                    next_step="add a fixture that loads "
+                    + (" and ".join(absent) or "the cells in another combination"),
+                    rule="plan-fixtures",
+                )  # fmt: skip
+
+    def design(self, runs: int, per_run: int, starts: int = _SEARCH_STARTS) -> Design:
+        """Return the design of a number of runs and rows in each."""
+        key = (runs, per_run)
+        if starts == _SEARCH_STARTS and key in self._designs:
+            return self._designs[key]
+        run = np.repeat(np.arange(runs), per_run)
+        rng = np.random.default_rng([self.demand.seed, runs, per_run])
+        chosen = self._exchanged(run, rng, starts, None)
+        if self.feasible.setup_minutes is not None:
+            price = self._price(chosen, run)
+            for share in _SHARES:
+                cheaper = self._exchanged(
+                    run, rng, starts, dataclasses.replace(price, weight=share * price.weight)
+                )
+                if self._seen_in_runs(cheaper, run):
+                    chosen = cheaper
+                    break
+        budgets = self.knowledge.expected(self.table(chosen, run))
+        design = Design(
+            chosen=chosen, run=run, U=np.array([budget.U for budget in budgets]),
+            minutes=self.minutes(chosen, run, self.check),
+        )  # fmt: skip
+        self._designs[key] = design
+        return design
+
+    def _exchanged(
+        self, run: NDArray[np.intp], rng: np.random.Generator, starts: int, price: Price | None
+    ) -> NDArray[np.intp]:
+        by = self.demand.criterion
+        return exchange(self.responses, run, by, rng, starts=starts, price=price, once=True)
+
+    def _seen_in_runs(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> bool:
+        """Tell whether every load is large in as many runs as tell how runs differ."""
+        largest = np.abs(self.feasible.loads).max(axis=0)
+        large = np.abs(self.loads[chosen]) >= _LARGE * largest
+        return all(len(np.unique(run[column])) >= FEWEST_RUNS for column in large.T)
+
+    def _price(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> Price:
+        """Return what a minute is worth: as much as it brings where it is spent on further rows."""
+        feasible, by = self.feasible, self.demand.criterion
+        setup = feasible.setup_minutes or {}
+        minutes = np.zeros(len(feasible.loads)) if feasible.minutes is None else feasible.minutes
+        mounts = {mount: number for number, mount in enumerate(setup)}
+        price = Price(
+            mount=np.array([mounts.get(mount, -1) for mount in feasible.mount])[self.place],
+            minutes=minutes[self.place],
+            setup=np.array([setup.get(mount, 0.0) for mount in feasible.mount])[self.place],
+            weight=1.0,
+        )
+        # n rows have a determinant as n^p and variances as 1/n: d(loss) for a share of n.
+        worth = loss(self.responses, chosen, run, by)
+        if by == "D":
+            worth = float(sum(response.wanted for response in self.responses))
+        return dataclasses.replace(price, weight=worth / max(price.total(chosen, run), 1e-9))
+
+    def table(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> Table:
+        """Return a design as a session's table."""
+        return self.knowledge.table(self.loads[chosen], run, self.up[chosen])
+
+    def minutes(
+        self, chosen: NDArray[np.intp], run: NDArray[np.intp], check: NDArray[np.intp]
+    ) -> float | None:
+        """Return how long readings, mountings, runs and check loads take; None where nobody stated it."""
+        feasible = self.feasible
+        if feasible.minutes is None or feasible.setup_minutes is None or feasible.run_minutes is None:
+            return None
+        load = self.place[chosen]
+        mounted = {(r, feasible.mount[at]) for r, at in zip(run.tolist(), load.tolist(), strict=True)}
+        mounted |= {(-1, feasible.mount[at]) for at in check.tolist()}
+        setup = sum(feasible.setup_minutes.get(mount, 0.0) for _, mount in mounted)
+        readings = feasible.minutes[load].sum() + feasible.minutes[check].sum()
+        return float(readings + setup + (int(run.max()) + 1) * feasible.run_minutes)
+
+    def best(self) -> Design:
+        """Return the design that the demand asks for."""
+        if math.isfinite(self.asked.min()):
+            return self._shortest()
+        return self._least_within_limits()
+
+    def _cost(self, design: Design) -> float:
+        return len(design.run) if design.minutes is None else design.minutes
+
+    def _fewest(self, runs: int) -> int:
+        terms = max(response.wanted for response in self.responses)
+        return max(math.ceil(FEW_POINTS / runs), math.ceil((terms + 2) / runs), 3)
+
+    def _most(self, runs: int) -> int:
+        """Return the rows that a run can have: no load twice in the same direction."""
+        return min(MOST_ROWS // runs, len(self.place))
+
+    def _shortest(self) -> Design:
+        kept: list[Design] = []
+        floors = np.array([self.knowledge.floor(at) for at in range(len(self.asked))])
+        if (self.asked < floors).any():  # not even known coefficients would do
+            for runs in (FEWEST_RUNS, MOST_RUNS):
+                self.design(runs, self._most(runs))
+            self._refuse_uncertainty()
+        for runs in range(FEWEST_RUNS, MOST_RUNS + 1):
+            least = self._fewest(runs)
+            if least > self._most(runs):
+                continue
+            if self.feasible.minutes is None and kept and min(map(self._cost, kept)) <= runs * least:
+                continue
+            design = self._shortest_of(runs, least)
+            kept += [] if design is None else [design]
+        if not kept:
+            self._refuse_uncertainty()
+        best = min(kept, key=self._cost)
+        if not self._within(best):
+            nearest = self._least_within_limits(refuse=False)
+            raise ConfigError(
+                "the uncertainty cannot be reached within the limits", where=f"--u, --{self._limit_word}",
+                got=f"{self._asked_text()} in {self._limit_text()}",
+                expected=f"nearest: {best.text} for this U; or {nearest.text} for {self._U_text(nearest)}",
+                next_step="allow one of the two; nothing was written", rule="plan-infeasible",
+            )  # fmt: skip
+        final = self.design(best.runs, len(best.run) // best.runs, _FINAL_STARTS)
+        return final if self._keeps(final) and self._within(final) else best
+
+    def _shortest_of(self, runs: int, least: int) -> Design | None:
+        """Return the shortest design of a number of runs that keeps the demand; None where none does."""
+        low = high = least
+        while not self._keeps(self.design(runs, high)):
+            if high >= self._most(runs):
+                return None
+            low, high = high + 1, min(math.ceil(1.6 * high), self._most(runs))
+        while low < high:  # U falls with rows, but for the chances of an exchange
+            middle = (low + high) // 2
+            low, high = (low, middle) if self._keeps(self.design(runs, middle)) else (middle + 1, high)
+        return self.design(runs, high)
+
+    def _keeps(self, design: Design) -> bool:
+        return bool(np.all(self.asked * (1 + 1e-9) - design.U >= 0))
+
+    def _refuse_uncertainty(self) -> None:
+        best = min(self._designs.values(), key=lambda design: float(np.max(design.U / self.asked)))
+        worst = int(np.argmax(best.U / self.asked))
+        budget = self.knowledge.today[worst]
+        holding = max(
+            budget.components, key=lambda component: 0.0 if component.name == "fit" else component.u
+        )
+        raise ConfigError(
+            "no number of loads reaches the uncertainty", where="--u", got=self._asked_text(),
+            expected=f"nearest: {self._U_text(best)} by {best.text}",
+            next_step=f"allow that, or lower what more loads cannot: of {budget.load} it is the "
+            f"{holding.name}, {100 * budget.share(holding):.0f} % of the variance",
+            rule="plan-infeasible",
+        )  # fmt: skip
+
+    def _within(self, design: Design) -> bool:
+        minutes, loads = self.demand.minutes, self.demand.loads
+        slow = minutes is not None and design.minutes is not None and design.minutes > minutes
+        return not slow and (loads is None or len(design.run) <= loads)
+
+    @property
+    def limited(self) -> bool:
+        """Whether time or loads are limited."""
+        return self.demand.minutes is not None or self.demand.loads is not None
+
+    @property
+    def _limit_word(self) -> str:
+        return "loads" if self.demand.minutes is None else "minutes"
+
+    def _limit_text(self) -> str:
+        limits = {"minutes": self.demand.minutes, "loads": self.demand.loads}
+        return " and ".join(f"{limit:g} {name}" for name, limit in limits.items() if limit is not None)
+
+    def _least_within_limits(self, *, refuse: bool = True) -> Design:
+        inside: list[Design] = []
+        shortest: list[Design] = []
+        for runs in range(FEWEST_RUNS, MOST_RUNS + 1):
+            low, high = self._fewest(runs), self._most(runs)
+            if self.demand.loads is not None:
+                high = min(high, self.demand.loads // runs)
+            if low > high:
+                continue
+            shortest.append(self.design(runs, low))
+            if self._within(shortest[-1]):
+                inside.append(self._longest_of(runs, low, high))
+        if not inside:
+            nearest = min(shortest, key=self._cost)
+            if not refuse:
+                return nearest
+            raise ConfigError(
+                "the limits are too tight for a session", where=f"--{self._limit_word}",
+                got=self._limit_text(),
+                expected=f"nearest: {nearest.text}, for {self._U_text(nearest)}",
+                next_step="allow as much, or state fixtures that take less; nothing was written",
+                rule="plan-infeasible",
+            )  # fmt: skip
+        best = min(inside, key=lambda design: float(np.max(design.U / self.today)))
+        final = self.design(best.runs, len(best.run) // best.runs, _FINAL_STARTS) if refuse else best
+        return final if self._within(final) else best
+
+    def _longest_of(self, runs: int, low: int, high: int) -> Design:
+        """Return the longest design of a number of runs within the limits; ``low`` rows a run are within."""
+        if self.demand.minutes is None:  # ``high`` keeps the number of loads
+            return self.design(runs, high)
+        reach = low
+        while reach < high and self._within(self.design(runs, reach)):
+            low, reach = reach, min(math.ceil(1.6 * reach), high)
+        high = reach if self._within(self.design(runs, reach)) else reach - 1
+        while low < high:
+            middle = (low + high + 1) // 2
+            low, high = (middle, high) if self._within(self.design(runs, middle)) else (low, middle - 1)
+        return self.design(runs, low)
+
+    def _U_text(self, design: Design) -> str:
+        return ", ".join(
+            f"{fit.load} {U:.3g} {fit.unit}"
+            for fit, U in zip(self.knowledge.record.loads, design.U.tolist(), strict=True)
+        )
+
+    def _asked_text(self) -> str:
+        return ", ".join(
+            f"{fit.load} {U:.3g} {fit.unit}"
+            for fit, U in zip(self.knowledge.record.loads, self.asked.tolist(), strict=True)
+            if math.isfinite(U)
+        )

@@ -1,0 +1,202 @@
+"""Files of a tire's flat-belt test as the field exchanges them: channels by name, each with its unit.
+
+- MAT: a vector for each channel and a structure ``channel`` with the lists ``name`` and ``units``, as the
+  Tire Test Consortium hands its rounds out;
+- text: a line of names, a line of units below it, then rows of numbers, all separated by tabs, as the Calspan
+  Tire Research Facility writes them. Lines above the names are a title.
+
+What is no quantity of a tire table (radii, temperatures of the tread, normalised forces) is passed over.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.channels import CHANNELS, Axes
+from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.inputs import TABLE_FILE, read_input
+from toolkit.recording.safe_open import gate
+from toolkit.recording.sniff import sniff
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CHANNEL = "channel"
+_SYMBOLS = {
+    "ET": "t",
+    "SL": "KAPPA",
+    **{name: name for name in ("V", "SA", "IA", "P", "FX", "FY", "FZ", "MX", "MZ")},
+}
+"""Name in the file -> symbol: SL is the slip ratio by the effective radius, 0 for a freely rolling wheel."""
+_NEEDED = ("ET", "SA", "FZ", "FY")
+_NO_UNIT = frozenset(("", "none", "-", "/"))
+_TITLE = 10  # lines that may stand above the names
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FieldFile:
+    """A file's channels in SI: ``columns`` by symbol (rows,), signs as written, FZ too.
+
+    ``axes`` follow from the sign of FZ: a load is negative where z points down (SAE J670), and positive in
+    ISO 8855. ``passed`` names the channels that are not used.
+    """
+
+    path: Path
+    axes: Axes
+    columns: Mapping[str, NDArray[np.float64]]
+    passed: tuple[str, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of samples."""
+        return len(self.columns["SA"])
+
+
+def is_field_file(path: Path) -> bool:
+    """Tell by its content whether a file is one of these; False for what cannot be read."""
+    if not path.is_file():
+        return False
+    data = read_input(path, TABLE_FILE)
+    kind = sniff(data).id
+    return kind == "mat" or (kind == "text" and _header(data.decode("latin-1").splitlines()) is not None)
+
+
+def read_field_file(path: Path) -> FieldFile:
+    """Read a file whole or not at all.
+
+    Raises
+    ------
+    UnreadableError
+        ``unreadable no-data``: it is no such file; and what the gate of recordings refuses
+    ColumnError
+        ``missing-column unknown-unit``: a channel is missing, or has a unit that is not known
+    CellError
+        ``nan-cell text-cell ragged-row``: no number stands in a number's place
+    """
+    data = read_input(path, TABLE_FILE)
+    gated = gate(path, data)
+    channels = _of_mat(gated.members["mat"], path) if gated.kind == "mat" else _of_text(data, path)
+    missing = [name for name in _NEEDED if name not in channels]
+    if missing:
+        raise ColumnError(
+            f"the file has no channel {', '.join(missing)}", where=path, got=", ".join(channels)[:300],
+            expected=", ".join(_NEEDED), next_step="export it with these channels", rule="missing-column",
+        )  # fmt: skip
+    columns = {_SYMBOLS[name]: _in_si(name, *channels[name], path) for name in _SYMBOLS if name in channels}
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1 or not min(lengths.values()):
+        raise UnreadableError(
+            "the channels differ in length, or are empty", where=path,
+            got=", ".join(f"{name} {length}" for name, length in lengths.items()), expected="one length",
+            next_step="export the file again", rule="no-data",
+        )  # fmt: skip
+    return FieldFile(
+        path=path,
+        axes="SAE" if float(np.median(columns["FZ"])) < 0 else "ISO-W",
+        columns=columns,
+        passed=tuple(name for name in channels if name not in _SYMBOLS),
+    )
+
+
+def _of_mat(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
+    from scipy.io import loadmat
+
+    stream: Any = io.BytesIO(data)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            variables = loadmat(stream, chars_as_strings=True)
+        channel = variables[CHANNEL].reshape(-1)[0]
+        names, units = (_texts(channel[key]) for key in ("name", "units"))
+        return {
+            name: (np.asarray(variables[name], dtype=np.float64).reshape(-1), text)
+            for name, text in zip(names, units, strict=True)
+            if name in variables
+        }
+    except Exception as error:
+        raise UnreadableError(
+            "the MAT-file holds no test in the consortium's form", where=path,
+            got=f"{type(error).__name__}: {error}"[:300],
+            expected="a vector for each channel, and a structure 'channel' with the lists 'name' and 'units'",
+            next_step="save it again with save(name, '-v7')", rule="unreadable",
+        ) from error  # fmt: skip
+
+
+def _texts(cells: NDArray[Any]) -> list[str]:
+    return [str(np.asarray(cell).reshape(-1)[0]).strip() for cell in cells.reshape(-1)]
+
+
+def _header(lines: Sequence[str]) -> int | None:
+    """Return the number of the line of names, None where there is none with units below it."""
+    for at in range(min(_TITLE, len(lines) - 2)):
+        names = [cell.strip() for cell in lines[at].split("\t")]
+        below = [len(line.rstrip("\t").split("\t")) for line in lines[at + 1 : at + 3]]
+        if set(_NEEDED) <= set(names) and below == [len(lines[at].rstrip("\t").split("\t"))] * 2:
+            return at
+    return None
+
+
+def _of_text(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
+    lines = data.decode("latin-1").splitlines()
+    at = _header(lines)
+    if at is None:
+        raise UnreadableError(
+            "the file is no tire test with names and units", where=path,
+            got=lines[0][:100] if lines else "nothing",
+            expected="a line of names (ET SA FZ FY ...), a line of units, rows of numbers, separated by tabs",
+            next_step="check the path", rule="unreadable",
+        )  # fmt: skip
+    names, units = ([cell.strip() for cell in line.rstrip("\t").split("\t")] for line in lines[at : at + 2])
+    rows = []
+    for number, line in enumerate(lines[at + 2 :], start=at + 3):
+        if not line.strip():
+            continue
+        cells = line.rstrip("\t").split("\t")
+        if len(cells) != len(names):
+            raise _cell(path, number, "the row", f"{len(cells)} cells", f"{len(names)} cells", "ragged-row")
+        try:
+            rows.append(list(map(float, cells)))
+        except ValueError:
+            bad = next(at for at, cell in enumerate(cells) if not _is_number(cell))
+            raise _cell(path, number, names[bad], repr(cells[bad]), "a number", "text-cell") from None
+    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+    return {name: (values[:, at], text) for at, (name, text) in enumerate(zip(names, units, strict=True))}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _cell(path: Path, line: int, name: str, got: str, expected: str, rule: str) -> CellError:
+    return CellError(
+        f"line {line}, {name}: no number", where=f"{path}, line {line}, {name}", got=got, expected=expected,
+        next_step="export the file again, or mend a copy of it", rule=rule,
+    )  # fmt: skip
+
+
+def _in_si(name: str, values: NDArray[np.float64], text: str, path: Path) -> NDArray[np.float64]:
+    channel, where = CHANNELS[_SYMBOLS[name]], f"{path}, channel {name}"
+    bare = channel.dimension == "ratio" and text.lower() in _NO_UNIT
+    stated = unit("1" if bare else text, where=where)
+    if stated.dimension != channel.dimension:
+        raise ColumnError(
+            f"channel {name} has a unit of another kind", where=where, got=f"{text} ({stated.dimension})",
+            expected=f"a unit of {channel.dimension}", next_step="correct the unit in a copy of the file",
+            rule="unit-dimension",
+        )  # fmt: skip
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise _cell(path, int(bad[0]) + 1, name, str(values[bad[0]]), "a finite number", "nan-cell")
+    return values * stated.factor + stated.offset

@@ -1,0 +1,66 @@
+"""What a simulation lacks: the answers that the home keeps, and the diagnosis of a case of the home.
+
+A case executes its code: from here it runs in the isolated worker alone, without network and without writing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse
+
+from toolkit.lab.holdings import CASE
+from toolkit.lab.jobs import start_job
+from toolkit.lab.seen_diagnosis import read_diagnosis
+from toolkit.workbench.page import page
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+    from toolkit.workbench.bench import Bench
+
+DIAGNOSES = "diagnoses"
+"""Folder of the home into which jobs write."""
+
+
+def diagnoses(request: Request) -> Response:
+    """Return the list's page: nothing is looked through before it stands."""
+    return page(request, "diagnoses")
+
+
+def diagnosis_list(request: Request) -> Response:
+    """Return the answers that the home keeps, and the cases that can be diagnosed."""
+    places = request.app.state.bench.holdings(again=True).places
+    return page(request, "part_diagnoses", answers=places["diagnosis"], cases=places["case"])
+
+
+def diagnosis(request: Request) -> Response:
+    """Return an answer's page."""
+    bench: Bench = request.app.state.bench
+    folder = bench.path_of("diagnosis", request.path_params["diagnosis"])
+    if folder is None:
+        raise HTTPException(404)
+    place_of = bench.holdings().places["diagnosis"][request.path_params["diagnosis"]]
+    return page(request, "diagnosis", seen=read_diagnosis(folder), place_of=place_of)
+
+
+def start(request: Request) -> Response:
+    """Start the diagnosis of a case, isolated."""
+    bench: Bench = request.app.state.bench
+    case_id = request.path_params["case"]
+    if bench.path_of("case", case_id) is None:
+        raise HTTPException(404)
+    place_of = bench.holdings().places["case"][case_id]
+    words = (
+        "diagnose",
+        f"./{place_of}/{CASE}",
+        "--out",
+        f"{DIAGNOSES}/{place_of}",
+        "--isolated",
+        "--home",
+        ".",
+    )
+    job = start_job(bench.home, kind="diagnosis", title=place_of, words=words)
+    return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)

@@ -1,0 +1,119 @@
+"""Long work: what runs and what ran, its progress, its log, its end when somebody asks for it."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse
+
+from toolkit.errors import ConfigError
+from toolkit.lab.holdings import archives_of, holding_id
+from toolkit.lab.jobs import Kind as JobKind
+from toolkit.lab.jobs import SeenJob, cancel_job, job_of, jobs_of, log_of, start_job
+from toolkit.workbench.page import page
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+    from toolkit.workbench.bench import Bench
+
+MOST_JOBS = 100
+AUDITS, REPAIRED = "audits", "repaired"
+"""Folders of the home into which jobs write."""
+
+
+def jobs(request: Request) -> Response:
+    """Return the jobs of the home, the newest first, and what can be started."""
+    bench: Bench = request.app.state.bench
+    seen = [one for _, one in zip(range(MOST_JOBS), jobs_of(bench.home), strict=False)]
+    return page(request, "jobs", jobs=seen, archives=archives_of(bench.home))
+
+
+def job(request: Request) -> Response:
+    """Return a job's page."""
+    bench, seen = _asked(request)
+    return page(request, "job", seen=seen, result=_result(bench, seen), log=log_of(bench.home, seen.id))
+
+
+def state(request: Request) -> Response:
+    """Return a job as it stands now: its page asks for this while it runs."""
+    bench, seen = _asked(request)
+    return page(request, "part_job", seen=seen, result=_result(bench, seen), log=log_of(bench.home, seen.id))
+
+
+def cancel(request: Request) -> Response:
+    """Ask for the end of a job."""
+    bench, seen = _asked(request)
+    cancel_job(bench.home, seen.id)
+    return _to_job(bench, seen.id)
+
+
+def start_audit(request: Request) -> Response:
+    """Start the audit of a folder of the home; one that was ended before goes on."""
+    bench: Bench = request.app.state.bench
+    archive = archives_of(bench.home).get(request.state.form.get("archive", ""))
+    if archive is None:
+        raise HTTPException(404)
+    words = ("audit", f"./{archive}", "--out", f"{AUDITS}/{archive}", "--home", ".")
+    return _started(bench, "audit", archive, words)
+
+
+def start_repair(request: Request) -> Response:
+    """Start the writing of corrected copies of an audited archive, by somebody who agreed to it."""
+    bench: Bench = request.app.state.bench
+    audit_id = request.path_params["audit"]
+    audited = bench.audited(audit_id)
+    if audited is None:
+        raise HTTPException(404)
+    place = bench.holdings().places["audit"][audit_id]
+    if request.state.form.get("consent") != "yes":
+        raise ConfigError(
+            "nobody agreed to the corrected copies", where=place, got="no consent",
+            expected="the box of the form, ticked", next_step="tick it; nothing was written", rule="usage",
+        )  # fmt: skip
+    if audited.archive is None:
+        raise ConfigError(
+            "the answer does not say where its archive is", where=place, got="an answer of an older version",
+            expected="an answer of this version", next_step="run the audit again", rule="archive",
+        )  # fmt: skip
+    words = (
+        "audit", str(audited.archive), "--out", f"./{place}", "--known-at", audited.known_at.isoformat(),
+        "--repair", f"{REPAIRED}/{os.path.basename(place)}", "--home", ".",  # noqa: PTH119  a text, not a path
+    )  # fmt: skip
+    return _started(bench, "repair", place, words)
+
+
+def _started(bench: Bench, kind: JobKind, title: str, words: tuple[str, ...]) -> Response:
+    return _to_job(bench, start_job(bench.home, kind=kind, title=title, words=words))
+
+
+def _to_job(bench: Bench, job_id: str) -> Response:
+    return RedirectResponse(f"{bench.keys.place}/job/{job_id}", 303)
+
+
+def _result(bench: Bench, seen: SeenJob) -> str | None:
+    """Return the address of what a job wrote, below the place; None where there is none yet."""
+    words = seen.job.words
+    if seen.state == "running":
+        return None
+    if seen.job.kind in ("audit", "repair") and "--out" in words[:-1]:
+        found = holding_id(os.path.normpath(words[words.index("--out") + 1]))
+        return f"/audit/{found}" if bench.path_of("audit", found) is not None else None
+    if seen.job.kind in ("preview", "report"):
+        found = holding_id(seen.job.title)
+        return f"/test/{found}/report" if bench.path_of("test", found) is not None else None
+    if seen.job.kind == "diagnosis" and "--out" in words[:-1]:
+        found = holding_id(os.path.normpath(words[words.index("--out") + 1]))
+        return f"/diagnosis/{found}" if bench.path_of("diagnosis", found) is not None else None
+    return None
+
+
+def _asked(request: Request) -> tuple[Bench, SeenJob]:
+    bench: Bench = request.app.state.bench
+    seen = job_of(bench.home, request.path_params["job"])
+    if seen is None:
+        raise HTTPException(404)
+    return bench, seen

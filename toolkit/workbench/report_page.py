@@ -1,0 +1,110 @@
+"""A report of a test: its pages as they will print, the holes that nothing fills, and its issue."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse, Response
+
+from toolkit.errors import ConfigError
+from toolkit.lab.home import TEMPLATES
+from toolkit.lab.jobs import start_job
+from toolkit.lab.previews import (
+    preview_pdf,
+    preview_words,
+    read_preview,
+    report_words,
+    template_findings,
+    templates_of,
+)
+from toolkit.workbench.page import page
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+
+    from toolkit.workbench.bench import Bench
+
+STEPS = ("preview", "issue")
+_DRAWING = threading.Lock()  # a browser asks for all pages at once
+
+
+def report(request: Request) -> Response:
+    """Return the page: the templates to choose from, and a place for the preview."""
+    bench, test_id, place_of = _asked(request)
+    return page(
+        request, "report", test_id=test_id, place_of=place_of, choices=templates_of(bench.home),
+        people=bench.registry.people().history.now is not None,
+    )  # fmt: skip
+
+
+def part(request: Request) -> Response:
+    """Return the preview that was made last, page by page, and the form that issues it."""
+    bench, test_id, place_of = _asked(request)
+    preview = read_preview(bench.home, test_id)
+    names = {name: chosen for chosen, name in templates_of(bench.home).items()}
+    used = None if preview is None else preview.manifest["template"]["name"]
+    return page(
+        request, "part_report", test_id=test_id, place_of=place_of, preview=preview, used=used,
+        chosen=names.get(str(used)), people=bench.registry.people().history.now is not None,
+    )  # fmt: skip
+
+
+def picture(request: Request) -> Response:
+    """Return a page of the preview as a picture."""
+    from toolkit.report.word.preview import page_picture
+
+    bench, test_id, _ = _asked(request)
+    pdf = preview_pdf(bench.home, test_id)
+    number = request.path_params["number"]
+    if pdf is None or number < 1:
+        raise HTTPException(404)
+    with _DRAWING:
+        return Response(page_picture(pdf, number), media_type="image/png")
+
+
+def start(request: Request) -> Response:
+    """Start the job that makes the preview, or that issues the report."""
+    bench, test_id, place_of = _asked(request)
+    step, form = request.path_params["step"], request.state.form
+    template = templates_of(bench.home).get(form.get("template", ""))
+    if step not in STEPS or template is None:
+        raise HTTPException(404)
+    if step == "preview":
+        job = start_job(
+            bench.home, kind="preview", title=place_of, words=preview_words(place_of, template, test_id)
+        )
+    else:
+        if bench.registry.people().history.now is not None:
+            raise ConfigError(
+                "people are enrolled here: a report is issued by their keys", where=place_of,
+                got="an issue without a signature", expected="the command that the page shows",
+                next_step="run it where the key is; nothing was issued", rule="not-signed",
+            )  # fmt: skip
+        words = report_words(place_of, template, allow_missing=form.get("holes") == "yes")
+        job = start_job(bench.home, kind="report", title=place_of, words=words)
+    return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)
+
+
+def templates(request: Request) -> Response:
+    """Return the templates of the home, and a place for what is wrong with each."""
+    bench: Bench = request.app.state.bench
+    return page(request, "templates", choices=templates_of(bench.home))
+
+
+def check(request: Request) -> Response:
+    """Return what `template check` says of a template."""
+    bench: Bench = request.app.state.bench
+    name = templates_of(bench.home).get(request.path_params["template"])
+    if name is None:
+        raise HTTPException(404)
+    return page(request, "part_template", findings=template_findings(bench.home / TEMPLATES / name))
+
+
+def _asked(request: Request) -> tuple[Bench, str, str]:
+    bench: Bench = request.app.state.bench
+    test_id = request.path_params["test"]
+    if bench.path_of("test", test_id) is None:
+        raise HTTPException(404)
+    return bench, test_id, bench.holdings().places["test"][test_id]

@@ -1,0 +1,216 @@
+"""A calibration session: typed or dropped, tried while it is typed, then entered.
+
+What is tried is what `calibrate --dry-run` tries, in a copy of the instrument's registry; its parts are those
+of a record's page, asked of that copy.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import TYPE_CHECKING, Any
+
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse, Response
+
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.lab import drafts
+from toolkit.lab.decisions import Order
+from toolkit.lab.pending import decide
+from toolkit.trust.requested import Requested
+from toolkit.workbench.bench import Bench
+from toolkit.workbench.page import fragment, page
+from toolkit.workbench.record_page import PARTS
+from toolkit.workbench.waiting import waiting
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from starlette.requests import Request
+
+
+def sessions(request: Request) -> Response:
+    """Return the sessions that are being typed, and the forms that begin one."""
+    return _sessions(request)
+
+
+def _sessions(
+    request: Request,
+    *,
+    status: int = 200,
+    refused: ToolkitError | None = None,
+    typed: Mapping[str, str] | None = None,
+) -> Response:
+    bench: Bench = request.app.state.bench
+    return page(
+        request, "sessions", status=status, drafts=drafts.drafts(bench.home), typed=typed or {},
+        instruments=bench.registry.instruments(), today=bench.today.isoformat(),
+        refused=None if refused is None else refused.as_dict(),
+    )  # fmt: skip
+
+
+def begin(request: Request) -> Response:
+    """Begin a session: from files, from the last session of an instrument, or from its columns."""
+    bench: Bench = request.app.state.bench
+    form = {name: value.strip() for name, value in request.state.form.items()}
+    try:
+        session, tables = _begun(bench, request.state.files, form)
+        draft_id = drafts.begin_draft(bench.home, session, tables)
+    except ToolkitError as error:
+        return _sessions(request, status=400, refused=error, typed=form)
+    return _to(bench, f"session/{draft_id}")
+
+
+def _begun(bench: Bench, files: Mapping[str, Any], form: Mapping[str, str]) -> tuple[str, dict[str, bytes]]:
+    if form.get("from") == "files":
+        uploads = [(upload.name, upload.data) for upload in files.get("files", ())]
+        session, tables = drafts.dropped_files(uploads)
+        if session is None:
+            raise _unstated(
+                "files", ", ".join(name for name, _ in uploads) or "no file", "SESSION.toml among them"
+            )
+        return session, tables
+    for key in ("instrument", "operator"):
+        if not form.get(key):
+            raise _unstated(key, "nothing", "a name")
+    day, operator = _day(form.get("date", "")), form["operator"]
+    if form["instrument"] in bench.registry.instruments() and not form.get("indications"):
+        session, header = drafts.next_session(bench.registry, form["instrument"], day=day, operator=operator)
+    else:
+        session, header = drafts.new_session(
+            instrument=form["instrument"], indications=form.get("indications", ""),
+            loads=form.get("loads", ""), day=day, operator=operator,
+        )  # fmt: skip
+    return session, {drafts.GRIDS["data"]: header.encode()}
+
+
+def session(request: Request) -> Response:
+    """Return a draft: its statements, its tables, and a place for what a dry run says."""
+    _, draft_id = _asked(request)
+    return session_page(request, draft_id)
+
+
+def session_page(
+    request: Request, draft_id: str, *, status: int = 200, refused: ToolkitError | None = None
+) -> Response:
+    """Return the page of a draft; ``refused`` is told at its end."""
+    bench: Bench = request.app.state.bench
+    return page(
+        request, "session", status=status, draft=drafts.open_draft(bench.home, draft_id),
+        people=bench.registry.people().history.now is not None,
+        refused=None if refused is None else refused.as_dict(), **waiting(bench, draft_id),
+    )  # fmt: skip
+
+
+def save(request: Request) -> Response:
+    """Save what was typed, and say nothing."""
+    bench, draft_id = _asked(request)
+    _save(bench, draft_id, request.state.form)
+    return Response(status_code=204)
+
+
+def rehearse(request: Request) -> Response:
+    """Save what was typed and try it: what `calibrate --dry-run` says, and every part of a record's page."""
+    from toolkit.calibration.control.calibrate import rehearsed
+    from toolkit.calibration.records.use import UNSIGNED
+    from toolkit.lab.sealing import standards_of
+    from toolkit.lab.session_answer import NOT_ENTERED, candidate_payload
+
+    bench, draft_id = _asked(request)
+    if request.headers.get("hx-request") != "true":
+        _save(bench, draft_id, request.state.form)
+        return _to(bench, f"session/{draft_id}")
+    try:
+        _save(bench, draft_id, request.state.form)
+        path = drafts.session_file(bench.home, draft_id)
+        with rehearsed(path, bench.registry, standards=standards_of(bench.home)) as (copy, candidate):
+            state = copy.status(candidate.record.id).state if candidate.existing else NOT_ENTERED
+            signature = UNSIGNED if state == NOT_ENTERED else copy.signature(candidate.record.id)
+            payload = candidate_payload(candidate, state, signature)
+            inner = Bench(bench.home, copy, bench.keys)
+            parts = {name: _part(request, inner, name, candidate.record.id) for name in PARTS}
+    except ToolkitError as error:
+        fault = drafts.fault_of(error, drafts.open_draft(bench.home, draft_id))
+        return page(request, "part_untried", error=error.as_dict(), fault=fault)
+    return page(request, "part_rehearsal", answer=payload, parts=parts)
+
+
+def _part(request: Request, bench: Bench, name: str, record_id: str) -> str:
+    """Return a part of the page; one that cannot be computed says why, and keeps none of the others."""
+    try:
+        return fragment(request, f"part_{name}", record_id=record_id, **PARTS[name](bench, record_id))
+    except ToolkitError as error:
+        return fragment(request, "part_error", error=error.as_dict())
+
+
+def add_files(request: Request) -> Response:
+    """Put files beside the session, or in its place."""
+    bench, draft_id = _asked(request)
+    uploads = [(upload.name, upload.data) for upload in request.state.files.get("files", ())]
+    try:
+        drafts.add_files(bench.home, draft_id, uploads)
+    except ToolkitError as error:
+        return session_page(request, draft_id, status=400, refused=error)
+    return _to(bench, f"session/{draft_id}")
+
+
+def enter(request: Request) -> Response:
+    """Enter the session as `calibrate` does; where people are enrolled request it."""
+    bench, draft_id = _asked(request)
+    try:
+        _save(bench, draft_id, request.state.form)
+        order = Order(action="enter", session=drafts.session_file(bench.home, draft_id))
+        candidate = decide(bench.home, bench.registry, draft_id, order)
+    except Requested:
+        return _to(bench, f"session/{draft_id}#decision")
+    except ToolkitError as error:
+        return session_page(request, draft_id, status=400, refused=error)
+    drafts.keep_session(bench.home, draft_id, candidate.record.id)
+    return _to(bench, f"record/{candidate.record.id}")
+
+
+def discard(request: Request) -> Response:
+    """Remove a draft that nobody entered."""
+    bench, draft_id = _asked(request)
+    if waiting(bench, draft_id)["pending"] is not None:
+        error = ConfigError(
+            "its entry waits for signatures", where=draft_id, got="a draft that was requested",
+            expected="a draft that nobody is asked to sign",
+            next_step="drop the request first; nothing was removed", rule="request",
+        )  # fmt: skip
+        return session_page(request, draft_id, status=400, refused=error)
+    drafts.drop_draft(bench.home, draft_id)
+    return _to(bench, "session")
+
+
+def _save(bench: Bench, draft_id: str, form: Mapping[str, str]) -> None:
+    if waiting(bench, draft_id)["pending"] is not None:
+        return  # what is signed must stay what was requested
+    if "session" in form:
+        grids = {key: form[key] for key in drafts.GRIDS if key in form}
+        drafts.save_draft(bench.home, draft_id, form["session"], grids)
+
+
+def _asked(request: Request) -> tuple[Bench, str]:
+    bench: Bench = request.app.state.bench
+    draft_id = request.path_params["draft"]
+    if draft_id not in drafts.draft_ids(bench.home):
+        raise HTTPException(404)
+    return bench, draft_id
+
+
+def _to(bench: Bench, place: str) -> Response:
+    return RedirectResponse(f"{bench.keys.place}/{place}", 303)
+
+
+def _day(text: str) -> dt.date:
+    try:
+        return dt.date.fromisoformat(text)
+    except ValueError as error:
+        raise _unstated("date", text or "nothing", "YYYY-MM-DD") from error
+
+
+def _unstated(where: str, got: str, expected: str) -> ConfigError:
+    return ConfigError(
+        "a session cannot begin like this", where=where, got=got, expected=expected,
+        next_step="state it; nothing was written", rule="usage",
+    )  # fmt: skip
