@@ -112,6 +112,16 @@ def test_what_no_header_tells_is_said_and_left_out(folder: Path, capsys: pytest.
     assert {"indications", "loads"} <= set(told["open"])
 
 
+@pytest.mark.parametrize("word", ["session", "machine"])
+def test_rows_without_a_header_say_nothing_of_columns(
+    word: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "bare.csv").write_text("23682,-0.31,9.44\n23780,-0.26,9.47\n")
+    code, answer = answered(capsys, word, "new", "s.toml", "--from", "bare.csv")
+    assert (code, answer["error"]["rule"]) == (2, "no-header")
+    assert not (folder / "s.toml").exists()
+
+
 def test_a_belt_by_a_recording_of_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "run_01.csv").write_text("Fz [kN],SA [deg],gx [mV/V],gy [mV/V],FY [N]\n1,0,0,0,0\n")
     code, told = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))

@@ -20,7 +20,7 @@ from toolkit.declared import Source, refuse
 from toolkit.declared.outline import outline
 from toolkit.declared.reading import attempt
 from toolkit.declared.writing import value_text
-from toolkit.errors import ConfigError, OutputError, ToolkitError, UnitError
+from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
 from toolkit.inputs import RECORDING_FILE, read_input
 
 FORMS = {
@@ -182,6 +182,12 @@ def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
         return bool(re.match(r"\s*[^\W\d]", text))
 
     cells = read_cells(read_input(recording, RECORDING_FILE), is_name, where=recording)
+    if not any(map(is_name, cells.header)):
+        raise RecordingError(
+            "the file has no header", where=recording, got=f"a first row of {', '.join(cells.header[:3])}, ...",
+            expected="a header that names each column with its unit, such as 'C1 [mV/V]', above the rows",
+            next_step="write the header, or leave --from away", rule="no-header",
+        )  # fmt: skip
     columns = []
     for header in (text.strip() for text in cells.header if text.strip()):
         name, unit = split_header(header)
