@@ -184,7 +184,7 @@ def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
     cells = read_cells(read_input(recording, RECORDING_FILE), is_name, where=recording)
     if not any(map(is_name, cells.header)):
         raise RecordingError(
-            "the file has no header", where=recording, got=f"a first row of {', '.join(cells.header[:3])}, ...",
+            "the file has no header", where=recording, got=f"a first row {', '.join(cells.header[:3])}, ...",
             expected="a header that names each column with its unit, such as 'C1 [mV/V]', above the rows",
             next_step="write the header, or leave --from away", rule="no-header",
         )  # fmt: skip
