@@ -165,15 +165,19 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
     head = first_line(text)
     separator = separator_of(head, header_of(machine), where=gated.path)
     if separator is None:
+        what = "the file is a text file, not a recording"
+        next_step = "give the file that the acquisition program wrote"
+        if _is_tabular(text):
+            what = f"the table has no column of the machine {machine.name}"
+            next_step = (
+                "name the machine that wrote it, or define it: toolkit machine new RIG.toml --from FILE"
+            )
         raise UnreadableError(
-            "the file is a text file, not a recording",
-            where=gated.path,
-            got=f"text that begins with {head[:60]!r}",
+            what, where=gated.path, got=f"text that begins with {head[:60]!r}",
             expected="an .xlsx workbook, or CSV with a header row such as "
             + ",".join(column.header for column in machine.columns),
-            next_step="give the file that the acquisition program wrote",
-            rule="not-a-workbook",
-        )
+            next_step=next_step, rule="not-a-workbook",
+        )  # fmt: skip
     below = _iterate_rows(text, separator, where=gated.path)
     next((row for row in below if any(cell.strip() for cell in row)), None)
     decimal = decimal_sign(chain.from_iterable(below), separator, where=gated.path)
@@ -185,6 +189,12 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
     for row in rows:
         row += [""] * (width - len(row))
     return Table(where=str(gated.path), rows=rows)
+
+
+def _is_tabular(text: str) -> bool:
+    lines = [line for line in text[:_PART].split("\n")[:-1] if line.strip()][:4]
+    counts = [{line.count(mark) for line in lines} for mark in SEPARATORS]
+    return len(lines) > 1 and any(len(count) == 1 and min(count) > 0 for count in counts)
 
 
 # Nearly every CSV file is a header and rows of plain numbers, all as wide. Such a table goes from bytes to
