@@ -71,6 +71,7 @@ _SPELLINGS = {
     "mph": "mile/hour",
     "1": "dimensionless",
     "-": "dimensionless",
+    "none": "dimensionless",
     "": "dimensionless",
     "%": "0.01*dimensionless",
     "rev": "turn",
@@ -81,7 +82,7 @@ _CANONICAL = {
     "lb": "lbf", "lbs": "lbf", "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad",
     "radians": "rad", "°C": "degC", "C": "degC", "°F": "degF", "counts": "count", "kph": "km/h",
     "kmh": "km/h", "-": "1", "": "1", "newton": "N", "newtons": "N", "second": "s", "seconds": "s",
-    "uV/V": "µV/V", "kNm": "kN*m",
+    "none": "1", "uV/V": "µV/V", "kNm": "kN*m",
 }  # fmt: skip
 
 _ANGLES = ("degree", "radian", "turn", "arcminute", "milliradian")

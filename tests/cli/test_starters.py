@@ -122,6 +122,17 @@ def test_rows_without_a_header_say_nothing_of_columns(
     assert not (folder / "s.toml").exists()
 
 
+def test_the_machine_of_a_recording_reads_it_whatever_form_its_units_have(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "foreign.csv").write_text("SA (deg),FZ_N,FY / N,MZ in Nm,TT [degC]\n1,3000,-500,20,40\n")
+    code, _ = answered(capsys, "machine", "new", "r.toml", "--from", "foreign.csv", *sets(BELT))
+    assert code == 0
+    code, answer = answered(capsys, "inspect", "foreign.csv", "--machine", "r.toml")
+    channels = {channel["symbol"]: channel["unit"] for channel in answer["channels"]}
+    assert channels == {"SA": "deg", "FZ": "N", "FY": "N", "MZ": "N*m", "TT": "degC"}
+
+
 def test_a_belt_by_a_recording_of_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "run_01.csv").write_text("Fz [kN],SA [deg],gx [mV/V],gy [mV/V],FY [N]\n1,0,0,0,0\n")
     code, told = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))

@@ -62,6 +62,11 @@ def test_a_printed_unit_wins():
     assert (found["SA"].unit, found["MZ"].unit, found["FY"].unit) == ("rad", "N*m", "N")
 
 
+@pytest.mark.parametrize("header", ["FZ (kN)", "FZ load / kN", "fz load in kN", "FZ_kN", "FZ load (kN)"])
+def test_a_unit_is_read_in_the_forms_of_other_laboratories(header):
+    assert assigned([header, *HEADERS[1:]])["FZ"].unit == "kN"
+
+
 @pytest.mark.parametrize(
     ("header", "place", "rule"),
     [
@@ -71,7 +76,7 @@ def test_a_printed_unit_wins():
         ("Mz [N]", 6, "unit-dimension"),
         ("FZ [furlongs per]", 0, "unknown-unit"),
         ("FZ", 0, "unknown-unit"),
-        ("FZ (lbf)", 0, "unknown-unit"),
+        ("FZ (load)", 0, "unknown-unit"),
         ("D52 (Filtred)", 1, "unknown-unit"),
         ("D52", 1, "unknown-unit"),
     ],

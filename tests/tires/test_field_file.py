@@ -92,6 +92,20 @@ def test_both_forms_hold_the_same_test_in_si(channels: dict[str, np.ndarray], tm
         assert file.passed == ("N", "RL", "NFY", "TSTC")
 
 
+@pytest.mark.parametrize(("form", "separator"), [("{}_{}", ","), ("{} [{}]", ";"), ("{} ({})", "\t")])
+def test_units_may_stand_beside_the_names(
+    form: str, separator: str, channels: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    lines = write_dat(tmp_path / "run.dat", channels, title="").read_text().splitlines()
+    names = [form.format(name, UNITS[name]) for name in channels]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(line.replace("\t", separator) for line in ["\t".join(names), *lines[2:]]))
+    assert is_field_file(path)
+    columns = read_field_file(path).columns
+    for name, values in read_field_file(tmp_path / "run.dat").columns.items():
+        np.testing.assert_array_equal(columns[name], values)
+
+
 def test_the_axes_follow_from_the_sign_of_the_load(channels: dict[str, np.ndarray], tmp_path: Path) -> None:
     turned = channels | {"FZ": -channels["FZ"]}
     assert read_field_file(write_mat(tmp_path / "sae.mat", channels)).axes == "SAE"

@@ -12,17 +12,16 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
 from toolkit.comparison.laboratories import K, Results
 from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.units import unit
 
-_HEADER = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
 _COLUMNS = ("measurand", "laboratory", "value", "U", "k")
 _UNITS = ("value", "U")
 ONE = "result"
@@ -101,17 +100,16 @@ def _columns(path: Path, head: list[str]) -> tuple[list[str], str]:
     names: list[str] = []
     units: dict[str, str] = {}
     for cell in head:
-        match = _HEADER.fullmatch(cell)
-        name = match[1] if match else cell.strip()
+        name, stated = split_header(cell, _COLUMNS.__contains__)
         if name not in _COLUMNS:
             _refuse_column(path, "unknown-column", f"unknown column {name!r}", cell, ", ".join(_COLUMNS))
         if name in names:
             _refuse_column(path, "doubled-column", f"the column {name} stands twice", cell, f"one {name}")
         names.append(name)
         if name in _UNITS:
-            if match is None or match[2] is None:
+            if stated is None:
                 _refuse_column(path, "unknown-unit", f"the column {name} has no unit", cell, f"'{name} [N]'")
-            units[name] = unit(match[2], where=f"{path}, column {name}").text
+            units[name] = unit(stated, where=f"{path}, column {name}").text
     for name in ("laboratory", "value"):
         if name not in names:
             _refuse_column(

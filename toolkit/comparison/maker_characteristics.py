@@ -12,7 +12,6 @@ import csv
 import difflib
 import io
 import math
-import re
 from pathlib import Path
 from typing import NoReturn
 
@@ -21,11 +20,11 @@ from toolkit.characteristics.characteristic import BOTH
 from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.tires.plausibility import demand_possible
 from toolkit.units import unit
 
-_HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
 # The characteristics that a maker can state against load, by name, with their SI unit.
 _STATED = {declared.name: declared for declared in compared() if declared.scope != "angle"}
 _NAMES = {name: declared.unit for name, declared in _STATED.items()}
@@ -33,7 +32,7 @@ _NAMES = {name: declared.unit for name, declared in _STATED.items()}
 
 def is_characteristics_table(path: Path) -> bool:
     """Tell whether a CSV file's header has FZ and a characteristic, and no slip angle."""
-    names = {match[1] for match in map(_HEADER.fullmatch, _header(_text(path))) if match}
+    names = {split_header(cell, _is_name)[0] for cell in _header(_text(path))}
     # A misspelt name still tells which kind of table was meant, and the error then names the right columns.
     near = any(difflib.get_close_matches(name, _NAMES, n=1, cutoff=0.8) for name in names)
     return "SA" not in names and near
@@ -147,26 +146,29 @@ def _lines(text: str) -> list[list[str]]:
     return list(csv.reader(io.StringIO(text, newline=""), delimiter=max(",;", key=first.count)))
 
 
+def _is_name(name: str) -> bool:
+    return name == "FZ" or name.removeprefix("U_") in _NAMES
+
+
 def _column(cell: str, path: Path) -> tuple[str, float]:
-    match = _HEADER.fullmatch(cell)
-    name = match[1] if match else cell.partition("[")[0].strip()
+    name, text = split_header(cell, _is_name)
     bare = name.removeprefix("U_")
-    if bare not in _NAMES and name != "FZ":
+    if not _is_name(name):
         near = difflib.get_close_matches(bare, ["FZ", *_NAMES], n=1, cutoff=0.5)
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
             f"{near[0]} [unit]" if near else ", ".join(["FZ", *_NAMES]),
         )  # fmt: skip
-    if match is None:
+    if text is None:
         _refuse(
             path, "unknown-unit", f"the column {name} has no unit", repr(cell), f"'{name} [unit]', e.g. [N]"
         )
     where = f"{path}, column {cell.strip()!r}"
     wanted = unit("N" if name == "FZ" else _NAMES[bare])
-    stated = unit(match[2], where=where)
+    stated = unit(text, where=where)
     # An angle has no dimension of its own: N and N/deg are told apart by what they are per.
     if stated.dimension != wanted.dimension or ("/" in stated.text) != ("/" in wanted.text):
-        _refuse(path, "unit-dimension", f"the unit of {name} is of another kind", match[2], wanted.text)
+        _refuse(path, "unit-dimension", f"the unit of {name} is of another kind", text, wanted.text)
     return name, stated.factor / wanted.factor
 
 

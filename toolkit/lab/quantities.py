@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.errors import ColumnError, UnitError
+from toolkit.headers import split_header
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
     # Column -> its values: an array, a list, a pandas Series or a pint quantity.
     Columns = pd.DataFrame | Mapping[str, Any]
-
-_HEADER = re.compile(r"\s*(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\]]*)\])?\s*")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,13 +78,12 @@ def columns_of(
     needed, known_names = tuple(names), {*names, *optional}
     columns: dict[str, Column] = {}
     for header in map(str, data):
-        parts = _HEADER.fullmatch(header)
-        name = parts["name"] if parts else header
+        name, text = split_header(header, known_names.__contains__)
         if name not in known_names:
             continue
         if name in columns:
             raise _refused(f"the column {name} stands twice", header, f"one {name}", "leave one of them out")
-        stated = [parts["unit"] if parts else None, (units or {}).get(name)]
+        stated = [text, (units or {}).get(name)]
         columns[name] = _column(name, data[header], [text for text in stated if text is not None])
     if missing := [name for name in needed if name not in columns]:
         got = ", ".join(map(str, data)) or "no column"

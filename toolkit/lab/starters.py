@@ -11,6 +11,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from toolkit.declared.outline import outline
 from toolkit.declared.reading import attempt
 from toolkit.declared.writing import value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
+from toolkit.headers import is_unit, split_header
 from toolkit.inputs import RECORDING_FILE, read_input
 
 FORMS = {
@@ -176,10 +178,9 @@ def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
         the file cannot be read, or has no header
     """
     from toolkit.calibration.session.cells import read_cells
-    from toolkit.recording.columns import split_header
 
-    def is_name(text: str) -> bool:
-        return bool(re.match(r"\s*[^\W\d]", text))
+    def is_name(text: str, whole: str = "") -> bool:
+        return text != whole and bool(re.match(r"\s*[^\W\d]", text))
 
     cells = read_cells(read_input(recording, RECORDING_FILE), is_name, where=recording)
     if not any(map(is_name, cells.header)):
@@ -190,10 +191,10 @@ def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
         )  # fmt: skip
     columns = []
     for header in (text.strip() for text in cells.header if text.strip()):
-        name, unit = split_header(header)
-        if unit is None and (match := re.fullmatch(r"(.+?)\s*\(([^()]*)\)", header)) and _dimension(match[2]):
-            name, unit = match[1], match[2]
-        columns.append((header, name, unit))
+        # Any text may be a name here, and a unit is what is known as one.
+        name, unit = split_header(header, partial(is_name, whole=header))
+        known = unit is not None and is_unit(unit)
+        columns.append((header, name if known else header, unit if known else None))
     return columns
 
 
@@ -232,7 +233,8 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
         if dimension is None or role is None:
             silent.append(f"{header}: " + ("no unit that is known" if dimension is None else "what it holds"))
             continue
-        entries.append({"symbol": symbol, "header": plain, "unit": unit, "role": role})
+        # As the reader of recordings will see it: what stands in square brackets is a unit to it.
+        entries.append({"symbol": symbol, "header": split_header(header)[0], "unit": unit, "role": role})
     silent += ["axes, rotations, drum and protocol: no header tells them"]
     note = f"guessed from {name}: FZ is the load, other forces and moments are computed by the rig"
     values = {"column": entries} if entries else {}

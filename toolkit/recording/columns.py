@@ -7,7 +7,6 @@ brackets has that unit, which must be of the machine's dimension. Any other colu
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,11 +14,11 @@ from typing import NoReturn
 
 from toolkit.channels import CHANNELS, Channel
 from toolkit.errors import ColumnError, UnitError
+from toolkit.headers import split_header
 from toolkit.machine import Machine
 from toolkit.machine.definition import Column, Role
 from toolkit.units import unit
 
-_WITH_UNIT = re.compile(r"(.*?)\s*\[([^\[\]]*)\]\s*")
 _EXTRA_ROLES: dict[str, Role] = {"t": "time", "TIRE_ANGLE": "angle", "DRUM_ANGLE": "angle"}
 _LONGEST = 200
 _OPTIONAL: tuple[Role, ...] = ("acquired",)
@@ -70,11 +69,17 @@ def header_of(machine: Machine) -> Callable[[str], bool]:
 
     A row with one such text is taken for a recording's.
     """
-    return lambda header: _machine_column(split_header(header)[0], machine) is not None
+    return lambda header: _machine_column(_split(header, machine)[0], machine) is not None
+
+
+def _split(header: str, machine: Machine) -> tuple[str, str | None]:
+    return split_header(
+        header, lambda name: _machine_column(name, machine) is not None or _channel(name, name) is not None
+    )
 
 
 def _assign(index: int, header: str, machine: Machine, where: object) -> Assigned:
-    name, printed = split_header(header)
+    name, printed = _split(header, machine)
     column = _machine_column(name, machine)
     if printed is None:
         # Without a printed unit only the machine's own header has one: a bare symbol could be anything.
@@ -98,16 +103,6 @@ def _assign(index: int, header: str, machine: Machine, where: object) -> Assigne
     return Assigned(
         index=index, symbol=symbol, header=header, unit=read.text, role=_EXTRA_ROLES.get(symbol, "covariate")
     )
-
-
-def split_header(header: str) -> tuple[str, str | None]:
-    """Return a header's name and the unit in its brackets, None where there is none."""
-    if len(header) > _LONGEST:
-        return header[:_LONGEST], None
-    match = _WITH_UNIT.fullmatch(header.strip())
-    if match is None or not match.group(1).strip():
-        return header.strip(), None
-    return match.group(1).strip(), match.group(2)
 
 
 def _plain(text: str) -> str:

@@ -2,8 +2,8 @@
 
 - MAT: a vector for each channel and a structure ``channel`` with the lists ``name`` and ``units``, as the
   Tire Test Consortium hands its rounds out;
-- text: a line of names, a line of units below it, then rows of numbers, all separated by tabs, as the Calspan
-  Tire Research Facility writes them. Lines above the names are a title.
+- text: a line of names, a line of units below it, then rows of numbers, as the Calspan Tire Research Facility
+  writes them with tabs; or the units beside the names (`toolkit.headers`). Lines above the names are a title.
 
 What is no quantity of a tire table (radii, temperatures of the tread, normalised forces) is passed over.
 """
@@ -15,12 +15,13 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from toolkit.channels import CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.safe_open import gate
 from toolkit.recording.sniff import sniff
@@ -37,8 +38,8 @@ _SYMBOLS = {
 }
 """Name in the file -> symbol: SL is the slip ratio by the effective radius, 0 for a freely rolling wheel."""
 _NEEDED = ("ET", "SA", "FZ", "FY")
-_NO_UNIT = frozenset(("", "none", "-", "/"))
 _TITLE = 10  # lines that may stand above the names
+_SEPARATORS = "\t,;"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -134,32 +135,49 @@ def _texts(cells: NDArray[Any]) -> list[str]:
     return [str(np.asarray(cell).reshape(-1)[0]).strip() for cell in cells.reshape(-1)]
 
 
-def _header(lines: Sequence[str]) -> int | None:
-    """Return the number of the line of names, None where there is none with units below it."""
-    for at in range(min(_TITLE, len(lines) - 2)):
-        names = [cell.strip() for cell in lines[at].split("\t")]
-        below = [len(line.rstrip("\t").split("\t")) for line in lines[at + 1 : at + 3]]
-        if set(_NEEDED) <= set(names) and below == [len(lines[at].rstrip("\t").split("\t"))] * 2:
-            return at
+class _Header(NamedTuple):
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    separator: str
+    rows_from: int  # the line of the first row, from 0
+
+
+def _header(lines: Sequence[str]) -> _Header | None:
+    """Return what the line of names says, None where there is none with units beside or below the names."""
+    for at in range(min(_TITLE, len(lines) - 1)):
+        for separator in _SEPARATORS:
+            parted = [split_header(cell, _SYMBOLS.__contains__) for cell in _cells(lines[at], separator)]
+            names, units = zip(*parted, strict=True)
+            if not set(_NEEDED) <= set(names):
+                continue
+            if all(text is not None for name, text in parted if name in _NEEDED):
+                return _Header(names, tuple(text or "" for text in units), separator, at + 1)
+            below = [_cells(line, separator) for line in lines[at + 1 : at + 3]]
+            if not any(units) and list(map(len, below)) == [len(names)] * 2:
+                return _Header(names, tuple(below[0]), separator, at + 2)
     return None
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return [cell.strip() for cell in line.rstrip(separator).split(separator)]
 
 
 def _of_text(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
     lines = data.decode("latin-1").splitlines()
-    at = _header(lines)
-    if at is None:
+    header = _header(lines)
+    if header is None:
         raise UnreadableError(
             "the file is no tire test with names and units", where=path,
             got=lines[0][:100] if lines else "nothing",
-            expected="a line of names (ET SA FZ FY ...), a line of units, rows of numbers, separated by tabs",
+            expected="a line of names (ET SA FZ FY ...) with units beside or below, then rows of numbers",
             next_step="check the path", rule="unreadable",
         )  # fmt: skip
-    names, units = ([cell.strip() for cell in line.rstrip("\t").split("\t")] for line in lines[at : at + 2])
+    names, units, separator, rows_from = header
     rows = []
-    for number, line in enumerate(lines[at + 2 :], start=at + 3):
+    for number, line in enumerate(lines[rows_from:], start=rows_from + 1):
         if not line.strip():
             continue
-        cells = line.rstrip("\t").split("\t")
+        cells = _cells(line, separator)
         if len(cells) != len(names):
             raise _cell(path, number, "the row", f"{len(cells)} cells", f"{len(names)} cells", "ragged-row")
         try:
@@ -188,8 +206,7 @@ def _cell(path: Path, line: int, name: str, got: str, expected: str, rule: str) 
 
 def _in_si(name: str, values: NDArray[np.float64], text: str, path: Path) -> NDArray[np.float64]:
     channel, where = CHANNELS[_SYMBOLS[name]], f"{path}, channel {name}"
-    bare = channel.dimension == "ratio" and text.lower() in _NO_UNIT
-    stated = unit("1" if bare else text, where=where)
+    stated = unit(text, where=where)
     if stated.dimension != channel.dimension:
         raise ColumnError(
             f"channel {name} has a unit of another kind", where=where, got=f"{text} ({stated.dimension})",

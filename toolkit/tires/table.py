@@ -22,6 +22,7 @@ import numpy as np
 from toolkit.channels import AXES, CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
+from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.tires.plausibility import LARGEST
 from toolkit.units import unit
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MARKS = "calibration"
-_HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _AXES: dict[str, Axes] = {axes: axes for axes in get_args(Axes)}
 _EDGE = 1 + 1e-9
@@ -199,27 +199,30 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
 
 def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
     # "SA [deg]" -> symbol, factor and offset to SI.
-    match = _HEADER.fullmatch(cell)
-    name = match[1] if match else cell.partition("[")[0].strip()
     known = {symbol.upper(): symbol for symbol in CHANNELS}
-    symbol = name if name in CHANNELS else known.get(name.upper() if len(name) > 1 else name)
+
+    def symbol_of(name: str) -> str | None:
+        return name if name in CHANNELS else known.get(name.upper() if len(name) > 1 else name)
+
+    name, text = split_header(cell, lambda name: symbol_of(name) is not None)
+    symbol = symbol_of(name)
     if symbol is None:
         near = difflib.get_close_matches(name.upper(), known, n=1, cutoff=0.5)
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
             f"{known[near[0]]} [unit]" if near else "SA FZ FY MZ, optional IA P V FX KAPPA t",
         )  # fmt: skip
-    if match is None:
+    if text is None:
         _refuse(
             path, "unknown-unit", f"the column {name} has no unit", repr(cell), f"'{name} [unit]', e.g. [N]"
         )
     where = f"{path}, column {cell.strip()!r}"
-    stated = unit(match[2], where=where)
+    stated = unit(text, where=where)
     dimension = CHANNELS[symbol].dimension
     if stated.dimension != dimension:
         from toolkit.units import si_scale
 
-        si_scale(match[2], dimension, where=where)
+        si_scale(text, dimension, where=where)
     return symbol, stated.factor, stated.offset
 
 

@@ -16,12 +16,11 @@ from typing import NamedTuple
 
 from toolkit.calibration.session.cells import Cells, is_empty
 from toolkit.errors import SessionError, ToolkitError
+from toolkit.headers import split_header
 from toolkit.units import unit
 
 COMMENT = "comment"
 RUNS = ("run", "direction", "rotation")
-_UNIT = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\Z")
-_ROUND = re.compile(r"(?P<name>[^()]+?)\s*\((?P<unit>[^()]*)\)\Z")
 
 
 class Wanted(NamedTuple):
@@ -154,15 +153,8 @@ def _read_head(header: tuple[str, ...], wanted: Wanted, where: str) -> Head:
 @lru_cache(maxsize=1024)
 def _split(text: str, wanted: Wanted) -> tuple[str, str | None]:
     """Return a header's name, as the session writes it where it is one of its, and its unit."""
-    text = " ".join(text.split())
-    name, found = text, None
-    for pattern in (_UNIT, _ROUND):
-        match = pattern.match(text)
-        # Round brackets are part of many names; they hold a unit where the name is the session's without.
-        if match and (pattern is _UNIT or _named(match["name"], wanted) in wanted.names):
-            name, found = match["name"].strip(), match["unit"]
-            break
-    return _named(name, wanted), found
+    name, stated = split_header(" ".join(text.split()), lambda name: _named(name, wanted) in wanted.names)
+    return _named(name, wanted), stated
 
 
 def _named(name: str, wanted: Wanted) -> str:

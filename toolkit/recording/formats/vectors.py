@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.errors import CellError, ColumnError, RecordingError, UnitError, UnreadableError
+from toolkit.headers import split_header
 from toolkit.machine import Machine
-from toolkit.recording.columns import assign_columns, header_of, split_header
+from toolkit.recording.columns import assign_columns, header_of
 from toolkit.recording.model import Series
 from toolkit.units import unit
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.recording.columns import split_header
+from toolkit.headers import split_header
 from toolkit.recording.extras import needed
 
 if TYPE_CHECKING:
