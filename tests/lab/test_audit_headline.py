@@ -21,6 +21,9 @@ def wrong(day: str, FY: float, *, variant: str = "E5 negative") -> dict[str, Any
     return file("sign_variant", day, variant=variant, repair=repair)
 
 
+IMPOSSIBLE = [{"rule": "impossible-force", "message": "no tire has it"}]
+
+
 def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
     files = [wrong("2014-03-09", 18885.7), wrong("2019-06-04", 980.5), file("exact"), file("rounding")]
     found = headline_of(files)
@@ -30,7 +33,7 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
     assert found.as_dict() == {
         "sentence": found.sentence, "files": 4, "wrong": 2, "FY_max_abs_N": 18885.7, "MZ_max_abs_Nm": 0.0,
         "causes": [{"cause": "E5 negative", "files": 2}], "from": "2014-03", "to": "2019-06", "unjudged": 0,
-        "unreadable": 0,
+        "unreadable": 0, "impossible": 0,
     }  # fmt: skip
 
 
@@ -43,6 +46,15 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
         (
             [file("exact"), file("unreadable")],
             "The file carries the values of the record in force; 1 file cannot be read",
+        ),
+        (
+            [file("unknown", notes=IMPOSSIBLE), file("exact", notes=IMPOSSIBLE), file("exact")],
+            "2 files hold an Fy or Mz that no tire has; "
+            "1 file cannot be judged: no record in force is known",
+        ),
+        (
+            [wrong("2014-03-01", 5.25) | {"notes": IMPOSSIBLE}],
+            "1 file carries a wrong Fy, up to 5.2 N; cause: E5 negative; in 2014-03",
         ),
         ([file("unknown")], "1 file cannot be judged: no record in force is known"),
         (

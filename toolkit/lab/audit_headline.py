@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
+from toolkit.reduction.physics import RULES
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
@@ -22,7 +23,8 @@ class Headline:
 
     ``wrong`` files change by the record in force on their day, ``FY_N`` and ``MZ_Nm`` at most; ``causes`` are
     the reasons with their files, the most frequent first; ``first`` and ``last`` the months of their tests.
-    ``unjudged`` files are not right either, but no record says what they should hold.
+    ``unjudged`` files are not right either, but no record says what they should hold. ``impossible`` files
+    are not among the wrong ones and hold an Fy or Mz that no tire has.
     """
 
     files: int
@@ -34,6 +36,7 @@ class Headline:
     last: str | None
     unjudged: int
     unreadable: int
+    impossible: int = 0
 
     @property
     def sentence(self) -> str:
@@ -44,7 +47,11 @@ class Headline:
         parts = []
         if self.wrong:
             parts += [self._size(), f"cause: {self._cause()}", self._since()]
-        elif not self.unjudged:
+        if self.impossible:
+            verb = "holds" if self.impossible == 1 else "hold"
+            more = " more" if self.wrong else ""
+            parts.append(f"{_files(self.impossible)}{more} {verb} an Fy or Mz that no tire has")
+        if not (self.wrong or self.unjudged or self.impossible):
             what = "The file carries" if readable == 1 else f"All {readable} files carry"
             parts.append(f"{what} the values of the record in force")
         if self.unjudged:
@@ -86,6 +93,7 @@ class Headline:
             "to": self.last,
             "unjudged": self.unjudged,
             "unreadable": self.unreadable,
+            "impossible": self.impossible,
         }
 
 
@@ -96,13 +104,15 @@ def headline(audit: ArchiveAudit) -> Headline:
 
 def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     """Return the headline of the files of an audit, as its answer lists them."""
-    count = wrong = unjudged = unreadable = 0
+    count = wrong = unjudged = unreadable = impossible = 0
     FY = MZ = 0.0
     causes: Counter[str] = Counter()
     months: set[str] = set()
     for file in files:
         count += 1
         repair = file["repair"]
+        unchanged = repair is None or file["grade"] in CLEAN
+        impossible += unchanged and any(note["rule"] in RULES for note in file.get("notes", ()))
         if file["grade"] == "unreadable":
             unreadable += 1
         elif file["grade"] in CLEAN:
@@ -119,7 +129,7 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     return Headline(
         files=count, wrong=wrong, FY_N=FY, MZ_Nm=MZ, causes=tuple(causes.most_common()),
         first=min(months, default=None), last=max(months, default=None), unjudged=unjudged,
-        unreadable=unreadable,
+        unreadable=unreadable, impossible=impossible,
     )  # fmt: skip
 
 
