@@ -148,6 +148,20 @@ def test_a_belt_by_a_recording_of_it(folder: Path, capsys: pytest.CaptureFixture
     assert load_machine(read_test_folder(folder).info.machine).name == "belt-2"
 
 
+def test_a_case_shows_every_kind_of_simulation_and_the_chosen_one_alone(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert answered(capsys, "case", "new", "any.toml")[0] == 0
+    text = (folder / "any.toml").read_text()
+    assert [f'#kind = "{kind}"' in text for kind in ("machine", "python", "ode", "columns")] == [True] * 4
+    _, answer = answered(capsys, "case", "new", "ode.toml", "--set", "simulation.kind=ode")
+    text = (folder / "ode.toml").read_text()
+    assert "simulation.path" in answer["open"]
+    assert '#path = "sim.py"   # FILL IN' in text
+    assert "#states = " in text
+    assert "function" not in text
+
+
 def test_a_plan_is_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _, told = answered(capsys, "plan", "new", "plan.toml")
     entries = ["date=2026-03-17", "tire.file=tire.tir", "tire.size=205/55R16", "seed=7"]

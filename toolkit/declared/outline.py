@@ -20,7 +20,7 @@ from toolkit.declared.describe import (
 )
 from toolkit.declared.lists import KeyedKind, ListKind
 from toolkit.declared.marks import Format
-from toolkit.declared.tables import Field, TableKind
+from toolkit.declared.tables import Field, FormsKind, TableKind
 from toolkit.declared.writing import _table, key_of, value_text
 
 Notes = Mapping[str, str]
@@ -63,6 +63,9 @@ def _entries(
         yield from _told(declared, notes)
         names = (*path, declared.key)
         header, entry = ".".join(map(key_of, names)), values.get(declared.key)
+        if isinstance(declared.kind, FormsKind):
+            yield from _forms(declared.kind, names, entry, required=declared.required)
+            continue
         inner = _inner_table(declared.kind)
         if isinstance(entry, list):
             for part in entry:
@@ -76,7 +79,31 @@ def _entries(
             yield from _commented(declared, inner, names)
 
 
+def _forms(
+    kind: FormsKind, names: tuple[str, ...], entry: Mapping[str, Any] | None, *, required: bool
+) -> Iterator[str]:
+    """Return the table that the entry's word chooses; all of them, commented out, where none is chosen."""
+    header = ".".join(map(key_of, names))
+    if entry is not None:
+        chosen = kind.tables.get(entry.get(kind.tag))
+        yield f"[{header}]"
+        yield from _table(entry, names) if chosen is None else _entries(chosen, names, entry, {})
+        return
+    yield f"#[{header}]" + ("   # FILL IN" if required else "")
+    for at, (word, form) in enumerate(kind.tables.items()):
+        yield from _comment(
+            f"{'or' if at else 'either'} {kind.tag} = {value_text(word)}: {_summary(form.cls)}"
+        )
+        yield f"#{key_of(kind.tag or '')} = {value_text(word)}"
+        rest = tuple(field for field in form.fields if field.key != kind.tag)
+        for declared in rest:
+            yield from _told(declared, {})
+            yield f"#{key_of(declared.key)} = {_example(declared)}"
+
+
 def _is_below(declared: Field) -> bool:
+    if isinstance(declared.kind, FormsKind):
+        return declared.kind.tag is not None and declared.kind.entry.example is None
     return _inner_table(declared.kind) is not None and declared.kind.entry.example is None
 
 
