@@ -85,18 +85,16 @@ def _forms(
     """Return the table that the entry's word chooses; all of them, commented out, where none is chosen."""
     header = ".".join(map(key_of, names))
     if entry is not None:
-        chosen = kind.tables.get(entry.get(kind.tag))
+        chosen = kind.tables.get(entry.get(kind.tag or ""))
         yield f"[{header}]"
         yield from _table(entry, names) if chosen is None else _entries(chosen, names, entry, {})
         return
     yield f"#[{header}]" + ("   # FILL IN" if required else "")
     for at, (word, form) in enumerate(kind.tables.items()):
-        yield from _comment(
-            f"{'or' if at else 'either'} {kind.tag} = {value_text(word)}: {_summary(form.cls)}"
-        )
-        yield f"#{key_of(kind.tag or '')} = {value_text(word)}"
-        rest = tuple(field for field in form.fields if field.key != kind.tag)
-        for declared in rest:
+        chosen_by = f"{kind.tag} = {value_text(word)}"
+        yield from _comment(f"{'or' if at else 'either'} {chosen_by}: {_summary(form.cls)}")
+        yield f"#{chosen_by}"
+        for declared in (field for field in form.fields if field.key != kind.tag):
             yield from _told(declared, {})
             yield f"#{key_of(declared.key)} = {_example(declared)}"
 
