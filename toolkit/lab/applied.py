@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.errors import ConfigError, OutputError, UnreadableError
 from toolkit.inputs import RECORDING_FILE, read_input
-from toolkit.machine import Machine
-from toolkit.machine.definition import Column
+from toolkit.recording.columns import rig
 from toolkit.recording.extras import needed
 from toolkit.recording.formats.vectors import Vector, Vectors, series_of
 from toolkit.recording.formats.write import Written, mdf_bytes, tdms_bytes
@@ -36,15 +34,6 @@ if TYPE_CHECKING:
 Table = Mapping[str, "NDArray[Any]"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rig:
-    """What a reader asks a machine definition for: a name, the columns that must be there, nothing else."""
-
-    name: str
-    columns: tuple[Column, ...]
-    simulated: bool = False
-
-
 def read_indications(path: Path, record: Record) -> tuple[Series, ...]:
     """Return the columns of a file that holds the indications of a record: each with its unit.
 
@@ -55,12 +44,7 @@ def read_indications(path: Path, record: Record) -> tuple[Series, ...]:
     ConfigError
         ``missing-extra``
     """
-    columns = tuple(
-        Column(symbol=name, header=f"{name} [{unit}]", unit=unit, role="indication")
-        for name, unit in record.indications.items()
-    )
-    # The readers ask for no more of a machine than a rig has.
-    machine = cast(Machine, Rig(name=record.result.instrument, columns=columns))
+    machine = rig(record.result.instrument, record.indications)
     data = read_input(path, RECORDING_FILE)
     if sniff(data).id == "parquet":
         return series_of(_parquet(data, path), machine)

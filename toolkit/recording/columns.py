@@ -10,7 +10,7 @@ import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NoReturn
+from typing import NoReturn, cast
 
 from toolkit.channels import CHANNELS, Channel
 from toolkit.errors import ColumnError, UnitError
@@ -33,6 +33,27 @@ class Assigned:
     header: str
     unit: str
     role: Role
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rig:
+    name: str
+    columns: tuple[Column, ...]
+    simulated: bool = False
+
+
+def rig(name: str, units: Mapping[str, str]) -> Machine:
+    """Return what readers ask a machine definition for, of a rig that has none.
+
+    Parameters
+    ----------
+    units : the columns that a file must have, each with the unit of its dimension
+    """
+    columns = tuple(
+        Column(symbol=symbol, header=f"{symbol} [{text}]", unit=text, role="indication")
+        for symbol, text in units.items()
+    )
+    return cast(Machine, _Rig(name=name, columns=columns))  # readers ask for no more
 
 
 def assign_columns(headers: Sequence[str], machine: Machine, *, where: object) -> tuple[Assigned, ...]:

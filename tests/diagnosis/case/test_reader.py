@@ -1,15 +1,17 @@
 """A case file: every entry checked, with its place and the nearest known word; nothing guessed."""
 
+import io
 import os
 import re
 import tomllib
 
 import numpy as np
 import pytest
+from openpyxl import Workbook
 
 from tests.diagnosis.cases import HEAD, ONE, TWO, carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
-from toolkit.errors import CellError, ColumnError, ConfigError, ToolkitError, UnreadableError
+from toolkit.errors import CellError, ColumnError, ConfigError, ToolkitError, UnitError, UnreadableError
 from toolkit.lab.rules import RULES_FILE
 
 
@@ -178,13 +180,45 @@ ROWS = "".join(f"{i},{0.1 * i},{i % 3},{i % 5}\n" for i in range(20))
 TABLE = "t,v,a,F\n" + ROWS
 
 
+def _xlsx(rows: list[list[object]]) -> bytes:
+    book, stream = Workbook(), io.BytesIO()
+    for row in rows:
+        book.active.append(row)
+    book.save(stream)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        TABLE.encode("utf-16"),
+        TABLE.replace(",", ";").replace(".", ","),
+        TABLE.replace(",", "\t"),
+        TABLE.replace("t,v,a,F", "t [s],v (m/s),a / m/s^2,F_N"),
+        TABLE.replace("t,v,a,F", "t,v,a,F [kN]"),
+        _xlsx(
+            [
+                ["t [s]", "v [m/s]", "a [m/s^2]", "F [N]"],
+                *[[*map(float, line.split(","))] for line in ROWS.split()],
+            ]
+        ),
+    ],
+    ids=["UTF-16", "semicolons", "tabs", "units", "kN", "workbook"],
+)
+def test_a_run_is_read_from_whatever_program_saved_it(tmp_path, content, request):
+    run = read_case(write_case(tmp_path, HEAD + ONE, r0__csv=content)).runs[0]
+    scale = 1000.0 if request.node.callspec.id == "kN" else 1.0
+    np.testing.assert_allclose(run.columns["v"], 0.1 * np.arange(20))
+    np.testing.assert_allclose(run.columns["F"], scale * (np.arange(20) % 5))
+
+
 @pytest.mark.parametrize(
     ("content", "error", "said"),
     [
         ("", UnreadableError, "no rows"),
         ("t,v,a,F\n", UnreadableError, "no rows"),
         ("t,v,a,F\n\n \n", UnreadableError, "no rows"),
-        (TABLE.encode("utf-16"), UnreadableError, "UTF-8"),
+        (b"t,v,a,F\n0,1,1,\x81\n", UnreadableError, "UTF-8"),
         (TABLE + "30,1,1," + "9" * 200_000 + "\n", UnreadableError, "field"),
         (TABLE.replace("\n7,", "\n7\0,", 1), CellError, "line 9, column t"),
         (TABLE + "30,1\n", CellError, "line 22"),
@@ -196,8 +230,9 @@ TABLE = "t,v,a,F\n" + ROWS
         (TABLE + "30,1,1,1\n30,1,1,1\n", CellError, "does not rise"),
         (TABLE + ",1,1,1\n", CellError, "no time"),
         (TABLE.replace("t,v,a,F", "t,v,F,F"), ColumnError, "twice"),
-        (TABLE.replace(",", ";"), ColumnError, "commas"),
-        (TABLE.replace(",", ";").replace(".", ","), CellError, "commas"),
+        (TABLE.replace(",", ";").replace("t;v", "t;v1"), ColumnError, "did you mean 'v1'"),
+        ("t;v;a;F\n" + "".join(f"{i};1,234;0;0\n" for i in range(9)), UnreadableError, "1,234"),
+        (TABLE.replace("t,v,a,F", "t [s],v [m/s],a,F [mm]"), UnitError, "mm"),
         ("t,v,a,F\n" + "".join(f"{i},,1,2\n" for i in range(9)), ColumnError, "no value at all"),
         (b"PK\x03\x04rest", UnreadableError, "workbook"),
     ],

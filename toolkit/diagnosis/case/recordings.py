@@ -1,4 +1,4 @@
-"""Read one run of a case: plain CSV, or the machine's own .xlsx; columns in the recording's units."""
+"""Read one run of a case: CSV, or what else holds a recording; columns in the units of the case."""
 
 from __future__ import annotations
 
@@ -10,14 +10,19 @@ import numpy as np
 
 from toolkit.diagnosis.case.case import CaseChannel, Run
 from toolkit.diagnosis.case.plain_csv import header_of, missing_column, read_csv
-from toolkit.errors import CellError, ColumnError, UnitError, UnreadableError
+from toolkit.errors import CellError, ColumnError, UnitError
 from toolkit.files import sha256_bytes
-from toolkit.machine import load_machine
+from toolkit.machine import Machine, load_machine
+from toolkit.recording.columns import rig
 from toolkit.recording.read import read_recording
+from toolkit.recording.sniff import sniff
 from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+_TEXT = ("text", "utf-16", "binary", "empty", "blank")  # a NUL among the numbers is told with its cell
 
 
 def read_run(
@@ -38,7 +43,7 @@ def read_run(
     ----------
     data : the file's content
     simulated : output -> column of the other program's output, for a case of kind ``columns``
-    machine : whose own workbooks the file may be one of; empty for plain CSV alone
+    machine : whose own recordings the file may be one of; empty for tables that name their channels
     predict : outputs may be absent
 
     Raises
@@ -46,9 +51,10 @@ def read_run(
     ColumnError
         a column is missing or doubled; CellError: a cell is no number; UnreadableError: no rows, no text
     """
-    names = {channel.name for channel in channels} | set(simulated.values())
     units = {channel.name: channel.unit for channel in channels}
-    table, present, own = _read(path, data, machine=machine, units=units, wanted=names)
+    # Another program's output stands in the unit of the channel that it is held against.
+    units = {column: units[output] for output, column in simulated.items()} | units
+    table, present, own = _read(path, data, machine=machine, units=units)
     columns: dict[str, NDArray[np.float64]] = {}
     for channel in channels:
         if channel.name in table:
@@ -92,25 +98,19 @@ def conditions(declared: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _read(
-    path: Path, data: bytes, *, machine: str, units: Mapping[str, str], wanted: set[str]
+    path: Path, data: bytes, *, machine: str, units: Mapping[str, str]
 ) -> tuple[dict[str, NDArray[np.float64]], list[str], bool]:
     """Return the wanted columns that a file has, the names of all, and whether it is the machine's own."""
-    is_book = data[:4] == b"PK\x03\x04"
-    header = [] if is_book else header_of(data)
+    is_text = sniff(data).id in _TEXT
+    header = header_of(data, units, where=path) if is_text else []
     # The acquisition program's own headers, in a workbook or as text.
-    if machine and (is_book or (not wanted & set(header) and _is_of_machine(header, machine))):
-        columns = _read_workbook(path, data, machine, units)
+    if machine and (not is_text or (not units.keys() & set(header) and _is_of_machine(header, machine))):
+        columns = _read_recording(path, data, load_machine(machine), units)
         return columns, list(columns), True
-    if not is_book:
-        return read_csv(data, wanted, where=path), header, False
-    raise UnreadableError(
-        "a run is a workbook",
-        where=path,
-        got="an .xlsx",
-        expected="a CSV (workbooks only for kind machine)",
-        next_step="save the run as CSV",
-        rule="case-run",
-    )
+    if is_text:
+        return read_csv(data, units, where=path), header, False
+    columns = _read_recording(path, data, rig("the case", units), units)
+    return columns, list(columns), False
 
 
 def _is_of_machine(header: Collection[str], machine: str) -> bool:
@@ -118,8 +118,8 @@ def _is_of_machine(header: Collection[str], machine: str) -> bool:
     return any(column.header in header for column in load_machine(machine).columns)
 
 
-def _read_workbook(
-    path: Path, data: bytes, machine: str, units: Mapping[str, str]
+def _read_recording(
+    path: Path, data: bytes, machine: Machine, units: Mapping[str, str]
 ) -> dict[str, NDArray[np.float64]]:
     """Return a file's columns by symbol, each in the unit that the case states for it.
 
@@ -129,7 +129,7 @@ def _read_workbook(
         it is no recording of the machine; UnitError: a stated unit is of another dimension
     """
     columns = {}
-    for series in read_recording(path, load_machine(machine), data=data).series:
+    for series in read_recording(path, machine, data=data).series:
         if series.symbol not in units:
             continue
         stated = unit(units[series.symbol])
