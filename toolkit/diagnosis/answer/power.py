@@ -104,15 +104,6 @@ def _distance(screen: LinearisedFit, trial: Scored) -> tuple[float, float, float
 
 def _noncentrality(alpha: float, dof: int) -> float:
     """Return the distance at which a chi-squared test of a level has 80 % power."""
-    from scipy.stats import chi2, ncx2
+    from scipy.special import chdtri, chndtrinc
 
-    critical = float(chi2.isf(alpha, dof))
-    low, high = 0.0, 10.0 * (critical + 20)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (
-            (middle, high)
-            if float(ncx2.sf(critical, dof, max(middle, 1e-12))) < VERDICT.power
-            else (low, middle)
-        )
-    return math.sqrt(high)
+    return math.sqrt(chndtrinc(chdtri(dof, alpha), dof, 1 - VERDICT.power))
