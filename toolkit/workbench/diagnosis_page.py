@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse
 
-from toolkit.lab.holdings import CASE
+from toolkit.errors import ToolkitError
+from toolkit.lab.holdings import CASE, holding_id
 from toolkit.lab.jobs import start_job
 from toolkit.lab.seen_diagnosis import read_diagnosis
+from toolkit.lab.uploads import hand_in_case
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -27,7 +29,28 @@ DIAGNOSES = "diagnoses"
 
 def diagnoses(request: Request) -> Response:
     """Return the list's page: nothing is looked through before it stands."""
-    return page(request, "diagnoses")
+    return _diagnoses(request)
+
+
+def _diagnoses(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
+    bench: Bench = request.app.state.bench
+    return page(
+        request, "diagnoses", status=status, own=bench.is_own,
+        refused=None if refused is None else refused.as_dict(),
+    )  # fmt: skip
+
+
+def take(request: Request) -> Response:
+    """Take a case from the browser. It brings code that reads files: only this server's user may."""
+    bench: Bench = request.app.state.bench
+    if not bench.is_own:
+        raise HTTPException(404)
+    uploads = [(upload.name, upload.data) for upload in request.state.files.get("files", ())]
+    try:
+        place_of = hand_in_case(bench.home, uploads)
+    except ToolkitError as error:
+        return _diagnoses(request, status=400, refused=error)
+    return RedirectResponse(f"{bench.keys.place}/diagnoses#{holding_id(place_of)}", 303)
 
 
 def diagnosis_list(request: Request) -> Response:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.lab.holdings import holding_id
 from toolkit.lab.home import TEMPLATES
 from toolkit.lab.jobs import start_job
 from toolkit.lab.previews import (
@@ -19,6 +20,7 @@ from toolkit.lab.previews import (
     template_findings,
     templates_of,
 )
+from toolkit.lab.uploads import hand_in_template
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -89,8 +91,26 @@ def start(request: Request) -> Response:
 
 def templates(request: Request) -> Response:
     """Return the templates of the home, and a place for what is wrong with each."""
+    return _templates(request)
+
+
+def _templates(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
     bench: Bench = request.app.state.bench
-    return page(request, "templates", choices=templates_of(bench.home))
+    return page(
+        request, "templates", status=status, choices=templates_of(bench.home),
+        refused=None if refused is None else refused.as_dict(),
+    )  # fmt: skip
+
+
+def take(request: Request) -> Response:
+    """Take a template from the browser; what `template check` says of it stands on its page."""
+    bench: Bench = request.app.state.bench
+    uploads = [(upload.name, upload.data) for upload in request.state.files.get("files", ())]
+    try:
+        name = hand_in_template(bench.home, uploads, replace=request.state.form.get("replace") == "yes")
+    except ToolkitError as error:
+        return _templates(request, status=400, refused=error)
+    return RedirectResponse(f"{bench.keys.place}/templates#{holding_id(f'{TEMPLATES}/{name}')}", 303)
 
 
 def check(request: Request) -> Response:
