@@ -15,6 +15,7 @@ from playwright.sync_api import BrowserContext, Page, expect
 from tests.workbench.conftest import ROOT, Served, serving
 from tests.workbench.test_app import browser, opened, settled
 from tests.workbench.test_app_tasks import looked_at
+from tests.workbench.test_diagnosis_page import CASE_FILES
 from toolkit.files import sha256_file
 from toolkit.lab.holdings import holding_id
 from toolkit.lab.home import make_home
@@ -145,4 +146,58 @@ def test_find_why_a_file_is_wrong_and_repair_it(browser: BrowserContext, bench: 
     assert sha256_file(original) == before
     copies = [path for path in (bench.home / "repaired").rglob("*") if path.suffix in (".xlsx", ".csv")]
     assert len(copies) == 1
+    page.close()
+
+
+def test_learn_what_a_simulation_lacks(browser: BrowserContext, bench: Served, tmp_path: Path) -> None:
+    for name, data in CASE_FILES:
+        (tmp_path / name).write_bytes(data)
+    page = opened(browser, bench, [], [])
+    page.get_by_role("link", name="Diagnoses", exact=True).click()
+    page.get_by_label("case.toml and every file").set_input_files([tmp_path / name for name, _ in CASE_FILES])
+    page.get_by_role("button", name="Add the case").click()
+    page.get_by_role("button", name="Diagnose: cases/case-1").click()
+    ended(page)
+    page.locator("main a[href*='/diagnosis/']").first.click()
+    expect(page.locator("[data-verdict=named]")).to_be_visible()
+    expect(page.locator("[data-effect=nonlinearity]")).to_be_visible()
+    photographed(page, "diagnosis")
+    looked_at(page, "diagnosis")
+    # Without the effect the simulation is as far off as before; with it, it is not.
+    page.get_by_role("link", name="Switch its effects").click()
+    left = page.locator("[data-rmse=F] data")
+    expect(left).to_be_visible(timeout=30_000)
+    fitted = float(left.get_attribute("value") or "nan")
+    effect = page.locator("fieldset[data-effect^=nonlinearity]")
+    effect.get_by_label("acts").uncheck()
+    expect(left).not_to_have_attribute("value", str(fitted), timeout=30_000)
+    assert float(left.get_attribute("value") or "nan") > 4 * fitted
+    photographed(page, "model")
+    looked_at(page, "model")
+    # A zoom stays while sizes change.
+    chart = page.locator(".curves .u-over").first
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 60, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 200, box["y"] + 160, steps=5)
+    page.mouse.up()
+    curves = page.locator(".curves").first
+    expect(curves).to_have_attribute("data-shows", re.compile(r"\S"))
+    page.wait_for_timeout(300)
+    shown = str(curves.get_attribute("data-shows"))
+    assert float(shown.split()[1]) < 60
+    effect.get_by_label("acts").check()
+    expect(left).to_have_attribute("value", str(fitted), timeout=30_000)
+    expect(curves).to_have_attribute("data-shows", shown)
+    # What is no number is told; the sizes of the answer simulate as before.
+    page.locator("input[name^=size-0]").first.fill("")
+    expect(page.locator("#trial")).to_contain_text("a size is no number", timeout=30_000)
+    page.reload()
+    expect(left).to_have_attribute("value", str(fitted), timeout=30_000)
+    page.get_by_role("button", name="Keep this as a model").click()
+    kept = page.locator("[data-kept]")
+    expect(kept).to_be_visible()
+    assert (bench.home / str(kept.get_attribute("data-kept"))).is_file()
     page.close()

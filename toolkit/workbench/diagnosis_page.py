@@ -65,8 +65,11 @@ def diagnosis(request: Request) -> Response:
     folder = bench.path_of("diagnosis", request.path_params["diagnosis"])
     if folder is None:
         raise HTTPException(404)
-    place_of = bench.holdings().places["diagnosis"][request.path_params["diagnosis"]]
-    return page(request, "diagnosis", seen=read_diagnosis(folder), place_of=place_of)
+    diagnosis_id = request.path_params["diagnosis"]
+    return page(
+        request, "diagnosis", seen=read_diagnosis(folder), diagnosis_id=diagnosis_id,
+        place_of=bench.holdings().places["diagnosis"][diagnosis_id],
+    )  # fmt: skip
 
 
 def start(request: Request) -> Response:
