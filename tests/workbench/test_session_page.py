@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.test_calibration_control import session
-from tests.workbench.conftest import Served, plain
+from tests.workbench.conftest import Answer, Served, plain
 from tests.workbench.test_signing_page import People, people
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import run as run_toolkit
@@ -124,6 +124,22 @@ def test_rows_pasted_with_tabs_and_decimal_commas_are_read(own: Served, tmp_path
     assert record.load("FY").coefficients[0] == pytest.approx(500, rel=1e-4)
 
 
+def faults(part: Answer) -> list[dict[str, object]]:
+    """Return the cells that a rehearsal marks."""
+    text = part.body.partition('data-faults="')[2].partition('"')[0].replace("&#34;", '"')
+    marked: list[dict[str, object]] = json.loads(text)
+    return marked
+
+
+def test_all_bad_cells_are_told_at_once(own: Served, tmp_path: Path) -> None:
+    content = typed(own, draft := dropped(own, session(tmp_path / "new", 2025, 0.0)))
+    rows = [row.split("\t") for row in content["data"].splitlines()]
+    rows[3][0], rows[1][1], rows[4][2] = "x", "", "1.5"
+    content["data"] = "\n".join("\t".join(row) for row in rows)
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    assert [(fault["line"], fault["column"]) for fault in faults(part)] == [(2, 1), (4, 0), (5, 2)]
+
+
 @pytest.mark.parametrize(
     ("line", "column", "text"), [(4, 0, "1,2,3"), (2, 1, ""), (8, 1, "x"), (5, 2, "1.5")]
 )
@@ -134,8 +150,7 @@ def test_an_error_is_told_at_its_cell(own: Served, tmp_path: Path, line: int, co
     rows[line - 1][column] = text
     content["data"] = "\n".join("\t".join(row) for row in rows)
     part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
-    fault = part.body.partition('data-fault="')[2].partition('"')[0].replace("&#34;", '"')
-    assert json.loads(fault) == {"table": "data", "line": line, "column": column}
+    assert faults(part) == [{"table": "data", "line": line, "column": column}]
     # It is kept as it was typed, and refused at the entry too, with the same reason.
     assert typed(own, draft)["data"] == content["data"] + "\n"
     refused = own.send(f"/session/{draft}/enter", content)

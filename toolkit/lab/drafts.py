@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.declared import toml_text
-from toolkit.errors import ConfigError, OutputError, ToolkitError
+from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError
 from toolkit.inputs import DATA_FILE, SETTINGS_FILE, check_size, is_regular, read_input, read_regular
 from toolkit.lab.uploads import FILE_NAME, claimed_folder
 from toolkit.publication import publication, settle
@@ -290,11 +290,16 @@ def next_session(registry: Registry, instrument: str, *, day: dt.date, operator:
     return toml_text(table), f"{header}\n"
 
 
-def fault_of(error: ToolkitError, draft: Draft) -> dict[str, Any] | None:
-    """Return the cell that an error is about: ``table`` by its key, ``line`` of the file, ``column`` from 0.
+def faults_of(error: ToolkitError, draft: Draft) -> list[dict[str, Any]]:
+    """Return the cells that an error is about: ``table`` by its key, ``line`` of the file, ``column`` from 0.
 
-    None where the error is about no cell of a table that is typed.
+    ``column`` is None where the error is about a row. Empty where it is about no cell of a typed table.
     """
+    errors = (error, *(error.further if isinstance(error, SessionError) else ()))
+    return [fault for each in errors if (fault := _fault(each, draft)) is not None]
+
+
+def _fault(error: ToolkitError, draft: Draft) -> dict[str, Any] | None:
     match = _CELL.search(error.where or "")
     if match is None:
         return None

@@ -129,8 +129,8 @@ def rehearse(request: Request) -> Response:
             inner = Bench(bench.home, copy, bench.keys)
             parts = {name: _part(request, inner, name, candidate.record.id) for name in PARTS}
     except ToolkitError as error:
-        fault = drafts.fault_of(error, drafts.open_draft(bench.home, draft_id))
-        return page(request, "part_untried", error=error.as_dict(), fault=fault)
+        faults = drafts.faults_of(error, drafts.open_draft(bench.home, draft_id))
+        return page(request, "part_untried", error=error.as_dict(), faults=faults)
     return page(request, "part_rehearsal", answer=payload, parts=parts)
 
 
