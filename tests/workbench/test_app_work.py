@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import zipfile
@@ -14,7 +13,7 @@ from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.workbench.conftest import ROOT, Served, serving
 from tests.workbench.test_app import browser, opened, settled
-from tests.workbench.test_app_tasks import looked_at
+from tests.workbench.test_app_tasks import looked_at, photographed
 from tests.workbench.test_diagnosis_page import CASE_FILES
 from toolkit.files import sha256_file
 from toolkit.lab.holdings import holding_id
@@ -46,22 +45,6 @@ def put_recording(folder: Path) -> Path:
 def ended(page: Page) -> None:
     """Wait on a job's page for its end."""
     expect(page.locator("[data-state]").first).not_to_have_attribute("data-state", "running", timeout=300_000)
-
-
-def photographed(page: Page, name: str) -> None:
-    """Keep pictures of a page in its three looks where somebody asked for them, to look at."""
-    folder = os.environ.get("TOOLKIT_PICTURES")
-    if not folder:
-        return
-    for look, scheme, width in (("light", "light", 1280), ("dark", "dark", 1280), ("phone", "light", 390)):
-        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-        page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_timeout(300)
-        page.screenshot(path=Path(folder) / f"{name}-{look}.png", full_page=True)
-    page.emulate_media(media="print", color_scheme="light")
-    page.screenshot(path=Path(folder) / f"{name}-print.png", full_page=True)
-    page.emulate_media(media="screen", color_scheme="light")
-    page.set_viewport_size({"width": 1280, "height": 900})
 
 
 def own_template(path: Path, *, tag: str) -> Path:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -294,3 +296,30 @@ def test_hostile_words_of_a_draft_stay_text(own: Served, tmp_path: Path) -> None
     body = own.page(f"/session/{draft}").body
     assert "<script>alert" not in body
     assert "{{ 7*7 }}" in body
+
+
+def test_a_statement_is_changed_in_its_field(own: Served, tmp_path: Path) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    content = typed(own, draft)
+    assert 'data-key="cells.S.serial"' in own.page(f"/session/{draft}").body
+    stated = {"key": "cells.S.serial", "value": "<77>"}
+    answer = own.send(f"/session/{draft}/state", content | stated, HX_Request="true")
+    assert (answer.status, answer.headers["hx-trigger"]) == (200, "stated")
+    assert 'serial = "&lt;77&gt;"' in answer.body.replace("&#34;", '"')
+    assert tomllib.loads(open_draft(own.home, draft).session)["cells"]["S"]["serial"] == "<77>"
+    # Who changes the text finds the fields changed, who tries it unchanged does not.
+    content = typed(own, draft)
+    assert (
+        '<section id="statements"'
+        not in own.send(f"/session/{draft}/rehearse", content, HX_Request="true").body
+    )
+    content["session"] = content["session"].replace("<77>", "78")
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    assert re.search(r'data-key="cells.S.serial"[^>]* value="78"', part.body)
+    for key, text in (("cells.X.serial", "1"), ("", ""), ("__class__", "1")):
+        refused = own.send(
+            f"/session/{draft}/state", content | {"key": key, "value": text}, HX_Request="true"
+        )
+        assert (refused.status, "cannot be changed" in refused.body) == (400, True)
+    own.send(f"/session/{draft}/state", content | {"session": "a = [", **stated}, HX_Request="true")
+    assert open_draft(own.home, draft).session == content["session"]

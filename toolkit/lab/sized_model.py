@@ -103,7 +103,7 @@ def sized_from(model: ModelFile, stated: Mapping[str, str]) -> tuple[Sized, ...]
 
 
 def trial_answer(sizable: SizableModel, sized: Sequence[Sized], home: Path) -> dict[str, Any]:
-    """Return what the sized model says: ``rmse`` by output with its unit, ``charts`` (title, what, chart).
+    """Return what the sized model says: ``rmse`` by output with its unit, ``charts`` (title, view, chart).
 
     The case's own code runs isolated, for `TRIAL_S` at most.
 
@@ -126,9 +126,9 @@ def trial_answer(sizable: SizableModel, sized: Sequence[Sized], home: Path) -> d
             for name, value in trial.rmse.items()
         ],
         "charts": [
-            (f"{row.run}: {row.output}", what, chart)
+            (f"{row.run}: {row.output}", view, chart)
             for row in trial.beside[:_MOST_RUNS]
-            for what, chart in _charts(row, has_time=trial.has_time)
+            for view, chart in _charts(row, has_time=trial.has_time)
         ],
     }
 

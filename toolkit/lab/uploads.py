@@ -75,21 +75,21 @@ def hand_in_template(home: Path, files: Sequence[tuple[str, bytes]], *, replace:
     from toolkit.report.style import read_style, style_file
     from toolkit.report.word.package import read_template
 
-    named = _named(files, "one .docx or .dotx, and a .toml of the same name where it has a style")
-    templates = [name for name in named if name.lower().endswith(WORD)]
-    style = [name for name in named if name.lower().endswith(".toml")]
-    stems = {Path(name).stem for name in named}
-    if len(templates) != 1 or len(stems) != 1 or len(named) != 1 + len(style):
-        raise _not_those("one template", named, "one .docx or .dotx, and a .toml of the same name")
+    contents = _named(files, "one .docx or .dotx, and a .toml of the same name where it has a style")
+    templates = [name for name in contents if name.lower().endswith(WORD)]
+    style = [name for name in contents if name.lower().endswith(".toml")]
+    stems = {Path(name).stem for name in contents}
+    if len(templates) != 1 or len(stems) != 1 or len(contents) != 1 + len(style):
+        raise _not_those("one template", contents, "one .docx or .dotx, and a .toml of the same name")
     (template,) = templates
-    check_size(named[template], TEMPLATE_FILE, template)
+    check_size(contents[template], TEMPLATE_FILE, template)
     for name in style:
-        check_size(named[name], SETTINGS_FILE, name)
+        check_size(contents[name], SETTINGS_FILE, name)
     folder = home / TEMPLATES
-    taken = next((name for name in named if os.path.lexists(folder / name)), None)
-    if taken is not None and not replace:
+    occupied = next((name for name in contents if os.path.lexists(folder / name)), None)
+    if occupied is not None and not replace:
         raise ConfigError(
-            "the home has a file of this name", where=f"{TEMPLATES}/{taken}", got="another of that name",
+            "the home has a file of this name", where=f"{TEMPLATES}/{occupied}", got="another of that name",
             expected="a new name, or consent to replace it",
             next_step="name the file anew, or agree to replace it; nothing was written", rule="usage",
         )  # fmt: skip
@@ -98,7 +98,7 @@ def hand_in_template(home: Path, files: Sequence[tuple[str, bytes]], *, replace:
         read_template(place / template)
         read_style(style_file(place / template))
 
-    _enter(folder, named, read)
+    _enter(folder, contents, read)
     return template
 
 
@@ -115,22 +115,22 @@ def hand_in_case(home: Path, files: Sequence[tuple[str, bytes]]) -> str:
     """
     from toolkit.diagnosis.case.reader import read_case
 
-    named = _named(files, f"{CASE} and every file that it names")
-    settings = [name for name in named if name.lower().endswith(".toml")]
-    if CASE not in named and len(settings) == 1:
-        named = {CASE if name in settings else name: data for name, data in named.items()}
-    if CASE not in named:
-        raise _not_those("a case", named, f"{CASE} and every file that it names")
-    for name, data in named.items():
+    contents = _named(files, f"{CASE} and every file that it names")
+    settings = [name for name in contents if name.lower().endswith(".toml")]
+    if CASE not in contents and len(settings) == 1:
+        contents = {CASE if name in settings else name: data for name, data in contents.items()}
+    if CASE not in contents:
+        raise _not_those("a case", contents, f"{CASE} and every file that it names")
+    for name, data in contents.items():
         check_size(data, SETTINGS_FILE if name == CASE else NAMED_FILE, name)
 
     def read(place: Path) -> None:
-        _check_inside(read_case(place / CASE), place, frozenset(named))
+        _check_inside(read_case(place / CASE), place, frozenset(contents))
 
     folder = home / CASES
     name = claimed_folder(folder, "case")
     try:
-        _enter(folder / name, named, read)
+        _enter(folder / name, contents, read)
     except BaseException:
         with contextlib.suppress(OSError):
             (folder / name).rmdir()
@@ -155,10 +155,10 @@ def _check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
 
 
 def _named(files: Sequence[tuple[str, bytes]], expected: str) -> dict[str, bytes]:
-    named = dict(files)
-    if len(named) < len(files) or not all(FILE_NAME.match(name) for name in named):
+    contents = dict(files)
+    if len(contents) < len(files) or not all(FILE_NAME.match(name) for name in contents):
         raise _not_those("files with names of their own", [name for name, _ in files], expected)
-    return named
+    return contents
 
 
 def _enter(folder: Path, files: Mapping[str, bytes], read: Callable[[Path], None]) -> None:
@@ -180,8 +180,8 @@ def _places_of(folder: Path, stage: Path) -> Iterator[None]:
         raise
 
 
-def _not_those(what: str, names: Sequence[str] | Mapping[str, bytes], expected: str) -> ConfigError:
+def _not_those(noun: str, names: Sequence[str] | Mapping[str, bytes], expected: str) -> ConfigError:
     return ConfigError(
-        f"the files are not {what}", where="files", got=", ".join(names) or "no file", expected=expected,
+        f"the files are not {noun}", where="files", got=", ".join(names) or "no file", expected=expected,
         next_step="choose them again; nothing was written", rule="usage",
     )  # fmt: skip

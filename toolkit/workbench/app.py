@@ -86,6 +86,7 @@ _PAGES: tuple[tuple[str, Page, list[str]], ...] = (
     ("/session", session_page.begin, ["POST"]),
     ("/session/{draft}", session_page.session, ["GET"]),
     ("/session/{draft}/save", session_page.save, ["POST"]),
+    ("/session/{draft}/state", session_page.state, ["POST"]),
     ("/session/{draft}/rehearse", session_page.rehearse, ["POST"]),
     ("/session/{draft}/files", session_page.add_files, ["POST"]),
     ("/session/{draft}/enter", session_page.enter, ["POST"]),

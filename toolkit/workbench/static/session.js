@@ -97,3 +97,5 @@ document.addEventListener("htmx:afterSwap", () => {
 });
 // What was typed in the last moment before the page goes.
 addEventListener("pagehide", () => { fetch(draft.dataset.save, { method: "POST", body: new URLSearchParams(new FormData(draft)), keepalive: true }); });
+// Fields in which somebody types are not drawn anew.
+document.addEventListener("htmx:oobBeforeSwap", (event) => { if (event.detail.target.contains(document.activeElement)) event.detail.shouldSwap = false; });
