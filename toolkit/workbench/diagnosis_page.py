@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 DIAGNOSES = "diagnoses"
 """Folder of the home into which jobs write."""
@@ -90,3 +91,12 @@ def start(request: Request) -> Response:
     )
     job = start_job(bench.home, kind="diagnosis", title=place_of, words=words)
     return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)
+
+
+ROUTES: Routes = (
+    ("GET", "/diagnoses", diagnoses),
+    ("POST", "/diagnoses", take),
+    ("GET", "/diagnoses/list", diagnosis_list),
+    ("GET", "/diagnosis/{diagnosis}", diagnosis),
+    ("POST", "/case/{case}/diagnose", start),
+)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from toolkit.lab.sized_model import SizableModel
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 _KEPT = re.compile(r"model-[1-9][0-9]{0,8}/model\.toml")
 _ANSWERING = threading.Lock()  # one simulation at a time: a hand on a size asks again and again
@@ -65,3 +66,10 @@ def _asked(request: Request) -> tuple[Bench, Path, SizableModel]:
     if sizable is None:
         raise HTTPException(404)
     return bench, folder, sizable
+
+
+ROUTES: Routes = (
+    ("GET", "/diagnosis/{diagnosis}/model", model),
+    ("POST", "/diagnosis/{diagnosis}/model/try", attempt),
+    ("POST", "/diagnosis/{diagnosis}/model/keep", keep),
+)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 STEPS = ("preview", "issue")
 _DRAWING = threading.Lock()  # a browser asks for all pages at once
@@ -128,3 +129,14 @@ def _asked(request: Request) -> tuple[Bench, str, str]:
     if bench.path_of("test", test_id) is None:
         raise HTTPException(404)
     return bench, test_id, bench.holdings().places["test"][test_id]
+
+
+ROUTES: Routes = (
+    ("GET", "/test/{test}/report", report),
+    ("GET", "/test/{test}/report/part", part),
+    ("GET", "/test/{test}/report/page/{number:int}.png", picture),
+    ("POST", "/test/{test}/report/{step}", start),
+    ("GET", "/templates", templates),
+    ("POST", "/templates", take),
+    ("GET", "/template/{template}/check", check),
+)

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
+    from toolkit.workbench.page import Routes
+
 
 def sessions(request: Request) -> Response:
     """Return the sessions that are being typed, and the forms that begin one."""
@@ -247,3 +249,16 @@ def _unstated(where: str, got: str, expected: str) -> ConfigError:
         "a session cannot begin like this", where=where, got=got, expected=expected,
         next_step="state it; nothing was written", rule="usage",
     )  # fmt: skip
+
+
+ROUTES: Routes = (
+    ("GET", "/session", sessions),
+    ("POST", "/session", begin),
+    ("GET", "/session/{draft}", session),
+    ("POST", "/session/{draft}/save", save),
+    ("POST", "/session/{draft}/state", state),
+    ("POST", "/session/{draft}/rehearse", rehearse),
+    ("POST", "/session/{draft}/files", add_files),
+    ("POST", "/session/{draft}/enter", enter),
+    ("POST", "/session/{draft}/discard", discard),
+)
