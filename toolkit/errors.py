@@ -119,7 +119,9 @@ class UnitError(ToolkitError):
 
 
 class SessionError(ToolkitError):
-    """Reference-load data that cannot be fitted."""
+    """Reference-load data that cannot be fitted. ``further``: the other cells that cannot be used."""
+
+    further: tuple[SessionError, ...] = ()
 
 
 class RegistryError(ToolkitError):

@@ -151,15 +151,21 @@ def test_a_page_of_another_port_reads_and_decides_nothing(
     page.close()
 
 
-def test_an_empty_home_in_german_and_on_paper(browser: BrowserContext, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("language", "title"),
+    [("de", "Was heute zu entscheiden ist"), ("fr", "Ce qui demande une décision aujourd'hui")],
+)
+def test_an_empty_home_in_other_languages_and_on_paper(
+    browser: BrowserContext, tmp_path: Path, language: str, title: str
+) -> None:
     (tmp_path / "new" / "calibrations").mkdir(parents=True)
     with serving(tmp_path / "new") as bench:
         page = opened(browser, bench, [], [])
-        page.set_extra_http_headers({"Accept-Language": "de"})
+        page.set_extra_http_headers({"Accept-Language": language})
         page.reload()
         settled(page)
-        assert page.locator("h1").inner_text() == "Was heute zu entscheiden ist"
-        assert page.locator("html").get_attribute("lang") == "de"
+        assert page.locator("h1").inner_text() == title
+        assert page.locator("html").get_attribute("lang") == language
         assert objections(page) == []
         page.emulate_media(media="print")
         assert not page.locator("header").is_visible()

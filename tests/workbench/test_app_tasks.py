@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from collections.abc import Iterator
@@ -36,6 +37,22 @@ def empty(tmp_path: Path) -> Iterator[Served]:
         yield bench
 
 
+def photographed(page: Page, name: str) -> None:
+    """Keep pictures of a page in its three looks where somebody asked for them, to look at."""
+    folder = os.environ.get("TOOLKIT_PICTURES")
+    if not folder:
+        return
+    for look, scheme, width in (("light", "light", 1280), ("dark", "dark", 1280), ("phone", "light", 390)):
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(300)
+        page.screenshot(path=Path(folder) / f"{name}-{look}.png", full_page=True)
+    page.emulate_media(media="print", color_scheme="light")
+    page.screenshot(path=Path(folder) / f"{name}-print.png", full_page=True)
+    page.emulate_media(media="screen", color_scheme="light")
+    page.set_viewport_size({"width": 1280, "height": 900})
+
+
 def looked_at(page: Page, name: str) -> None:
     """Judge a page in its looks: what axe objects to, and nothing wider than the window."""
     for scheme, width in (LIGHT, DARK_PHONE):
@@ -59,6 +76,7 @@ def typed_session(page: Page, source: Path) -> None:
     new.get_by_role("button", name="Begin").click()
     page.wait_for_url("**/session/draft-1")
     expect(page.locator("#rehearsal")).to_contain_text("no rows", timeout=30_000)
+    page.get_by_text("Statements of the session").click()
     statements = page.locator("textarea[name=session]")
     statements.fill(statements.input_value().replace('zero = "included"\n', STATEMENTS))
     for name, table in (("data", "loads.csv"), ("check", "check.csv")):
@@ -77,6 +95,13 @@ def test_see_what_limits_U(browser: BrowserContext, empty: Served, tmp_path: Pat
     page = opened(browser, empty, [], [])
     typed_session(page, session(tmp_path / "s", 2025, 0.1))
     expect(page.locator("[data-part=budget] .chart canvas")).to_have_count(1)
+    # A statement is typed in its field, and stands in the text.
+    resolution = page.locator("[data-key='cells.S.resolution']")
+    expect(resolution).to_have_value("1e-07")
+    page.locator("[data-key=operator]").fill("Dora Example")
+    expect(page.locator("textarea[name=session]")).to_have_value(re.compile('operator = "Dora Example"'))
+    expect(page.locator("#rehearsal [data-record=cell-r1]")).to_be_visible(timeout=60_000)
+    photographed(page, "session")
     looked_at(page, "session")
     # A slip of a cell is told at the cell, by row and column, and mended there.
     cell = page.locator("#grid-data").get_by_label("row 4, S [mV/V]")

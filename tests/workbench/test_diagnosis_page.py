@@ -43,22 +43,30 @@ def simulate(inputs, p):
 """
 
 
-@pytest.fixture(scope="module")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A home with a case: the cell has a part with the square of its load, which the simulation has not."""
-    lab = tmp_path_factory.mktemp("diagnosed") / "lab"
-    case = lab / "cases" / "cell"
-    case.mkdir(parents=True)
-    shutil.copytree(ROOT / "calibrations", lab / "calibrations")
-    (case / "case.toml").write_text(TOML)
-    (case / "sim.py").write_text(SIMULATOR)
+def _case_files() -> list[tuple[str, bytes]]:
+    """Return a case: the cell has a part with the square of its load, which the simulation has not."""
     rng = np.random.default_rng(20260101)
+    files = {"case.toml": TOML, "sim.py": SIMULATOR, "more.csv": "L\n100\n200\n300\n"}
     for run in range(2):
         load = np.linspace(10.0, 1200.0, 80) + rng.normal(0.0, 1.0, 80)
         force = load + 2e-5 * load**2 + rng.normal(0.0, 0.4, 80)
         rows = "".join(f"{a:.9g},{b:.9g}\n" for a, b in zip(load, force, strict=True))
-        (case / f"r{run}.csv").write_text(f"L,F\n{rows}")
-    (case / "more.csv").write_text("L\n100\n200\n300\n")
+        files[f"r{run}.csv"] = f"L,F\n{rows}"
+    return [(name, text.encode()) for name, text in files.items()]
+
+
+CASE_FILES = _case_files()
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with a case."""
+    lab = tmp_path_factory.mktemp("diagnosed") / "lab"
+    case = lab / "cases" / "cell"
+    case.mkdir(parents=True)
+    shutil.copytree(ROOT / "calibrations", lab / "calibrations")
+    for name, data in CASE_FILES:
+        (case / name).write_bytes(data)
     return lab
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from tests.workbench.conftest import Served, plain
 from tests.workbench.test_home_page import command
+from toolkit.machine import load_machine
 
 Capture = pytest.CaptureFixture[str]
 
@@ -187,3 +188,17 @@ def test_every_rule_that_a_gate_names_is_in_the_table() -> None:
         if keyword.arg == "rule" and isinstance(keyword.value, ast.Constant)
     }
     assert named == set(GATES)
+
+
+def test_what_a_decision_rests_on_stands_beside_it(served: Served) -> None:
+    page = served.page("/record/cell-r7").body
+    record = served.registry.load("cell-r7")
+    for stored in record.data:
+        assert f'data-role="{stored.role}"' in page
+        assert stored.sha256 in page
+    gates = served.page("/record/cell-r7/part/gates").body
+    assert "none states this instrument" in gates
+    assert "polarity reading" in gates or "by nothing" in gates
+    machine = load_machine("m15")
+    gates = served.page("/record/m15-r1/part/gates").body
+    assert f'data-machine="m15">m15, version {machine.version}' in gates

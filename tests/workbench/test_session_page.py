@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from tests.cli.test_calibration_control import session
-from tests.workbench.conftest import Served, plain
+from tests.workbench.conftest import Answer, Served, plain
 from tests.workbench.test_signing_page import People, people
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import run as run_toolkit
@@ -124,6 +126,22 @@ def test_rows_pasted_with_tabs_and_decimal_commas_are_read(own: Served, tmp_path
     assert record.load("FY").coefficients[0] == pytest.approx(500, rel=1e-4)
 
 
+def faults(part: Answer) -> list[dict[str, object]]:
+    """Return the cells that a rehearsal marks."""
+    text = part.body.partition('data-faults="')[2].partition('"')[0].replace("&#34;", '"')
+    marked: list[dict[str, object]] = json.loads(text)
+    return marked
+
+
+def test_all_bad_cells_are_told_at_once(own: Served, tmp_path: Path) -> None:
+    content = typed(own, draft := dropped(own, session(tmp_path / "new", 2025, 0.0)))
+    rows = [row.split("\t") for row in content["data"].splitlines()]
+    rows[3][0], rows[1][1], rows[4][2] = "x", "", "1.5"
+    content["data"] = "\n".join("\t".join(row) for row in rows)
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    assert [(fault["line"], fault["column"]) for fault in faults(part)] == [(2, 1), (4, 0), (5, 2)]
+
+
 @pytest.mark.parametrize(
     ("line", "column", "text"), [(4, 0, "1,2,3"), (2, 1, ""), (8, 1, "x"), (5, 2, "1.5")]
 )
@@ -134,8 +152,7 @@ def test_an_error_is_told_at_its_cell(own: Served, tmp_path: Path, line: int, co
     rows[line - 1][column] = text
     content["data"] = "\n".join("\t".join(row) for row in rows)
     part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
-    fault = part.body.partition('data-fault="')[2].partition('"')[0].replace("&#34;", '"')
-    assert json.loads(fault) == {"table": "data", "line": line, "column": column}
+    assert faults(part) == [{"table": "data", "line": line, "column": column}]
     # It is kept as it was typed, and refused at the entry too, with the same reason.
     assert typed(own, draft)["data"] == content["data"] + "\n"
     refused = own.send(f"/session/{draft}/enter", content)
@@ -279,3 +296,30 @@ def test_hostile_words_of_a_draft_stay_text(own: Served, tmp_path: Path) -> None
     body = own.page(f"/session/{draft}").body
     assert "<script>alert" not in body
     assert "{{ 7*7 }}" in body
+
+
+def test_a_statement_is_changed_in_its_field(own: Served, tmp_path: Path) -> None:
+    draft = dropped(own, session(tmp_path / "new", 2025, 0.0))
+    content = typed(own, draft)
+    assert 'data-key="cells.S.serial"' in own.page(f"/session/{draft}").body
+    stated = {"key": "cells.S.serial", "value": "<77>"}
+    answer = own.send(f"/session/{draft}/state", content | stated, HX_Request="true")
+    assert (answer.status, answer.headers["hx-trigger"]) == (200, "stated")
+    assert 'serial = "&lt;77&gt;"' in answer.body.replace("&#34;", '"')
+    assert tomllib.loads(open_draft(own.home, draft).session)["cells"]["S"]["serial"] == "<77>"
+    # Who changes the text finds the fields changed, who tries it unchanged does not.
+    content = typed(own, draft)
+    assert (
+        '<section id="statements"'
+        not in own.send(f"/session/{draft}/rehearse", content, HX_Request="true").body
+    )
+    content["session"] = content["session"].replace("<77>", "78")
+    part = own.send(f"/session/{draft}/rehearse", content, HX_Request="true")
+    assert re.search(r'data-key="cells.S.serial"[^>]* value="78"', part.body)
+    for key, text in (("cells.X.serial", "1"), ("", ""), ("__class__", "1")):
+        refused = own.send(
+            f"/session/{draft}/state", content | {"key": key, "value": text}, HX_Request="true"
+        )
+        assert (refused.status, "cannot be changed" in refused.body) == (400, True)
+    own.send(f"/session/{draft}/state", content | {"session": "a = [", **stated}, HX_Request="true")
+    assert open_draft(own.home, draft).session == content["session"]

@@ -10,7 +10,7 @@ from babel.messages.extract import extract
 from babel.messages.pofile import read_po
 
 from toolkit.workbench.page import TEMPLATES, templates
-from toolkit.workbench.words import MESSAGES, SOURCE, TERMS, languages
+from toolkit.workbench.words import MESSAGES, SOURCE, TERMS, languages, preferred
 
 Phrase = str | tuple[str, ...]
 PLACE = re.compile(r"%\((\w+)\)s")
@@ -60,7 +60,24 @@ def test_no_template_holds_words_beside_the_catalogue() -> None:
 
 def test_numbers_take_the_decimal_sign_of_the_language_and_keep_their_value() -> None:
     drawn = {
-        name: templates(name).from_string("{{ number(-1.25, '.2f', 'N') }}").render() for name in ("en", "de")
+        name: templates(name).from_string("{{ number(-1.25, '.2f', 'N') }}").render()
+        for name in ("en", "de", "fr")
     }
     assert drawn["en"] == '<data value="-1.25">\u22121.25\u00a0N</data>'
     assert drawn["de"] == '<data value="-1.25">\u22121,25\u00a0N</data>'
+    assert drawn["fr"] == drawn["de"]
+
+
+def test_the_pages_come_in_english_german_and_french() -> None:
+    assert set(languages()) == {"en", "de", "fr"}
+    assert [preferred(accepted) for accepted in ("fr-CA,en;q=0.5", "de-AT", "it, fr;q=0.2", "it")] == [
+        "fr", "de", "fr", "en",
+    ]  # fmt: skip
+
+
+def test_french_puts_a_space_that_does_not_break_before_its_double_marks() -> None:
+    # Lexique des règles typographiques en usage à l'Imprimerie nationale: deux-points, ; ? ! et guillemets.
+    catalogue = read_po(io.BytesIO((MESSAGES / "fr.po").read_bytes()))
+    for message in (message for message in catalogue if message.id):
+        for text in message.string if isinstance(message.string, tuple) else (message.string,):
+            assert not re.search(r"[^\u00a0](?:[;?!\u00bb]|:(?=\s|$))|\u00ab(?!\u00a0)", text), text

@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.declared import toml_text
-from toolkit.errors import ConfigError, OutputError, ToolkitError
+from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError
 from toolkit.inputs import DATA_FILE, SETTINGS_FILE, check_size, is_regular, read_input, read_regular
+from toolkit.lab.uploads import FILE_NAME, claimed_folder
 from toolkit.publication import publication, settle
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ GRIDS = {"data": "loads.csv", "check": "check.csv"}
 """The tables that are typed: their key in the session, and their name where it states none."""
 
 _ID = re.compile(r"draft-[1-9][0-9]{0,8}\Z")
-_NAME = re.compile(r"[^\W_.][\w ().+-]{0,99}\Z")
 _TEXT = (".csv", ".tsv", ".txt")
 _STANDING = (
     "schema", "instrument", "indications", "loads", "model", "degree", "method", "drop", "between_runs",
@@ -124,7 +124,7 @@ def begin_draft(home: Path, session: str, tables: Mapping[str, bytes]) -> str:
     """
     files = {SESSION: session.encode(), **tables}
     _check(files)
-    draft_id = _claimed(home / DRAFTS)
+    draft_id = claimed_folder(home / DRAFTS, "draft")
     try:
         _write(home / DRAFTS / draft_id, files)
     except ToolkitError:
@@ -290,11 +290,16 @@ def next_session(registry: Registry, instrument: str, *, day: dt.date, operator:
     return toml_text(table), f"{header}\n"
 
 
-def fault_of(error: ToolkitError, draft: Draft) -> dict[str, Any] | None:
-    """Return the cell that an error is about: ``table`` by its key, ``line`` of the file, ``column`` from 0.
+def faults_of(error: ToolkitError, draft: Draft) -> list[dict[str, Any]]:
+    """Return the cells that an error is about: ``table`` by its key, ``line`` of the file, ``column`` from 0.
 
-    None where the error is about no cell of a table that is typed.
+    ``column`` is None where the error is about a row. Empty where it is about no cell of a typed table.
     """
+    errors = (error, *(error.further if isinstance(error, SessionError) else ()))
+    return [fault for each in errors if (fault := _fault(each, draft)) is not None]
+
+
+def _fault(error: ToolkitError, draft: Draft) -> dict[str, Any] | None:
     match = _CELL.search(error.where or "")
     if match is None:
         return None
@@ -303,24 +308,6 @@ def fault_of(error: ToolkitError, draft: Draft) -> dict[str, Any] | None:
     names = [re.split(r"\s*[\[(]", part)[0] for part in header]
     column = names.index(match["column"]) if match["column"] in names else None
     return None if key is None else {"table": key, "line": int(match["line"]), "column": column}
-
-
-def _claimed(folder: Path) -> str:
-    """Make a folder whose number nobody else has, and return its name."""
-    number = max((int(name[6:]) for name in draft_ids(folder.parent)), default=0) + 1
-    try:
-        folder.mkdir(exist_ok=True)
-        while True:
-            with contextlib.suppress(FileExistsError):
-                (folder / f"draft-{number}").mkdir()
-                return f"draft-{number}"
-            number += 1
-    except OSError as error:
-        raise OutputError(
-            "a draft cannot be made", where=folder, got=error.strerror,
-            expected="a folder with write permission and free space", next_step="give that permission",
-            rule="not-writable",
-        ) from error  # fmt: skip
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -332,7 +319,7 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 def _check(files: Mapping[str, bytes]) -> None:
     for name, data in files.items():
-        if not _NAME.match(name):
+        if not FILE_NAME.match(name):
             raise ConfigError(
                 "no name of a session's table", where="files", got=name,
                 expected="letters, digits, blanks, points and lines, with a letter or digit first",
@@ -357,7 +344,7 @@ def _names(session: str) -> dict[str, str]:
         "check": check.get("file", check.get("data")) if isinstance(check, dict) else check,
     }
     return {
-        key: name if isinstance(name := stated[key], str) and _NAME.match(name) else default
+        key: name if isinstance(name := stated[key], str) and FILE_NAME.match(name) else default
         for key, default in GRIDS.items()
     }
 

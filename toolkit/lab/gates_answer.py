@@ -79,6 +79,7 @@ def gates_answer(registry: Registry, record_id: str) -> dict[str, Any]:
         "blocked": bool(judged.failed),
         "gates": gates,
         "evidence": list(judged.evidence),
+        "machine": None if machine is None else {"name": machine.name, "version": machine.version},
     }
 
 

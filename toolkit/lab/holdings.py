@@ -21,7 +21,7 @@ Kind = Literal["test", "audit", "diagnosis", "case"]
 ANSWER, CASE = "diagnosis.json", "case.toml"
 _ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "node_modules"))
 
-_WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses"))
+_WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses", "models"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 PREVIEWS, REPORTS = f"{FOLDER}/previews", "reports"
 PDF = "report.pdf"
+WORD = (".docx", ".dotx")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +48,7 @@ def templates_of(home: Path) -> dict[str, str]:
     return {
         holding_id(f"{TEMPLATES}/{entry.name}"): entry.name
         for entry in entries
-        if entry.is_file(follow_symlinks=False) and entry.name.endswith((".docx", ".dotx"))
+        if entry.is_file(follow_symlinks=False) and entry.name.lower().endswith(WORD)
     }
 
 

@@ -77,6 +77,7 @@ class FittedEffect:
 class ModelFile:
     """A model file, read whole and checked; paths are absolute or relative to the working folder.
 
+    ``case`` is where the case lay when it was diagnosed, None where the answer does not say;
     ``files`` are the files of the simulation by key (``tire``, ``path``, ``calibration``, ``machine``);
     ``simulation`` the rest of that table as TOML values; ``channels`` name, unit, role and noise of each.
     """
@@ -87,6 +88,7 @@ class ModelFile:
     code_version: str
     verdict: str
     complete: bool
+    case: Path | None
     case_sha256: str
     recordings: tuple[tuple[str, str], ...]
     axes: Axes
@@ -146,6 +148,7 @@ def read_model(path: Path) -> ModelFile:
         code_version=_text(table.get("code_version"), f"{path}: code_version"),
         verdict=_text(answer.get("verdict"), f"{path}: answer.verdict"),
         complete=answer.get("complete") is True,
+        case=path.parent / name if (name := _maybe(answer.get("case"), f"{path}: answer.case")) else None,
         case_sha256=_text(answer.get("case_sha256"), f"{path}: answer.case_sha256"),
         recordings=tuple(
             (name, _text(digest, f"{path}: answer.recordings"))

@@ -1,9 +1,10 @@
-"""The addresses of the workbench, and what answers each."""
+"""The workbench as an application: the addresses that its pages declare, and how each is answered."""
 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,18 +14,7 @@ from starlette.responses import Response
 from starlette.routing import Mount, Route
 
 from toolkit.errors import ToolkitError
-from toolkit.workbench import (
-    archive_page,
-    assets,
-    diagnosis_page,
-    home_page,
-    jobs_page,
-    record_page,
-    report_page,
-    session_page,
-    signing_page,
-    tire_test_page,
-)
+from toolkit.workbench import assets
 from toolkit.workbench.bench import Bench
 from toolkit.workbench.page import is_part, page, refusal
 
@@ -34,15 +24,14 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.trust.people import Person
     from toolkit.workbench.guard import Keys
-
-Page = Callable[["Request"], Response]
+    from toolkit.workbench.page import Page, Routes
 
 
 def application(home: Path, registry: Registry, keys: Keys, *, person: Person | None = None) -> Starlette:
     """Return the pages of a home below the place of its keys; `guard.Guard` stands before them."""
     routes = [
         Route("/static/{name}", assets.static, name="static"),
-        *(Route(path, _answering(handler), methods=methods) for path, handler, methods in _PAGES),
+        *_routes(),
     ]
     app = Starlette(
         routes=[Mount(keys.place, routes=routes)],
@@ -52,57 +41,12 @@ def application(home: Path, registry: Registry, keys: Keys, *, person: Person | 
     return app
 
 
-_PAGES: tuple[tuple[str, Page, list[str]], ...] = (
-    ("/", home_page.home, ["GET"]),
-    ("/agenda/{question}", home_page.agenda, ["GET"]),
-    ("/records", record_page.records, ["GET"]),
-    ("/record/{record}", record_page.record, ["GET"]),
-    ("/record/{record}/part/{part}", record_page.part, ["GET"]),
-    ("/record/{record}/decide/{decision}", record_page.decide, ["POST"]),
-    ("/tests", tire_test_page.tests, ["GET"]),
-    ("/tests/windows", tire_test_page.test_windows, ["GET"]),
-    ("/tests/window/{start:int}", tire_test_page.test_window, ["GET"]),
-    ("/test/{test}", tire_test_page.test, ["GET"]),
-    ("/test/{test}/part/{part}", tire_test_page.part, ["GET"]),
-    ("/test/{test}/download/{what}", tire_test_page.download, ["GET"]),
-    ("/test/{test}/report", report_page.report, ["GET"]),
-    ("/test/{test}/report/part", report_page.part, ["GET"]),
-    ("/test/{test}/report/page/{number:int}.png", report_page.picture, ["GET"]),
-    ("/test/{test}/report/{step}", report_page.start, ["POST"]),
-    ("/templates", report_page.templates, ["GET"]),
-    ("/template/{template}/check", report_page.check, ["GET"]),
-    ("/beside", tire_test_page.beside, ["GET"]),
-    ("/beside/part", tire_test_page.beside_part, ["GET"]),
-    ("/audits", archive_page.audits, ["GET"]),
-    ("/audits/list", archive_page.audit_list, ["GET"]),
-    ("/audit/{audit}", archive_page.audit, ["GET"]),
-    ("/audit/{audit}/part/{part}", archive_page.part, ["GET"]),
-    ("/audit/{audit}/windows", archive_page.windows, ["GET"]),
-    ("/audit/{audit}/window/{start:int}", archive_page.window, ["GET"]),
-    ("/audit/{audit}/file/{number:int}", archive_page.file, ["GET"]),
-    ("/session", session_page.sessions, ["GET"]),
-    ("/session", session_page.begin, ["POST"]),
-    ("/session/{draft}", session_page.session, ["GET"]),
-    ("/session/{draft}/save", session_page.save, ["POST"]),
-    ("/session/{draft}/rehearse", session_page.rehearse, ["POST"]),
-    ("/session/{draft}/files", session_page.add_files, ["POST"]),
-    ("/session/{draft}/enter", session_page.enter, ["POST"]),
-    ("/session/{draft}/discard", session_page.discard, ["POST"]),
-    ("/request/{request}", signing_page.request_file, ["GET"]),
-    ("/request/{request}/answer", signing_page.answered, ["POST"]),
-    ("/request/{request}/sign", signing_page.agent_signed, ["POST"]),
-    ("/request/{request}/drop", signing_page.dropped, ["POST"]),
-    ("/audit/{audit}/repair", jobs_page.start_repair, ["POST"]),
-    ("/diagnoses", diagnosis_page.diagnoses, ["GET"]),
-    ("/diagnoses/list", diagnosis_page.diagnosis_list, ["GET"]),
-    ("/diagnosis/{diagnosis}", diagnosis_page.diagnosis, ["GET"]),
-    ("/case/{case}/diagnose", diagnosis_page.start, ["POST"]),
-    ("/jobs", jobs_page.jobs, ["GET"]),
-    ("/jobs/audit", jobs_page.start_audit, ["POST"]),
-    ("/job/{job}", jobs_page.job, ["GET"]),
-    ("/job/{job}/state", jobs_page.state, ["GET"]),
-    ("/job/{job}/cancel", jobs_page.cancel, ["POST"]),
-)
+def _routes() -> Iterator[Route]:
+    """Yield the addresses that the pages declare: every module ``*_page`` of this package."""
+    for name in sorted(path.stem for path in Path(__file__).parent.glob("*_page.py")):
+        declared: Routes = import_module(f"toolkit.workbench.{name}").ROUTES
+        for method, path, handler in declared:
+            yield Route(path, _answering(handler), methods=[method])
 
 
 def _answering(handler: Page) -> Page:

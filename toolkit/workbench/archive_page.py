@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from toolkit.lab.audited import Order
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 WINDOW = 200
 """Rows of the list of files that are asked for at once."""
@@ -118,3 +119,14 @@ def _asked(request: Request) -> tuple[Bench, Audited]:
     if audited is None:
         raise HTTPException(404)
     return bench, audited
+
+
+ROUTES: Routes = (
+    ("GET", "/audits", audits),
+    ("GET", "/audits/list", audit_list),
+    ("GET", "/audit/{audit}", audit),
+    ("GET", "/audit/{audit}/part/{part}", part),
+    ("GET", "/audit/{audit}/windows", windows),
+    ("GET", "/audit/{audit}/window/{start:int}", window),
+    ("GET", "/audit/{audit}/file/{number:int}", file),
+)

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse
 
-from toolkit.lab.holdings import CASE
+from toolkit.errors import ToolkitError
+from toolkit.lab.holdings import CASE, holding_id
 from toolkit.lab.jobs import start_job
 from toolkit.lab.seen_diagnosis import read_diagnosis
+from toolkit.lab.uploads import hand_in_case
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 DIAGNOSES = "diagnoses"
 """Folder of the home into which jobs write."""
@@ -27,7 +30,28 @@ DIAGNOSES = "diagnoses"
 
 def diagnoses(request: Request) -> Response:
     """Return the list's page: nothing is looked through before it stands."""
-    return page(request, "diagnoses")
+    return _diagnoses(request)
+
+
+def _diagnoses(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
+    bench: Bench = request.app.state.bench
+    return page(
+        request, "diagnoses", status=status, own=bench.is_own,
+        refused=None if refused is None else refused.as_dict(),
+    )  # fmt: skip
+
+
+def take(request: Request) -> Response:
+    """Take a case from the browser. It brings code that reads files: only this server's user may."""
+    bench: Bench = request.app.state.bench
+    if not bench.is_own:
+        raise HTTPException(404)
+    uploads = [(upload.name, upload.data) for upload in request.state.files.get("files", ())]
+    try:
+        place_of = hand_in_case(bench.home, uploads)
+    except ToolkitError as error:
+        return _diagnoses(request, status=400, refused=error)
+    return RedirectResponse(f"{bench.keys.place}/diagnoses#{holding_id(place_of)}", 303)
 
 
 def diagnosis_list(request: Request) -> Response:
@@ -42,8 +66,11 @@ def diagnosis(request: Request) -> Response:
     folder = bench.path_of("diagnosis", request.path_params["diagnosis"])
     if folder is None:
         raise HTTPException(404)
-    place_of = bench.holdings().places["diagnosis"][request.path_params["diagnosis"]]
-    return page(request, "diagnosis", seen=read_diagnosis(folder), place_of=place_of)
+    diagnosis_id = request.path_params["diagnosis"]
+    return page(
+        request, "diagnosis", seen=read_diagnosis(folder), diagnosis_id=diagnosis_id,
+        place_of=bench.holdings().places["diagnosis"][diagnosis_id],
+    )  # fmt: skip
 
 
 def start(request: Request) -> Response:
@@ -64,3 +91,12 @@ def start(request: Request) -> Response:
     )
     job = start_job(bench.home, kind="diagnosis", title=place_of, words=words)
     return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)
+
+
+ROUTES: Routes = (
+    ("GET", "/diagnoses", diagnoses),
+    ("POST", "/diagnoses", take),
+    ("GET", "/diagnoses/list", diagnosis_list),
+    ("GET", "/diagnosis/{diagnosis}", diagnosis),
+    ("POST", "/case/{case}/diagnose", start),
+)

@@ -1,4 +1,8 @@
-"""Forms as a browser sends them: fields, and files with the names that they had (RFC 7578)."""
+"""Forms as a browser sends them: fields, and files with the names that they had (RFC 7578).
+
+A form is whole or refused. Starlette's own parser takes one that was cut off for one with fewer fields, and
+reads text that is no UTF-8 as Latin-1: a decision must rest on neither.
+"""
 
 from __future__ import annotations
 

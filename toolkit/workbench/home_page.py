@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 MOST_ROWS = 50
 
@@ -81,3 +82,9 @@ _QUESTIONS: dict[str, Callable[[Bench], dict[str, Any]]] = {
     "drift": _drift,
     "work": _work,
 }
+
+
+ROUTES: Routes = (
+    ("GET", "/", home),
+    ("GET", "/agenda/{question}", agenda),
+)

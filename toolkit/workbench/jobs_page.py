@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 MOST_JOBS = 100
 AUDITS, REPAIRED = "audits", "repaired"
@@ -117,3 +118,13 @@ def _asked(request: Request) -> tuple[Bench, SeenJob]:
     if seen is None:
         raise HTTPException(404)
     return bench, seen
+
+
+ROUTES: Routes = (
+    ("POST", "/audit/{audit}/repair", start_repair),
+    ("GET", "/jobs", jobs),
+    ("POST", "/jobs/audit", start_audit),
+    ("GET", "/job/{job}", job),
+    ("GET", "/job/{job}/state", state),
+    ("POST", "/job/{job}/cancel", cancel),
+)

@@ -21,9 +21,16 @@ from toolkit.report.pages.kit import data, drawn, environment
 from toolkit.workbench.words import decimal_sign, preferred, translations
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from starlette.requests import Request
+    from starlette.responses import Response
 
     from toolkit.errors import ToolkitError
+
+    Page = Callable[[Request], Response]
+    Routes = tuple[tuple[str, str, Page], ...]
+    """Method, path and handler of each address of a page."""
 
 TEMPLATES = Path(__file__).with_name("templates")
 

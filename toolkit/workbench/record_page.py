@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 DECISIONS = ("approve", "withdraw", "discard")
 
@@ -202,3 +203,11 @@ def _asked(request: Request) -> tuple[Bench, str]:
     if ledger.damage is None and record_id not in ledger.entered():
         raise HTTPException(404)
     return bench, record_id
+
+
+ROUTES: Routes = (
+    ("GET", "/records", records),
+    ("GET", "/record/{record}", record),
+    ("GET", "/record/{record}/part/{part}", part),
+    ("POST", "/record/{record}/decide/{decision}", decide),
+)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.lab.holdings import holding_id
 from toolkit.lab.home import TEMPLATES
 from toolkit.lab.jobs import start_job
 from toolkit.lab.previews import (
@@ -19,12 +20,14 @@ from toolkit.lab.previews import (
     template_findings,
     templates_of,
 )
+from toolkit.lab.uploads import hand_in_template
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
     from starlette.requests import Request
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 STEPS = ("preview", "issue")
 _DRAWING = threading.Lock()  # a browser asks for all pages at once
@@ -89,8 +92,26 @@ def start(request: Request) -> Response:
 
 def templates(request: Request) -> Response:
     """Return the templates of the home, and a place for what is wrong with each."""
+    return _templates(request)
+
+
+def _templates(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
     bench: Bench = request.app.state.bench
-    return page(request, "templates", choices=templates_of(bench.home))
+    return page(
+        request, "templates", status=status, choices=templates_of(bench.home),
+        refused=None if refused is None else refused.as_dict(),
+    )  # fmt: skip
+
+
+def take(request: Request) -> Response:
+    """Take a template from the browser; what `template check` says of it stands on its page."""
+    bench: Bench = request.app.state.bench
+    uploads = [(upload.name, upload.data) for upload in request.state.files.get("files", ())]
+    try:
+        name = hand_in_template(bench.home, uploads, replace=request.state.form.get("replace") == "yes")
+    except ToolkitError as error:
+        return _templates(request, status=400, refused=error)
+    return RedirectResponse(f"{bench.keys.place}/templates#{holding_id(f'{TEMPLATES}/{name}')}", 303)
 
 
 def check(request: Request) -> Response:
@@ -108,3 +129,14 @@ def _asked(request: Request) -> tuple[Bench, str, str]:
     if bench.path_of("test", test_id) is None:
         raise HTTPException(404)
     return bench, test_id, bench.holdings().places["test"][test_id]
+
+
+ROUTES: Routes = (
+    ("GET", "/test/{test}/report", report),
+    ("GET", "/test/{test}/report/part", part),
+    ("GET", "/test/{test}/report/page/{number:int}.png", picture),
+    ("POST", "/test/{test}/report/{step}", start),
+    ("GET", "/templates", templates),
+    ("POST", "/templates", take),
+    ("GET", "/template/{template}/check", check),
+)

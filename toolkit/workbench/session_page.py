@@ -16,6 +16,7 @@ from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab import drafts
 from toolkit.lab.decisions import Order
 from toolkit.lab.pending import decide
+from toolkit.lab.statements import statement_groups, with_statement
 from toolkit.trust.requested import Requested
 from toolkit.workbench.bench import Bench
 from toolkit.workbench.page import fragment, page
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from starlette.requests import Request
+
+    from toolkit.workbench.page import Routes
 
 
 def sessions(request: Request) -> Response:
@@ -95,7 +98,8 @@ def session_page(
     """Return the page of a draft; ``refused`` is told at its end."""
     bench: Bench = request.app.state.bench
     return page(
-        request, "session", status=status, draft=drafts.open_draft(bench.home, draft_id),
+        request, "session", status=status, draft=(draft := drafts.open_draft(bench.home, draft_id)),
+        groups=statement_groups(draft.session), oob=False,
         people=bench.registry.people().history.now is not None,
         refused=None if refused is None else refused.as_dict(), **waiting(bench, draft_id),
     )  # fmt: skip
@@ -106,6 +110,22 @@ def save(request: Request) -> Response:
     bench, draft_id = _asked(request)
     _save(bench, draft_id, request.state.form)
     return Response(status_code=204)
+
+
+def state(request: Request) -> Response:
+    """Save what was typed with one statement as its field has it; return the text of the statements."""
+    bench, draft_id = _asked(request)
+    form = dict(request.state.form)
+    if waiting(bench, draft_id)["pending"] is None:
+        form["session"] = with_statement(
+            form.get("session", "").replace("\r\n", "\n"), form.get("key", ""), form.get("value", "")
+        )
+        _save(bench, draft_id, form)
+    answer = page(
+        request, "part_statement_text", draft=drafts.open_draft(bench.home, draft_id), pending=None
+    )  # fmt: skip
+    answer.headers["hx-trigger"] = "stated"
+    return answer
 
 
 def rehearse(request: Request) -> Response:
@@ -119,6 +139,7 @@ def rehearse(request: Request) -> Response:
     if request.headers.get("hx-request") != "true":
         _save(bench, draft_id, request.state.form)
         return _to(bench, f"session/{draft_id}")
+    before = drafts.open_draft(bench.home, draft_id).session
     try:
         _save(bench, draft_id, request.state.form)
         path = drafts.session_file(bench.home, draft_id)
@@ -129,9 +150,23 @@ def rehearse(request: Request) -> Response:
             inner = Bench(bench.home, copy, bench.keys)
             parts = {name: _part(request, inner, name, candidate.record.id) for name in PARTS}
     except ToolkitError as error:
-        fault = drafts.fault_of(error, drafts.open_draft(bench.home, draft_id))
-        return page(request, "part_untried", error=error.as_dict(), fault=fault)
-    return page(request, "part_rehearsal", answer=payload, parts=parts)
+        draft = drafts.open_draft(bench.home, draft_id)
+        return page(
+            request, "part_untried", error=error.as_dict(), faults=drafts.faults_of(error, draft),
+            statements=_restated(request, draft, before),
+        )  # fmt: skip
+    statements = _restated(request, drafts.open_draft(bench.home, draft_id), before)
+    return page(request, "part_rehearsal", answer=payload, parts=parts, statements=statements)
+
+
+def _restated(request: Request, draft: drafts.Draft, before: str) -> str:
+    """Return the fields anew where somebody changed the text of the statements itself."""
+    if draft.session == before:
+        return ""
+    return fragment(
+        request, "part_statements", draft=draft, groups=statement_groups(draft.session), oob=True,
+        pending=None,
+    )  # fmt: skip
 
 
 def _part(request: Request, bench: Bench, name: str, record_id: str) -> str:
@@ -214,3 +249,16 @@ def _unstated(where: str, got: str, expected: str) -> ConfigError:
         "a session cannot begin like this", where=where, got=got, expected=expected,
         next_step="state it; nothing was written", rule="usage",
     )  # fmt: skip
+
+
+ROUTES: Routes = (
+    ("GET", "/session", sessions),
+    ("POST", "/session", begin),
+    ("GET", "/session/{draft}", session),
+    ("POST", "/session/{draft}/save", save),
+    ("POST", "/session/{draft}/state", state),
+    ("POST", "/session/{draft}/rehearse", rehearse),
+    ("POST", "/session/{draft}/files", add_files),
+    ("POST", "/session/{draft}/enter", enter),
+    ("POST", "/session/{draft}/discard", discard),
+)

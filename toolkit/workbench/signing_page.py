@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
 
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 
 def request_file(request: Request) -> Response:
@@ -100,3 +101,11 @@ def _refused(request: Request, pending: Pending, error: ToolkitError) -> Respons
 def _home_of(name: str) -> str:
     """Return the page on which a request waits: that of a record, or of the draft of a session."""
     return f"record/{name}" if ID.match(name) else f"session/{name}"
+
+
+ROUTES: Routes = (
+    ("GET", "/request/{request}", request_file),
+    ("POST", "/request/{request}/answer", answered),
+    ("POST", "/request/{request}/sign", agent_signed),
+    ("POST", "/request/{request}/drop", dropped),
+)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from toolkit.lab.resolve import Resolved
     from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
 
 WINDOW = 100
 """Rows of a list that are asked for at once."""
@@ -271,3 +272,15 @@ def _asked(request: Request) -> tuple[Bench, str, Path]:
     if folder is None:
         raise HTTPException(404)
     return bench, test_id, folder
+
+
+ROUTES: Routes = (
+    ("GET", "/tests", tests),
+    ("GET", "/tests/windows", test_windows),
+    ("GET", "/tests/window/{start:int}", test_window),
+    ("GET", "/test/{test}", test),
+    ("GET", "/test/{test}/part/{part}", part),
+    ("GET", "/test/{test}/download/{what}", download),
+    ("GET", "/beside", beside),
+    ("GET", "/beside/part", beside_part),
+)

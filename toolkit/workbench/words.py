@@ -34,7 +34,7 @@ def translations(language: str) -> NullTranslations:
 def preferred(accepted: str) -> str:
     """Return the language of a page, by what a browser says that its person reads.
 
-    >>> preferred("de-AT,de;q=0.9,en;q=0.8"), preferred("fr"), preferred("")
+    >>> preferred("de-AT,de;q=0.9,en;q=0.8"), preferred("it"), preferred("")
     ('de', 'en', 'en')
     """
     from babel.core import negotiate_locale

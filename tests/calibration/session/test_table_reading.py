@@ -77,3 +77,19 @@ def test_decimal_commas_are_named() -> None:
     assert "another number of cells" in error.what
     assert "decimal comma" in str(error.next_step)
     assert "nothing was written" in str(refusal("\n".join([HEADER, "0,1,1"])).next_step)
+
+
+def test_every_bad_cell_is_told_at_once_in_the_order_of_the_rows() -> None:
+    text = "\n".join([HEADER, "x,1,1,up", "0.1,,1.5,up", "0.2,2,1,sideways", "0.3,3,1,down"]) + "\n"
+    first = refusal(text)
+    cells = ["row 1 (line 2), column S", "row 2 (line 3), column F", "row 2 (line 3), column run"]
+    cells.append("row 3 (line 4), column direction")
+    assert [error.where for error in (first, *first.further)] == [f"loads.csv, {cell}" for cell in cells]
+    assert {error.rule for error in first.further} == {"cell"}
+    assert all(cell in str(first) for cell in cells)
+
+
+def test_a_file_of_other_things_is_refused_before_all_of_it_is_judged() -> None:
+    first = refusal("\n".join([HEADER, *["a,b,1,up"] * 5000]) + "\n")
+    assert len(first.further) == 999
+    assert "990 more cells" in str(first.got)

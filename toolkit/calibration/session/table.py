@@ -42,6 +42,8 @@ _DECIMAL_COMMA = (
     "the number has a decimal comma, and commas stand between the cells too: save the file with semicolons "
     "or tabs between the cells, or with a decimal point; nothing was written"
 )
+_MOST_FAULTS = 1000  # a file of another kind has millions
+_MOST_PLACES = 9  # of further cells in one message; `SessionError.further` has them all
 _CORRECT = "correct the cell, or remove the whole row with a reason in the laboratory's notes"
 
 
@@ -139,7 +141,8 @@ def read_table(
     Raises
     ------
     SessionError
-        a column is missing, doubled, unknown or without unit; a cell is no finite number; no rows
+        a column is missing, doubled, unknown or without unit; no rows; cells that are no finite numbers, told
+        at once: the first of them with the others as ``further``
     UnitError
         a unit is unknown
     """
@@ -152,18 +155,23 @@ def read_table(
             cells.where, "the file has no rows", "0 rows", "one row a reference load", "no-data"
         )
     up = None
+    faults: list[tuple[int, int, SessionError]] = []
     if "direction" in head.columns:
-        direction = [str(cell).strip().lower() for cell in cells.columns[head.columns["direction"]]]
+        at = head.columns["direction"]
+        direction = [str(cell).strip().lower() for cell in cells.columns[at]]
         for number, text in enumerate(direction, start=1):
             if text not in ("up", "down"):
-                raise _cell(cells, number, head.columns["direction"], "up or down")
+                faults.append((number, at, _cell(cells, number, at, "up or down")))
         up = np.array([text == "up" for text in direction])
     more = [name for name in ("run", "rotation") if name in head.columns]
-    found = _numbers(cells, [head.columns[name] for name in (*head.numeric, *more)])
-    values, extra = found[: len(head.numeric)].T, dict(zip(more, found[len(head.numeric) :], strict=True))
+    columns = _numbers(cells, [head.columns[name] for name in (*head.numeric, *more)], faults)
+    values, extra = columns[: len(head.numeric)].T, dict(zip(more, columns[len(head.numeric) :], strict=True))
     run = extra.get("run")
-    if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
-        raise _cell(cells, int(fraction[0]) + 1, head.columns["run"], "a whole number")
+    if run is not None:
+        for row in np.flatnonzero(np.isfinite(run) & (run != np.floor(run))).tolist():
+            at = head.columns["run"]
+            faults.append((row + 1, at, _cell(cells, row + 1, at, "a whole number")))
+    _refuse_cells(faults)
     return Table(
         names=head.numeric,
         units=head.units,
@@ -186,8 +194,23 @@ def _texts(cells: Cells, column: int) -> tuple[str, ...]:
     return texts
 
 
-def _numbers(cells: Cells, at: Sequence[int]) -> NDArray[np.float64]:
-    """Return the numbers of columns (columns, rows)."""
+def _refuse_cells(faults: Sequence[tuple[int, int, SessionError]]) -> None:
+    """Raise the first of the cells that cannot be used, by row and column; it names the others."""
+    if not faults:
+        return
+    first, *further = (error for _, _, error in sorted(faults, key=lambda fault: fault[:2]))
+    if further:
+        places = [str(error.where).rpartition("/")[2].partition(", ")[2] for error in further[:_MOST_PLACES]]
+        more = len(further) - len(places)
+        first.got = f"{first.got}; none either in {'; '.join(places)}{f'; {more} more cells' if more else ''}"
+    first.further = tuple(further)
+    raise first
+
+
+def _numbers(
+    cells: Cells, at: Sequence[int], faults: list[tuple[int, int, SessionError]]
+) -> NDArray[np.float64]:
+    """Return the numbers of columns (columns, rows), NaN with a fault in place of what is none."""
     columns = [cells.columns[one] for one in at]
     if cells.separator == ",":
         text = "".join(map("".join, columns))
@@ -199,9 +222,16 @@ def _numbers(cells: Cells, at: Sequence[int]) -> NDArray[np.float64]:
         except ValueError:
             pass
     decimal = _decimal(cells, at)
-    return np.array(
-        [[_number(cells, row, one, decimal) for row in range(1, len(cells.lines) + 1)] for one in at]
-    )
+    values = np.full((len(at), len(cells.lines)), np.nan)
+    for place, column in enumerate(at):
+        for row in range(1, len(cells.lines) + 1):
+            try:
+                values[place, row - 1] = _number(cells, row, column, decimal)
+            except SessionError as error:
+                faults.append((row, column, error))
+                if len(faults) >= _MOST_FAULTS:
+                    _refuse_cells(faults)
+    return values
 
 
 def _decimal(cells: Cells, at: Sequence[int]) -> str:

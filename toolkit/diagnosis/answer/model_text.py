@@ -52,7 +52,7 @@ def model_text(case: Case, search: Search, diagnosis: Diagnosis, folder: Path) -
         "[answer]",
         *toml_lines({
             "verdict": diagnosis.verdict, "remaining": diagnosis.remaining, "complete": diagnosis.complete,
-            "case": _relative(case.path, folder), "case_sha256": case.sha256,
+            "case": relative_path(case.path, folder), "case_sha256": case.sha256,
             "recordings": {run.name: run.sha256 for run in case.runs},
         }),
         *_simulation(case, search, folder),
@@ -90,7 +90,7 @@ def _simulation(case: Case, search: Search, folder: Path) -> list[str]:
     }
     for key, file in files.items():
         if file is not None:
-            entries[key], sums[key] = _relative(file, folder), sha256_file(file)
+            entries[key], sums[key] = relative_path(file, folder), sha256_file(file)
     if simulation.kind == "machine":
         entries.setdefault("machine", simulation.machine)
         if simulation.calibration:
@@ -183,5 +183,6 @@ def _standard_error(search: Search, at: int) -> float | None:
     return math.sqrt(variance) if math.isfinite(variance) and variance > 0 else None
 
 
-def _relative(file: Path, folder: Path) -> str:
+def relative_path(file: Path, folder: Path) -> str:
+    """Return a file as a model file in a folder names it."""
     return Path(os.path.relpath(real_path(file), real_path(folder))).as_posix()

@@ -3,6 +3,7 @@
 // Switches of the form around it (load, rotation) hide series; a value is told where the pointer or the keys are.
 (() => {
 const drawn = new Map();
+const zooms = new Map();  // by the name of a chart: what is drawn anew under that name keeps its zoom
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const figures = new Intl.NumberFormat(document.documentElement.lang, { maximumSignificantDigits: 6, useGrouping: false });
 const uncertain = new Intl.NumberFormat(document.documentElement.lang, { maximumSignificantDigits: 2, useGrouping: false });
@@ -46,8 +47,9 @@ function paths(content, element) {
 function range(of) {
   return (plot, low, high) => {
     if (low === null || low === undefined) return [0, 1];
+    if (plot.zoomed) return [low, high];
     const pad = (high - low || Math.abs(high) || 1) * 0.04;
-    return of && !plot.zoomed ? of : [low - pad, high + pad];
+    return of || [low - pad, high + pad];
   };
 }
 function draw(element) {
@@ -63,8 +65,14 @@ function draw(element) {
   }, [null, ...content.series.map((series) => [series.x, series.y])], element);
   drawn.set(element, { plot, content });
   plot.over.addEventListener("mousemove", (event) => tell(element, nearest(element, event)));
-  plot.over.addEventListener("dblclick", () => { plot.zoomed = false; });
-  plot.over.addEventListener("mouseup", () => { plot.zoomed = true; });
+  const name = element.dataset.name, zoom = zooms.get(name);
+  plot.over.addEventListener("dblclick", () => { plot.zoomed = false; zooms.delete(name); });
+  plot.over.addEventListener("mouseup", () => {
+    plot.zoomed = true;
+    if (name) setTimeout(() => { if (plot.zoomed) zooms.set(name, ["x", "y"].map((key) => ({ min: plot.scales[key].min, max: plot.scales[key].max }))); });
+  });
+  if (zoom) { plot.zoomed = true; plot.setScale("x", zoom[0]); plot.setScale("y", zoom[1]); }
+  plot.hooks.setScale = [() => { element.dataset.shows = ["x", "y"].map((key) => plot.scales[key].min + " " + plot.scales[key].max).join(" "); }];
   if (!element.dataset.keys) { element.dataset.keys = "yes"; element.addEventListener("keydown", step); }
   shown(element);
 }
@@ -118,7 +126,10 @@ function shown(element) {
     if (plot.series[at + 1].show !== show) plot.setSeries(at + 1, { show });
   }));
 }
-function drawCurves(root) { root.querySelectorAll(".curves[data-curves]:empty").forEach(draw); }
+function drawCurves(root) {
+  [...drawn].forEach(([element, { plot }]) => { if (!element.isConnected) { plot.destroy(); drawn.delete(element); } });
+  root.querySelectorAll(".curves[data-curves]:empty").forEach(draw);
+}
 function drawCurvesAgain() {
   [...drawn].forEach(([element, { plot }]) => { plot.destroy(); element.replaceChildren(); });
   drawn.clear();

@@ -79,19 +79,23 @@ class Grid {
     if (event.key === "Enter" && row === this.rows.length && !this.area.readOnly) { this.rows.push([""]); this.draw(); }
     this.cell(row, column)?.focus();
   }
-  mark(fault) {
+  mark(faults) {
     this.table.querySelectorAll("[aria-invalid]").forEach((input) => { input.removeAttribute("aria-invalid"); input.removeAttribute("aria-describedby"); });
-    if (!fault || fault.table !== this.area.name) return;
-    const row = this.table.rows[fault.line - 1];
-    const cells = fault.column === null ? row?.querySelectorAll("input") ?? [] : [this.cell(fault.line - 1, fault.column)];
-    for (const input of cells) if (input) { input.setAttribute("aria-invalid", "true"); input.setAttribute("aria-describedby", "fault"); }
+    for (const fault of faults) {
+      if (fault.table !== this.area.name) continue;
+      const row = this.table.rows[fault.line - 1];
+      const cells = fault.column === null ? row?.querySelectorAll("input") ?? [] : [this.cell(fault.line - 1, fault.column)];
+      for (const input of cells) if (input) { input.setAttribute("aria-invalid", "true"); input.setAttribute("aria-describedby", "fault"); }
+    }
   }
 }
 const draft = document.getElementById("draft");
 const grids = [...draft.querySelectorAll("textarea.grid")].map((area) => new Grid(area));
 document.addEventListener("htmx:afterSwap", () => {
-  const fault = document.querySelector("#rehearsal [data-fault]")?.dataset.fault;
-  grids.forEach((grid) => grid.mark(fault ? JSON.parse(fault) : null));
+  const faults = JSON.parse(document.querySelector("#rehearsal [data-faults]")?.dataset.faults ?? "[]");
+  grids.forEach((grid) => grid.mark(faults));
 });
 // What was typed in the last moment before the page goes.
 addEventListener("pagehide", () => { fetch(draft.dataset.save, { method: "POST", body: new URLSearchParams(new FormData(draft)), keepalive: true }); });
+// Fields in which somebody types are not drawn anew.
+document.addEventListener("htmx:oobBeforeSwap", (event) => { if (event.detail.target.contains(document.activeElement)) event.detail.shouldSwap = false; });

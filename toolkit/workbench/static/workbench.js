@@ -37,3 +37,12 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAgain)
 let waiting = 0;
 addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(() => charts.forEach(([element, plot]) => plot.setSize({ width: Math.max(element.clientWidth, 200), height: 240 })), 100); });
 drawAll(document);
+// Files may be dropped anywhere on the form that takes them.
+function takes(event) { const form = event.target.closest?.("form"); return form?.querySelector("input[type=file]") && event.dataTransfer.types.includes("Files") ? form : null; }
+document.addEventListener("dragover", (event) => { if (takes(event)) event.preventDefault(); });
+document.addEventListener("drop", (event) => {
+  const form = takes(event);
+  if (!form) return;
+  event.preventDefault();
+  form.querySelector("input[type=file]").files = event.dataTransfer.files;
+});
