@@ -16,6 +16,7 @@ from toolkit.cli.console import (
     Json,
     KnownAt,
     Quiet,
+    answers,
     day,
     into_file,
     into_folder,
@@ -26,6 +27,7 @@ from toolkit.cli.console import (
 NAME = "audit"
 
 
+@answers("toolkit.lab.archive_answer_types:AuditAnswer")
 def command(
     archive: Annotated[Path, typer.Argument(help="A folder of recordings, in any depth.")],
     workers: Annotated[

@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     RequestFile,
     Sign,
     answer,
+    answers,
     exit_code,
     into_folder,
     new_registry,
@@ -36,6 +37,7 @@ Figures = Annotated[
 ]
 
 
+@answers("toolkit.lab.record_answer_types:CalibrateAnswer")
 def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
     calibrations: NewCalibrations = None,

@@ -22,6 +22,7 @@ from toolkit.cli.console import (
     Sign,
     TimeStamp,
     answer,
+    answers,
     ask_passphrase,
     day,
     exit_code,
@@ -34,6 +35,7 @@ from toolkit.cli.console import (
 CERTIFICATE = "certificate"
 
 
+@answers("toolkit.lab.control_answer_types:BudgetAnswer")
 def budget(
     record_id: Id,
     load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
@@ -85,6 +87,7 @@ def budget(
     return exit_code(findings)
 
 
+@answers("toolkit.lab.control_answer_types:ApplyAnswer")
 def apply(
     record_id: Id,
     data: Annotated[
@@ -126,6 +129,7 @@ def apply(
     return exit_code(loads.findings)
 
 
+@answers("toolkit.lab.document_answer_types:CertificateAnswer")
 def certificate(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
     template: Annotated[
@@ -198,6 +202,7 @@ def certificate(
     return 1 if delivered.warnings else exit_code(issued.findings)
 
 
+@answers("toolkit.lab.control_answer_types:StandardAnswer")
 def standard(
     record_id: Id,
     name: Annotated[str, typer.Option("--standard", help="e74 or iso376.")],
@@ -248,6 +253,7 @@ def standard(
     return 0
 
 
+@answers("toolkit.lab.control_answer_types:ChartAnswer")
 def chart(
     instrument: Annotated[str, typer.Argument(help="The instrument.")],
     out: Annotated[
@@ -279,6 +285,7 @@ def chart(
     return exit_code(findings)
 
 
+@answers("toolkit.lab.control_answer_types:DueAnswer")
 def due(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     on: Annotated[

@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     Quiet,
     Reader,
     answer,
+    answers,
     day,
     exit_code,
     into_folder,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 NAME = "compare"
 
 
+@answers("toolkit.lab.tire_answer_types:CompareForms")
 def command(
     sources: Annotated[
         list[Path] | None,

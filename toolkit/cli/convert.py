@@ -16,6 +16,7 @@ from toolkit.cli.console import (
     KnownAt,
     Quiet,
     answer,
+    answers,
     day,
     exit_code,
     into_file,
@@ -24,6 +25,7 @@ from toolkit.cli.console import (
 NAME = "convert"
 
 
+@answers("toolkit.lab.tire_answer_types:ConvertAnswer")
 def command(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A .tir, .tdx, .csv or reduced .xlsx.")],
     target: Annotated[Path, typer.Argument(metavar="OUT", callback=into_file, help="A .tir, .tdx or .csv.")],

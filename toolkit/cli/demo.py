@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, into_folder
+from toolkit.cli.console import Json, Quiet, answer, answers, into_folder
 from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ class Step:
     told: Callable[[Payload], str]
 
 
+@answers("toolkit.lab.document_answer_types:DemoAnswer")
 def command(
     context: typer.Context,
     out: Annotated[

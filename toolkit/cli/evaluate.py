@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, exit_code, into_file
+from toolkit.cli.console import Json, Quiet, answer, answers, exit_code, into_file
 
 NAME = "evaluate"
 
 
+@answers("toolkit.lab.tire_answer_types:EvaluateAnswer")
 def command(
     tire: Annotated[Path, typer.Argument(metavar="TIRE.tir", help="A tire property file, MF 5.2 or 6.x.")],
     grid: Annotated[

@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     KnownAt,
     Quiet,
     answer,
+    answers,
     day,
     exit_code,
     into_file,
@@ -27,6 +28,7 @@ from toolkit.cli.console import (
 NAME = "fit"
 
 
+@answers("toolkit.lab.tire_answer_types:FitAnswer")
 def command(
     source: Annotated[
         Path,

@@ -20,6 +20,7 @@ from toolkit.cli.console import (
     Reader,
     Units,
     answer,
+    answers,
     day,
     exit_code,
     into_file,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 NAME = "process"
 
 
+@answers("toolkit.lab.tire_answer_types:ProcessAnswer")
 def command(
     test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
     calibration: CalibrationId = None,

@@ -24,6 +24,7 @@ from toolkit.cli.console import (
     Sign,
     TimeStamp,
     answer,
+    answers,
     ask_passphrase,
     day,
     into_folder,
@@ -35,6 +36,7 @@ from toolkit.cli.console import reader as choose_reader
 NAME = "report"
 
 
+@answers("toolkit.lab.document_answer_types:ReportForms")
 def command(
     tests: Annotated[
         list[Path],

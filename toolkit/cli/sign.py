@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, ask_passphrase, into_file
+from toolkit.cli.console import Json, Quiet, answer, answers, ask_passphrase, into_file
 from toolkit.errors import ConfigError
 
 NAME = "sign"
 
 
+@answers("toolkit.lab.decision_answer_types:SignAnswer")
 def command(
     request: Annotated[Path, typer.Argument(help="What --request wrote, or the answer of another person.")],
     key: Annotated[

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, into_file
+from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, answers, into_file
 
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @app.command("check")
+@answers("toolkit.lab.document_answer_types:TemplateCheckAnswer")
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Word template, .docx or .dotx.")],
     json: Json = False,
@@ -46,6 +47,7 @@ def check(
 
 
 @app.command("tags")
+@answers("toolkit.lab.document_answer_types:TagsAnswer")
 def tags(
     test: Annotated[
         Path | None, typer.Option("--test", help="Show which tags this test has, and their values.")
@@ -113,6 +115,7 @@ def tags(
 
 
 @app.command("words")
+@answers("toolkit.lab.document_answer_types:WordsAnswer")
 def words(
     language: Annotated[
         str | None, typer.Option("--language", help="This language alone; default: all but English.")
@@ -165,6 +168,7 @@ def words(
 
 
 @app.command("new")
+@answers("toolkit.lab.document_answer_types:NewTemplateAnswer")
 def new(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", callback=into_file, help="Where to write it: NAME.docx.")

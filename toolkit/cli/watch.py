@@ -11,11 +11,12 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, into_folder
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, answers, into_folder
 
 NAME = "watch"
 
 
+@answers("toolkit.lab.document_answer_types:WatchAnswer")
 def command(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", help="Folder in which tests arrive, each with test.toml.")

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.lab.control_answer_types import AppliedRange, ApplyAnswer
     from toolkit.lab.record import Loads, Record
 
 Table = Mapping[str, "NDArray[Any]"]
@@ -212,7 +213,7 @@ WRITERS: dict[str, Callable[[Table, CalibrationUse], bytes]] = {
 
 def apply_answer(
     record: Record, source: Path, out: Path, *, tare: Mapping[str, float] | None, draft: bool
-) -> tuple[dict[str, Any], str, Loads]:
+) -> tuple[ApplyAnswer, str, Loads]:
     """Compute a file's loads by a record and write them; return both forms of the answer, and the loads."""
     from toolkit.lab.answers import finding_lines
 
@@ -225,7 +226,7 @@ def apply_answer(
     write_applied(out, applied_columns(series, loads), loads.use)
     ranges = {name: _range(loads, name) for name in loads.value}
     rows = len(series[0].values)
-    payload = {
+    payload: ApplyAnswer = {
         "out": out, "rows": rows, "calibration": loads.use.as_dict(), "mark": loads.use.mark, "loads": ranges,
         "findings": [finding.as_dict() for finding in loads.findings],
     }  # fmt: skip
@@ -236,7 +237,7 @@ def apply_answer(
     return payload, "\n".join(lines), loads
 
 
-def _range(loads: Loads, name: str) -> dict[str, Any]:
+def _range(loads: Loads, name: str) -> AppliedRange:
     values, U = loads.value[name], loads.U[name]
     return {
         "unit": loads.units[name], "least": float(values.min()), "largest": float(values.max()),

@@ -12,8 +12,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from toolkit.declared import Entry
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
@@ -45,15 +46,15 @@ class Verdict:
     """The answer of one file; ``over`` is what it was issued over, ``certificate`` the signer's SHA-256."""
 
     file: str
-    kind: str
+    kind: Annotated[str, Entry("what the document is")]
     issued_by: str | None = None
     issued_at: str | None = None
     signature: Signature = "invalid"
-    ledger: Continuity = "unknown"
-    still_holds: bool | None = None
+    ledger: Annotated[Continuity, Entry("whether today's ledger continues the document's")] = "unknown"
+    still_holds: Annotated[bool | None, Entry("null where nothing says")] = None
     why: str = ""
-    over: str | None = None
-    certificate: str | None = None
+    over: Annotated[str | None, Entry("what it was issued over")] = None
+    certificate: Annotated[str | None, Entry("SHA-256 of the signer's")] = None
 
     @property
     def code(self) -> int:
@@ -62,10 +63,6 @@ class Verdict:
             return 2
         broken = self.still_holds is False or self.ledger in ("forked", "rolled_back")
         return 0 if self.signature == "valid" and not broken else 1
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the answer as JSON values."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     @property
     def line(self) -> str:
