@@ -17,7 +17,7 @@ from toolkit.effects.applied import acting, in_order
 from toolkit.effects.filters import lag
 from toolkit.effects.forward import driven, similar
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
-from toolkit.simulation import carriage, road
+from toolkit.simulation import carriage
 from toolkit.simulation.places import through_machine
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.steady import loaded_radius, steady_of
@@ -74,7 +74,7 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
     start = driven(start, in_order(rolling, "road"), setting, tire)
     start = driven(start, commanded, setting, tire)
     angle = setting.channels["DRUM_ANGLE"]
-    FZ = road.load_on_drum(plan.road, load=start.FZ, angle=angle)
+    FZ = carriage.load_on_drum(plan.road, load=start.FZ, angle=angle)
     FZ = through_machine({"FZ": FZ}, rolling, setting, plan.machine)["FZ"]
     start = driven(dataclasses.replace(start, FZ=FZ), turned, setting, tire)
 
@@ -115,7 +115,7 @@ def _setting(plan: Plan, run: RunSteps, line: Timeline, before: Before, speed: f
     ambient = plan.motion.ambient_K + plan.motion.ambient_drift_K_s * elapsed
     pressure = plan.pressure_Pa if run.pressure_Pa is None else run.pressure_Pa
     turns = {
-        name: road.drum_angle(
+        name: carriage.drum_angle(
             time=line.clock, speed_m_s=speed, radius_m=radius, start_rad=0.0, reverse=reverse
         )
         for name, radius in (

@@ -8,8 +8,7 @@ from typing import Any
 
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.records.use import UNSIGNED
-from toolkit.calibration.registry.clock import check_after, day_of
-from toolkit.calibration.registry.clock_state import clock_state
+from toolkit.calibration.registry.clock import check_after, clock_state, day_of
 from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
 from toolkit.errors import TrustError
 from toolkit.publication import publication
