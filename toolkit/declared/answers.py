@@ -192,12 +192,17 @@ def _words(annotation: Any) -> str:
     if origin is Literal:
         return " or ".join(f'"{word}"' if isinstance(word, str) else str(word) for word in inner)
     if _is_mapping(origin):
-        return f"by name: {_words(inner[1])}"
+        return f"by name: {_grouped(inner[1])}"
     if origin is tuple and inner[-1] is not Ellipsis:
         return f"[{', '.join(map(_words, inner))}]"
     if _is_list(origin):
-        return f"list of {_words(inner[0])}"
+        return f"list of {_grouped(inner[0])}"
     return _WORDS[annotation][0]
+
+
+def _grouped(annotation: Any) -> str:
+    words = _words(annotation)
+    return f"({words})" if " or " in words else words
 
 
 def _linked(annotation: Any) -> str:
