@@ -139,14 +139,14 @@ def command(
             expected="two tests or more, or --laboratories FILE", next_step="see 'toolkit compare --help'",
             rule="usage",
         )  # fmt: skip
-    chosen = choose_reader(reader)
+    engine = choose_reader(reader)
     style = unit_choice(units or "SI")
     started = time.perf_counter()
     opened = comparison_template(template, out, home)
     with progress(None, "reading", show=not (json or quiet)) as step:
         entries, findings = read_entries(
             sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,
-            home=home, draft=draft, reader=chosen, step=step,
+            home=home, draft=draft, reader=engine, step=step,
         )  # fmt: skip
     comparison = compare(
         entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility

@@ -72,7 +72,7 @@ def command(
         resolved = _resolved(stage)
         outcome = _tire_file(resolved, stage / "tire.tir")
         figures = _figures(resolved, stage)
-        certificates = sorted(one.name for one in (stage / "certificate").iterdir())
+        certificates = sorted(path.name for path in (stage / "certificate").iterdir())
         say(f"      {outcome}\n      {len(figures)} figures\n")
         report = steps_run[-1]
         (stage / _MARK).write_text(
@@ -247,9 +247,9 @@ def _told_certificate(payload: Payload) -> str:
 
 
 def _told_process(payload: Payload) -> str:
-    used = sum(entry["used"] for entry in payload["conditions"])
+    conditions = sum(entry["used"] for entry in payload["conditions"])
     findings = ", ".join(dict.fromkeys(entry["rule"] for entry in payload["findings"])) or "none"
-    return f"{used} conditions by {payload['calibration']['id']}; findings: {findings}"
+    return f"{conditions} conditions by {payload['calibration']['id']}; findings: {findings}"
 
 
 def _told_fit(payload: Payload) -> str:

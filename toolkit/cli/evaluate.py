@@ -51,9 +51,9 @@ def command(
     text = grid_text(table, values)
     if out is not None:
         write_result(out, text)
-    shown = text.rstrip("\n") if out is None else f"{len(table.cells)} rows written to {out}"
+    printed = text.rstrip("\n") if out is None else f"{len(table.cells)} rows written to {out}"
     if findings:
-        shown += f"\n\n{findings_text(findings)}"
+        printed += f"\n\n{findings_text(findings)}"
     payload = {
         "tire": str(tire),
         "model": "mf52" if file.version == "5.2" else "mf61",
@@ -66,5 +66,5 @@ def command(
         "findings": [finding.as_dict() for finding in findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, shown, as_json=json, quiet=quiet)
+    answer(payload, printed, as_json=json, quiet=quiet)
     return exit_code(findings)

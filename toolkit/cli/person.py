@@ -241,10 +241,10 @@ def check(
     from toolkit.lab.stamping import stamp_of
 
     registry = _registry(calibrations, home)
-    named, comparison = check_against(registry, instrument, against)
+    concerned, comparison = check_against(registry, instrument, against)
     stamp = stamp_of(against, trusted(registry.folder.parent / TRUST))
     text = f"{comparison.continuity}: {comparison.why}"
-    payload = {"instrument": named, "ledger": comparison.continuity, "why": comparison.why}
+    payload = {"instrument": concerned, "ledger": comparison.continuity, "why": comparison.why}
     if stamp is not None:
         text += f"\n{stamp.text}"
         payload["time_stamp"] = f"{stamp.at:%Y-%m-%dT%H:%M:%SZ}"

@@ -66,7 +66,7 @@ def command(
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
-    chosen, style = choose_reader(reader), unit_choice(units)
+    engine, style = choose_reader(reader), unit_choice(units)
     if out is not None:
         refuse_original(out, suffix=".xlsx")
     started = time.perf_counter()
@@ -78,7 +78,7 @@ def command(
             home=home,
             known_at=day(known_at),
             draft=draft,
-            reader=chosen,
+            reader=engine,
             protocol=protocol,
             step=step,
         )

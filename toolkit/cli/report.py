@@ -136,7 +136,7 @@ def command(
     from toolkit.report.drawer import Drawer
     from toolkit.report.word.office import Office
 
-    chosen = choose_reader(reader)
+    engine = choose_reader(reader)
     started = time.perf_counter()
     issuing = None
     if issue or sign or seal is not None or time_stamp is not None or os.environ.get("TOOLKIT_SEAL_KEY"):
@@ -160,7 +160,7 @@ def command(
         from toolkit.report.word.package import read_template
 
         compared = model_choice(models) if models else ()
-        shown = None if units is None else unit_choice(units)
+        style = None if units is None else unit_choice(units)
         answer_and_file = diagnosis_of(diagnosis, by, tests)
         # The template is judged before anything is read: its error must not wait for a long reduction.
         opened = read_template(template or home_template("org.docx", home))
@@ -173,7 +173,7 @@ def command(
                 home=home,
                 known_at=day(known_at),
                 draft=draft,
-                reader=chosen,
+                reader=engine,
                 protocol=protocol,
                 step=step,
             ),
@@ -182,7 +182,7 @@ def command(
             tydex=tydex or hand_over,
             tir=tir or hand_over,
             models=compared,
-            units=shown,
+            units=style,
             diagnosis=answer_and_file,
             allow_missing=allow_missing,
             keep=keep,

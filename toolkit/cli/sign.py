@@ -67,8 +67,8 @@ def command(
     return 0
 
 
-def _usage(where: str, got: str, expected: str) -> ConfigError:
+def _usage(where: str, actual: str, expected: str) -> ConfigError:
     return ConfigError(
-        "it is not clear how to sign", where=where, got=got, expected=expected,
+        "it is not clear how to sign", where=where, got=actual, expected=expected,
         next_step="see 'toolkit sign --help'; nothing was signed", rule="usage",
     )  # fmt: skip

@@ -136,30 +136,33 @@ def words(
     from toolkit.words.catalogue import SOURCE, languages, phrases
     from toolkit.words.phrasebook import phrasebook
 
-    others = [name for name in languages() if name != SOURCE]
-    if language is not None and language not in others:
-        raise typer.BadParameter(", ".join(others), param_hint="--language")
-    chosen = others if language is None else [language]
+    translated = [name for name in languages() if name != SOURCE]
+    if language is not None and language not in translated:
+        raise typer.BadParameter(", ".join(translated), param_hint="--language")
+    listed_languages = translated if language is None else [language]
     listed: list[str] = list(phrases(SOURCE))
     if template is not None:
         texts = fixed_texts(stories(open_package(read_template(template))))
         listed = list(dict.fromkeys(phrase_of(text.text or "") for text in texts))
-    books = {name: phrasebook(name) for name in chosen}
+    books = {name: phrasebook(name) for name in listed_languages}
     rows = [
         {"phrase": phrase} | {name: book.say(phrase) for name, book in books.items() if book.knows(phrase)}
         for phrase in listed
     ]
     missing = [
-        {"language": name, "phrase": row["phrase"]} for row in rows for name in chosen if name not in row
+        {"language": name, "phrase": row["phrase"]}
+        for row in rows
+        for name in listed_languages
+        if name not in row
     ]
     lines = [
         f"{'' if name == 'phrase' else f'  {name}  '}{row.get(name, 'MISSING')}"
         for row in rows
-        for name in ("phrase", *chosen)
+        for name in ("phrase", *listed_languages)
     ]
     lines.append(f"{len(rows)} phrases, {len(missing)} translations missing")
     answer(
-        {"languages": chosen, "phrases": rows, "missing": missing},
+        {"languages": listed_languages, "phrases": rows, "missing": missing},
         "\n".join(lines),
         as_json=json,
         quiet=quiet,

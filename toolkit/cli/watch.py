@@ -87,12 +87,12 @@ def command(
             "the folder to watch does not exist", where=folder, got="no folder", expected="a folder",
             next_step="check the path", rule="no-test",
         )  # fmt: skip
-    shown = None if units is None else unit_choice(units)
+    style = None if units is None else unit_choice(units)
     find_soffice()
     options = Options(
         template=read_template(template or home_template("org.docx", home)),
         resolve=partial(resolve_test, calibrations=calibrations, home=home),
-        units=shown,
+        units=style,
         allow_missing=allow_missing,
     )
     target = out or folder / "reports"
@@ -117,13 +117,13 @@ def command(
 @contextlib.contextmanager
 def _stopping() -> Iterator[list[int]]:
     """Yield a list that is no longer empty once the command was asked to end."""
-    asked: list[int] = []
+    signals: list[int] = []
     old = {
-        request: signal.signal(request, lambda number, _frame: asked.append(number))
+        request: signal.signal(request, lambda number, _frame: signals.append(number))
         for request in (signal.SIGTERM, signal.SIGINT)
     }
     try:
-        yield asked
+        yield signals
     finally:
         for number, handler in old.items():
             signal.signal(number, handler)

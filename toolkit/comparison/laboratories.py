@@ -208,14 +208,14 @@ def _measurand(
             name, "too few laboratories to compare", len(taking_part), f"{fewest} at least{beside}"
         )
     robust = algorithm_a(np.array([entry.mean for entry in taking_part])) if len(taking_part) > 1 else None
-    own = next((entry for entry in results if entry.laboratory == reference), None)
-    if own is not None and own.U is not None:
-        assigned, u_assigned, by = own.mean, own.U / own.k, own.laboratory
+    stated = next((entry for entry in results if entry.laboratory == reference), None)
+    if stated is not None and stated.U is not None:
+        assigned, u_assigned, by = stated.mean, stated.U / stated.k, stated.laboratory
     elif reference is None and robust is not None:
         assigned, u_assigned, by = robust.mean, robust.u, f"consensus of {robust.n} (algorithm A)"
     else:
-        got = "no result" if own is None else "a result without U"
-        raise _refused(name, "the reference laboratory cannot assign a value", f"{reference}: {got}",
+        lacking = "no result" if stated is None else "a result without U"
+        raise _refused(name, "the reference laboratory cannot assign a value", f"{reference}: {lacking}",
                        "its result with U")  # fmt: skip
     sigma_pt: float | None
     if sigma is None and robust is not None and robust.n >= FEWEST and robust.sd > 0:
@@ -306,9 +306,9 @@ def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:
         ("Cochran", p.cochran_p, p.cochran_laboratory, "scatters more than the others"),
         ("Grubbs", p.grubbs_p, p.grubbs_laboratory, "lies apart from the others"),
     )  # fmt: skip
-    for test, chance, laboratory, what in tests:
+    for test, chance, laboratory, deviation in tests:
         if chance is not None and chance < OUTLIER:
-            message = f"{laboratory} {what} ({test}, p = {chance:.2g}): s_r and s_R are with it"
+            message = f"{laboratory} {deviation} ({test}, p = {chance:.2g}): s_r and s_R are with it"
             findings.append(Finding(rule="laboratory-outlier", where=measurand.name, message=message))
     if reference is None and len(measurand.scores) < FEW:
         message = (
@@ -321,8 +321,8 @@ def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:
     return findings
 
 
-def _refused(measurand: str, what: str, got: object, expected: str) -> ConfigError:
+def _refused(measurand: str, problem: str, actual: object, expected: str) -> ConfigError:
     return ConfigError(
-        what, where=measurand, got=got, expected=expected, next_step="add what is expected",
+        problem, where=measurand, got=actual, expected=expected, next_step="add what is expected",
         rule="laboratories",
     )  # fmt: skip

@@ -116,8 +116,8 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
                 )
         load = abs(values["FZ"] or 0.0)
         if load in loads or load <= 0:
-            what = f"row {number}: the load {'stands twice' if load else 'is zero'}"
-            _refuse(path, "doubled-load", what, f"{load:g} N", "each load once, above zero")
+            fault = f"row {number}: the load {'stands twice' if load else 'is zero'}"
+            _refuse(path, "doubled-load", fault, f"{load:g} N", "each load once, above zero")
         loads.add(load)
         rows += _rows_of(values, load, identity)
     if not rows:
@@ -186,12 +186,14 @@ def _column(cell: str, path: Path) -> tuple[str, float]:
             path, "unknown-unit", f"the column {name} has no unit", repr(cell), f"'{name} [unit]', e.g. [N]"
         )
     where = f"{path}, column {cell.strip()!r}"
-    wanted = unit("N" if name == "FZ" else _NAMES[bare])
+    expected_unit = unit("N" if name == "FZ" else _NAMES[bare])
     stated = unit(match[2], where=where)
     # An angle has no dimension of its own: N and N/deg are told apart by what they are per.
-    if stated.dimension != wanted.dimension or ("/" in stated.text) != ("/" in wanted.text):
-        _refuse(path, "unit-dimension", f"the unit of {name} is of another kind", match[2], wanted.text)
-    return name, stated.factor / wanted.factor
+    if stated.dimension != expected_unit.dimension or ("/" in stated.text) != ("/" in expected_unit.text):
+        _refuse(
+            path, "unit-dimension", f"the unit of {name} is of another kind", match[2], expected_unit.text
+        )
+    return name, stated.factor / expected_unit.factor
 
 
 def _number(cell: str, factor: float, where: str, *, needed: bool) -> float | None:
@@ -211,8 +213,10 @@ def _number(cell: str, factor: float, where: str, *, needed: bool) -> float | No
     return value * factor
 
 
-def _refuse(path: Path, rule: str, what: str, got: str, expected: str) -> NoReturn:
-    raise ColumnError(what, where=path, got=got, expected=expected, next_step="mend the table", rule=rule)
+def _refuse(path: Path, rule: str, problem: str, actual: str, expected: str) -> NoReturn:
+    raise ColumnError(
+        problem, where=path, got=actual, expected=expected, next_step="mend the table", rule=rule
+    )
 
 
 # What a table may vary that a free-rolling, upright test does not.
@@ -353,12 +357,12 @@ def _check_one_condition(table: TireTable) -> None:
         values = table.get(symbol)
         if values is None:
             continue
-        shown = from_si(values, si_unit)
-        if float(np.ptp(shown)) > 2 * room:
+        printed = from_si(values, si_unit)
+        if float(np.ptp(printed)) > 2 * room:
             raise FitError(
                 f"the table varies {symbol}: a test is compared at one",
                 where=table.path,
-                got=f"{float(shown.min()):.4g} to {float(shown.max()):.4g} {si_unit}",
+                got=f"{float(printed.min()):.4g} to {float(printed.max()):.4g} {si_unit}",
                 expected=f"one {symbol}, the test's",
                 next_step="keep the rows of the test's conditions in a table of their own",
                 rule="table-varies",

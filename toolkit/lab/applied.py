@@ -83,7 +83,7 @@ def _parquet(data: bytes, path: Path) -> Vectors:
     vectors = [
         Vector(name=name, unit=None, values=values) for name, values in zip(names, columns, strict=True)
     ]
-    return Vectors(where=str(path), vectors=[one for one in vectors if one.values.dtype.kind != "O"])
+    return Vectors(where=str(path), vectors=[vector for vector in vectors if vector.values.dtype.kind != "O"])
 
 
 def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, NDArray[np.float64]]:
@@ -94,11 +94,11 @@ def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, NDArray
     ConfigError
         ``doubled-column``: the file has a column of a load already
     """
-    columns = {f"{one.symbol} [{one.unit}]": one.values for one in series}
-    taken = {one.symbol for one in series} & set(loads.value)
-    if taken:
+    columns = {f"{column.symbol} [{column.unit}]": column.values for column in series}
+    clash = {column.symbol for column in series} & set(loads.value)
+    if clash:
         raise ConfigError(
-            "the file has columns of loads already", where=", ".join(sorted(taken)),
+            "the file has columns of loads already", where=", ".join(sorted(clash)),
             got="a column in the file", expected="indications, and other columns of other names",
             next_step="take it out of a copy of the file, or rename it there", rule="doubled-column",
         )  # fmt: skip

@@ -283,10 +283,12 @@ def temperature_of(span: float | None, coefficient: float | None) -> Temperature
 
 
 def _wrong(
-    what: str,
+    problem: str,
     where: str,
-    got: object,
+    actual: object,
     expected: str,
     next_step: str = "see 'toolkit calibration budget --help'",
 ) -> ToolkitError:
-    return ConfigError(what, where=where, got=got, expected=expected, next_step=next_step, rule="budget")
+    return ConfigError(
+        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="budget"
+    )

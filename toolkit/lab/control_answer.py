@@ -202,10 +202,10 @@ def _e74(result: E74Result, force: str, reading: str) -> list[str]:
          "-" if c.lack_of_fit is None else f"{c.lack_of_fit.p:.3g}"]
         for c in result.curves
     ]  # fmt: skip
-    chosen = "as asked for" if result.requested else "by the annex"
+    origin = "as asked for" if result.requested else "by the annex"
     return [
         f"{result.points} points at {result.levels} forces in {result.runs} runs; "
-        f"degree {result.degree} {chosen}",
+        f"degree {result.degree} {origin}",
         table(["degree", f"s_m [{reading}]", f"LLF [{force}]", "dof", "lack of fit F", "p"], rows),
         f"lower limit factor {result.llf:.6g} {force}",
         *(

@@ -307,9 +307,9 @@ def _content(path: Path) -> bytes:
         ) from error  # fmt: skip
 
 
-def _nobody(got: str, expected: Sequence[str]) -> ToolkitError:
+def _nobody(actual: str, expected: Sequence[str]) -> ToolkitError:
     return TrustError(
-        "there is no such person or key", where="people", got=got,
+        "there is no such person or key", where="people", got=actual,
         expected=", ".join(expected) or "nobody is enrolled",
         next_step="see 'toolkit person list'; nothing was changed", rule="person",
     )  # fmt: skip

@@ -98,8 +98,8 @@ def verify_file(path: Path, trust: Trust, *, ledger: Ledger = no_ledger) -> Verd
             return _proof(path, data, ledger)
         return _by_its_issue(path, data, trust, ledger)
     except ToolkitError as error:
-        told = f"{error.what}: {error.got}" if error.got else error.what
-        return Verdict(file=str(path), kind="unreadable", why=told)
+        reason = f"{error.what}: {error.got}" if error.got else error.what
+        return Verdict(file=str(path), kind="unreadable", why=reason)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,15 +117,15 @@ class Carried:
         if self.anchor is None:
             return None
         entered = hashes_of(self.anchor)
-        other = [name for name, digest in self.files.items() if entered.get(name, digest) != digest]
+        changed = [name for name, digest in self.files.items() if entered.get(name, digest) != digest]
         # A digital certificate's entry is the hash of its content, before its proof and its seal.
-        other = [name for name in other if not name.endswith(".xml")]
+        changed = [name for name in changed if not name.endswith(".xml")]
         record = entry_of(self.anchor).get("id")
         if not self.anchor.proved:
             return "its proof does not hold: it was changed"
         if self.names and record not in [name.record for name in self.names]:
             return f"its proof is of another record, {record}"
-        return f"its proof is of another {other[0]}" if other else None
+        return f"its proof is of another {changed[0]}" if changed else None
 
 
 def carried(attachments: Mapping[str, bytes], *, where: object) -> Carried:
@@ -263,7 +263,9 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
         if check.signature == "unsigned":
             continue
         verdict = _verdict(path, "manifest", check, proof, proof.document, ledger)
-        if all(proof.files.get(other) == digest for other, digest in hashes.items() if other != name):
+        if all(
+            proof.files.get(companion) == digest for companion, digest in hashes.items() if companion != name
+        ):
             return replace(verdict, why=f"{len(hashes)} files as listed, proved by {name}: {verdict.why}")
         why = f"{name} does not list the other files"
         return Verdict(file=str(path), kind="manifest", signature="unsigned", why=why)
@@ -360,9 +362,9 @@ def _content(path: Path) -> bytes:
         raise _unreadable(path, getattr(error, "strerror", None) or str(error)) from error
 
 
-def _unreadable(path: Path, got: str) -> TrustError:
+def _unreadable(path: Path, actual: str) -> TrustError:
     return TrustError(
-        "the file cannot be read as a document", where=path, got=got,
+        "the file cannot be read as a document", where=path, got=actual,
         expected="a PDF, a digital calibration certificate, a manifest or a record",
         next_step="name it as it was issued", rule="unreadable-document",
     )  # fmt: skip

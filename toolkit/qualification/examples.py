@@ -62,9 +62,9 @@ def _checks(certified: CertifiedSet) -> list[Check]:
     )
     return [
         digits_check(
-            CERTIFIED, certified.name, quantity.replace("_", " "), required, got, _note(public, required)
+            CERTIFIED, certified.name, quantity.replace("_", " "), required, computed, _note(public, required)
         )
-        for quantity, required, public, got in zip(
+        for quantity, required, public, computed in zip(
             QUANTITIES, certified.required, certified.public, reached, strict=True
         )
     ]
@@ -177,8 +177,8 @@ def _e74(example: dict[str, Any], folder: Path) -> list[Check]:
             for key, text in degree["printed"].items()
         ]
     expected = int(example["degree_of_best_fit"])
-    chosen = Check(
+    degree_check = Check(
         group=E74, name="Pontius", quantity="degree of best fit", measure="text", required=str(expected),
         reached=str(best.degree), passed=best.degree == expected,
     )  # fmt: skip
-    return [*checks, chosen]
+    return [*checks, degree_check]

@@ -161,8 +161,8 @@ def check_case(plan: Plan, record: str | None) -> str:
 
 
 def _tire_text(file: FileTire) -> bytes:
-    same = read_tir(file.path).coefficients() == file.tir.coefficients()
-    return read_input(file.path, TIRE_FILE) if same else file_text(file.tir).encode()
+    unchanged = read_tir(file.path).coefficients() == file.tir.coefficients()
+    return read_input(file.path, TIRE_FILE) if unchanged else file_text(file.tir).encode()
 
 
 def _inputs(test: VirtualTest) -> list[str]:
@@ -176,8 +176,8 @@ def _inputs(test: VirtualTest) -> list[str]:
             if not name.endswith("_CMD")
             and len({float(v) for file in test.files for v in shown(file.signals, name)[[0, -1]]}) > 1
         )
-    chosen = dict.fromkeys(("SA", "FZ" if load == "measured" else "FZ_CMD", *columns))
-    return [name for name in chosen if name != "FZ" or load == "measured"]
+    columns_in_order = dict.fromkeys(("SA", "FZ" if load == "measured" else "FZ_CMD", *columns))
+    return [name for name in columns_in_order if name != "FZ" or load == "measured"]
 
 
 def _judged(plan: Plan) -> list[str]:

@@ -81,12 +81,12 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
     on_tire = in_order(rolling, "tire")
     heats = any(applied.effect.by_temperature for applied in on_tire)
     for _ in range(_HEAT_TURNS if heats else 1):
-        made = driven(start, on_tire, setting, tire)
-        forces = tire(made)
-        power = np.abs(forces.FY * made.V * np.sin(made.SA))
+        driven_tire = driven(start, on_tire, setting, tire)
+        forces = tire(driven_tire)
+        power = np.abs(forces.FY * driven_tire.V * np.sin(driven_tire.SA))
         setting = _warmed(plan, setting, line, power, before)
     on_top = through_machine({"FY": forces.FY, "MZ": forces.MZ}, rolling, setting, plan.machine)
-    answer = HubTire(FY=on_top["FY"], MZ=on_top["MZ"], loaded_radius=loaded_radius(plan, made.FZ))
+    answer = HubTire(FY=on_top["FY"], MZ=on_top["MZ"], loaded_radius=loaded_radius(plan, driven_tire.FZ))
     if any(applied.effect.by_slip_work for applied in on_tire):
         # The effect counts the work of the tire as new: what wear itself adds to it is of second order.
         new = driven(
@@ -97,7 +97,7 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
     gap = plan.motion.between_files_s
     warmth = float(setting.channels["T_TREAD"][-1] - setting.channels["T_AMBIENT"][-1])
     return Walked(
-        hub=carriage.hub_loads(plan.carriage, tire=answer, FZ=made.FZ),
+        hub=carriage.hub_loads(plan.carriage, tire=answer, FZ=driven_tire.FZ),
         SA=start.SA,
         sensed=carriage.sensed_angle(plan.carriage, SA=wheel),
         setting=setting,

@@ -49,7 +49,7 @@ def model_tire(path: Path, *, where: str) -> tuple[FileTire, tuple[str, ...]]:
     tire = model.file("tire")
     if model.kind != "machine" or tire is None:
         raise _wrong("the model has no tire", where, f"a model of kind {model.kind}", "one of kind machine")
-    numbers = {one.name: one.value for one in model.parameters}
+    numbers = {fitted.name: fitted.value for fitted in model.parameters}
     ours = [name for name in numbers if "." in name]
     if ours:
         raise _wrong(
@@ -58,7 +58,7 @@ def model_tire(path: Path, *, where: str) -> tuple[FileTire, tuple[str, ...]]:
         )  # fmt: skip
     file = read_file_tire(tire)
     changed = dataclasses.replace(file, tir=with_numbers(file.tir, numbers))
-    return changed, tuple(effect_text(one, model, where=where) for one in model.effects)
+    return changed, tuple(effect_text(fitted, model, where=where) for fitted in model.effects)
 
 
 def with_numbers(tir: TirFile, numbers: dict[str, float]) -> TirFile:
@@ -69,14 +69,14 @@ def with_numbers(tir: TirFile, numbers: dict[str, float]) -> TirFile:
     >>> with_numbers(tir, {"PCY1": 1.4, "LKY": 0.9}).coefficients()
     {'PCY1': 1.4, 'LKY': 0.9}
     """
-    known = {line.key for line in tir.lines if line.section.endswith("COEFFICIENTS")}
+    keys = {line.key for line in tir.lines if line.section.endswith("COEFFICIENTS")}
     lines = [
         dataclasses.replace(line, value=numbers[line.key])
         if line.key in numbers and line.section.endswith("COEFFICIENTS")
         else line
         for line in tir.lines
     ]
-    missing = [name for name in numbers if name not in known]
+    missing = [name for name in numbers if name not in keys]
     if missing:
         lines += [TirLine(section=_NEW, text=f"[{_NEW}]")]
         lines += [TirLine(section=_NEW, key=name, value=numbers[name]) for name in missing]
@@ -113,9 +113,9 @@ def effect_text(one: FittedEffect, model: ModelFile, *, where: str) -> str:
     return head + (f"={','.join(written)}" if written else "")
 
 
-def _wrong(what: str, where: str, got: str, expected: str) -> ConfigError:
+def _wrong(problem: str, where: str, actual: str, expected: str) -> ConfigError:
     return ConfigError(
-        what, where=where, got=got, expected=expected,
+        problem, where=where, got=actual, expected=expected,
         next_step="run the model on inputs instead: toolkit simulate MODEL.toml --inputs FILE.csv",
         rule="model-file",
     )  # fmt: skip
@@ -173,8 +173,10 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
     machine = load_machine(stated.machine)
     if not machine.simulated:
         expected = 'a machine definition with kind = "simulated", such as m15-virtual'
-        what = "a real machine cannot be simulated under its own name"
-        fault = Fault(key=("machine",), got=machine.name, expected=expected, what=what, form=PlanFile.FORMAT)
+        problem = "a real machine cannot be simulated under its own name"
+        fault = Fault(
+            key=("machine",), got=machine.name, expected=expected, what=problem, form=PlanFile.FORMAT
+        )
         refuse([fault], Source(where=path, text=data.decode("utf-8-sig")))
     angles = stated.slip_angles_rad or machine.protocol.slip_angles_rad
     loads = stated.loads_N or machine.protocol.loads_N
@@ -216,35 +218,36 @@ def with_effects(plan: Plan, given: list[str]) -> Plan:
     """
     added: list[AppliedEffect] = []
     for text in given:
-        for one in parse_effect(text, plan.machine):
-            _check_tire(plan, one, text)
-            _check_runs(plan, one, text)
-            added.append(one)
+        for applied in parse_effect(text, plan.machine):
+            _check_tire(plan, applied, text)
+            _check_runs(plan, applied, text)
+            added.append(applied)
     return dataclasses.replace(plan, effects=(*plan.effects, *added))
 
 
-def _check_tire(plan: Plan, one: AppliedEffect, text: str) -> None:
-    file, what = plan.tire_file, one.effect.needs_tire
+def _check_tire(plan: Plan, applied: AppliedEffect, text: str) -> None:
+    file, need = plan.tire_file, applied.effect.needs_tire
     has = {
         "pressure": file is not None and file.has_pressure,
         "camber": file is None or file.has_camber,
     }
-    if what is not None and not has[what]:
+    if need is not None and not has[need]:
         raise ConfigError(
-            f"the plan's tire does not depend on its {what}", where=f"--effect {text}", got=one.effect.name,
-            expected=f"a tire file with {what} coefficients",
-            next_step=f"give the plan a .tir of MF 6.x with {what} terms, or leave the effect out",
+            f"the plan's tire does not depend on its {need}", where=f"--effect {text}",
+            got=applied.effect.name,
+            expected=f"a tire file with {need} coefficients",
+            next_step=f"give the plan a .tir of MF 6.x with {need} terms, or leave the effect out",
             rule="effect-value",
         )  # fmt: skip
 
 
-def _check_runs(plan: Plan, one: AppliedEffect, text: str) -> None:
-    if one.condition is None or any(one.acts_under(run.conditions) for run in plan.recordings):
+def _check_runs(plan: Plan, applied: AppliedEffect, text: str) -> None:
+    if applied.condition is None or any(applied.acts_under(run.conditions) for run in plan.recordings):
         return
-    known = sorted({f"{k}:{v}" for run in plan.recordings for k, v in run.conditions.items()})
+    conditions = sorted({f"{k}:{v}" for run in plan.recordings for k, v in run.conditions.items()})
     raise ConfigError(
         "no run has the condition of an effect", where=f"--effect {text}",
-        got=f"{one.condition[0]}:{'+'.join(one.condition[1])}", expected=", ".join(known),
+        got=f"{applied.condition[0]}:{'+'.join(applied.condition[1])}", expected=", ".join(conditions),
         next_step="name a condition of the plan's runs", rule="effect-value",
     )  # fmt: skip
 

@@ -227,10 +227,10 @@ def fit_global(
     FitError
         what `why_not_global` says, an unknown loss or weighting
     """
-    for name, got, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
-        if got not in choices:
+    for name, choice, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        if choice not in choices:
             raise FitError(
-                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(choices),
+                f"unknown {name} {choice!r}", where=f"--{name}", got=choice, expected=", ".join(choices),
                 next_step="name one of those expected", rule=f"unknown-{name}",
             )  # fmt: skip
     if (problem := why_not_global(data, model)) is not None:
@@ -267,8 +267,8 @@ def not_varied(fits: Sequence[ModelFit], where: str) -> list[Finding]:
     """Return one note on what did not vary in the data, though the models ask for it."""
     reasons: dict[str, list[str]] = {}
     for fit in fits:
-        for one in fit.fits:
-            for _, why in one.fixed:
+        for fitted in fit.fits:
+            for _, why in fitted.fixed:
                 text = next((lack for lack in LACKS.values() if why.startswith(lack)), None)
                 if text is not None and fit.model not in reasons.setdefault(text, []):
                     reasons[text].append(fit.model)
@@ -364,8 +364,8 @@ class _Fitter:
 
     def _bins(self, data: Measured) -> tuple[Measured, Array, float]:
         # A model with many inner points is searched on fewer bins.
-        most = None if self.model.grid == 1 else max(_INNER // self.model.grid, _LEAST)
-        return binned(data, robust=self.loss == "robust", most=most)
+        limit = None if self.model.grid == 1 else max(_INNER // self.model.grid, _LEAST)
+        return binned(data, robust=self.loss == "robust", most=limit)
 
     def _weigh(self, channels: tuple[str, ...], values: Array) -> None:
         # Every load block by the size of its own residuals; none counts more than nine times another.
@@ -400,16 +400,16 @@ class _Fitter:
         predicted = {name: np.zeros(len(self.data)) for channels in founds for name in channels}
         kept_values, kept_starts, kept_sigma = self.values.copy(), self.starts, dict(self.sigma)
         for block in blocks:
-            own = self.data.block == block
-            others = self.data.take(~own)
+            in_block = self.data.block == block
+            remaining = self.data.take(~in_block)
             self.values = kept_values.copy()
-            self.sigma = {name: values[~own] for name, values in kept_sigma.items()}
+            self.sigma = {name: values[~in_block] for name, values in kept_sigma.items()}
             for channels, stage in founds.items():
                 self.starts = self.values[None]
-                self.values = self._refit(channels, stage.left, others)
-            curves = self._curves(self.values, self.data.take(own))
+                self.values = self._refit(channels, stage.left, remaining)
+            curves = self._curves(self.values, self.data.take(in_block))
             for name, column in predicted.items():
-                column[own] = curves[name]
+                column[in_block] = curves[name]
         self.values, self.starts, self.sigma = kept_values, kept_starts, kept_sigma
         return predicted
 

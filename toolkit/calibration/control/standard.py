@@ -71,9 +71,11 @@ def evaluate_record(
 
 def _refused(
     where: str,
-    what: str,
-    got: object,
+    problem: str,
+    actual: object,
     expected: object,
     next_step: str = "name one of each with --load and --indication",
 ) -> SessionError:
-    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule="standard")
+    return SessionError(
+        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="standard"
+    )

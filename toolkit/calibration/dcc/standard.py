@@ -202,14 +202,14 @@ def with_standard(
                 f"reference.uncertainty.{name}", "one of the two",
                 "leave it out of the session", "dcc-stated",
             )  # fmt: skip
-    chosen = {name: points for name, points in loads.items() if points}
-    if missing := [name for name in loads if name not in chosen and name not in typed]:
+    points_by_load = {name: points for name, points in loads.items() if points}
+    if missing := [name for name in loads if name not in points_by_load and name not in typed]:
         raise _refused(
             "the digital certificate does not cover a load of the session", place,
             f"no expanded uncertainty of {', '.join(missing)}", "one in N or N·m, with its coverage factor",
             "name another certificate, or state the uncertainty of that load", "dcc-quantity",
         )  # fmt: skip
-    largest = {name: max(points, key=lambda p: p.U / p.k) for name, points in chosen.items()}
+    largest = {name: max(points, key=lambda p: p.U / p.k) for name, points in points_by_load.items()}
     reference["uncertainty"] = typed | {
         name: {"U": point.U, "k": point.k, "unit": _UNITS[point.dimension]} for name, point in largest.items()
     }
@@ -226,7 +226,7 @@ def with_standard(
         "calibrated": certificate.calibrated.isoformat(),
         "issued": certificate.issued and certificate.issued.isoformat(),
         "item": {"name": item.name, "serial": item.serial},
-        "taken": {name: _provenance(chosen[name], point) for name, point in largest.items()},
+        "taken": {name: _provenance(points_by_load[name], point) for name, point in largest.items()},
     }
     return dict(raw) | {"reference": reference}
 
@@ -243,8 +243,8 @@ def check_covered(reference: Mapping[str, Any], tables: Sequence[Columns | None]
     SessionError
         ``dcc-range``
     """
-    taken = reference.get("dcc")
-    for load, entry in taken["taken"].items() if isinstance(taken, Mapping) else ():
+    stated = reference.get("dcc")
+    for load, entry in stated["taken"].items() if isinstance(stated, Mapping) else ():
         low, high = entry["range"]
         for table in tables:
             if table is None or not table.has(load):
@@ -332,8 +332,8 @@ def _demand_valid(
 
 def _chosen(certificate: DigitalCertificate, load: str, place: str) -> tuple[Point, ...]:
     """Return the points of a load: those that name it, else those that name no channel."""
-    wanted = "force" if _FORCE.match(load) else "moment" if _MOMENT.match(load) else None
-    points = [p for p in certificate.points if wanted in (None, p.dimension)]
+    quantity = "force" if _FORCE.match(load) else "moment" if _MOMENT.match(load) else None
+    points = [p for p in certificate.points if quantity in (None, p.dimension)]
     points = [p for p in points if load in p.channels] or [p for p in points if not p.channels]
     if len({point.dimension for point in points}) > 1:
         raise _refused(
@@ -358,12 +358,12 @@ def _provenance(points: Sequence[Point], point: Point) -> dict[str, Any]:
 
 
 def _refused(
-    what: str, where: object, got: object, expected: object, next_step: str, rule: str
+    problem: str, where: object, actual: object, expected: object, next_step: str, rule: str
 ) -> SessionError:
     return SessionError(
-        what,
+        problem,
         where=where,
-        got=got,
+        got=actual,
         expected=expected,
         next_step=f"{next_step}; nothing was written",
         rule=rule,

@@ -58,8 +58,8 @@ def moment(text: str) -> datetime:
     ValueError
         the text is no time
     """
-    found = datetime.fromisoformat(text)
-    return found if found.tzinfo is not None else found.replace(tzinfo=UTC)
+    parsed = datetime.fromisoformat(text)
+    return parsed if parsed.tzinfo is not None else parsed.replace(tzinfo=UTC)
 
 
 def day_of(time: str) -> date:
@@ -114,9 +114,9 @@ def check_after(last: str | None, time: str, where: object) -> None:
         )
 
 
-def untimely(what: str, where: object, got: str, expected: str) -> RegistryError:
+def untimely(problem: str, where: object, actual: str, expected: str) -> RegistryError:
     """Return the error of a day that cannot be."""
     return RegistryError(
-        what, where=where, got=got, expected=expected,
+        problem, where=where, got=actual, expected=expected,
         next_step="correct the date, or this computer's clock; nothing was written", rule="time",
     )  # fmt: skip

@@ -48,13 +48,13 @@ class LineForm:
         self._rest = {name: value for name, value in body.items() if name not in (*texts, _NUMBER)}
         self._is_deep = any(self._rest.values())
         # A text is a name where a colon follows it: no text of a skeleton is anything else.
-        named = [at for at in range(1, len(pieces), 2) if pieces[at + 1].startswith(":")]
-        (place,) = [at + 1 for at in named if pieces[at : at + 2] == [_NUMBER, f":{body[_NUMBER]},"]]
+        keys = [at for at in range(1, len(pieces), 2) if pieces[at + 1].startswith(":")]
+        (place,) = [at + 1 for at in keys if pieces[at : at + 2] == [_NUMBER, f":{body[_NUMBER]},"]]
         self._number = place // 2
-        self._names_of = itemgetter(*named)
+        self._names_of = itemgetter(*keys)
         self._names = self._names_of(pieces)
         self._texts = tuple(map(sys.intern, texts))
-        self._texts_of = itemgetter(*(at + 2 for at in named if pieces[at + 1] == ":"))
+        self._texts_of = itemgetter(*(at + 2 for at in keys if pieces[at + 1] == ":"))
 
     def parts(self, text: str, pieces: list[str]) -> Parts | None:
         """Return the parts of a line that is split at its quotation marks; None where it has another form."""
@@ -112,8 +112,8 @@ def _is_plain(text: str) -> bool:
 
 def _cut(text: str, body: dict[str, Any]) -> Parts:
     entry = f'"{_TAKEN}":"{body[_TAKEN]}",'
-    before, there, after = text.partition(entry)
-    if there and entry not in after:
+    before, separator, after = text.partition(entry)
+    if separator and entry not in after:
         return body, before + after
     return body, canonical({name: value for name, value in body.items() if name != _TAKEN})
 
@@ -287,11 +287,11 @@ def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:
     parts = lines.split(b"\n")
     if parts[-1] != b"":
         damage = f"line {len(parts)} of the ledger is incomplete"
-    whole = parts[:-1]
+    complete = parts[:-1]
     prev = START
     with _uncollected():
         try:
-            for number, line in enumerate(whole, start=1):
+            for number, line in enumerate(complete, start=1):
                 entry = _entry(line, number, prev)
                 entries.append(entry)
                 prev = entry.sha256

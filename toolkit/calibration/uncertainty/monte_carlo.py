@@ -250,8 +250,9 @@ def _until_settled(
     return np.concatenate(batches), False
 
 
-def _refused(what: str, got: object, expected: object) -> SessionError:
+def _refused(problem: str, actual: object, expected: object) -> SessionError:
     return SessionError(
-        what, where="Monte Carlo", got=got, expected=expected, next_step="choose another number of trials",
+        problem, where="Monte Carlo", got=actual, expected=expected,
+        next_step="choose another number of trials",
         rule="budget",
     )  # fmt: skip
