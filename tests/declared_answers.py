@@ -34,12 +34,9 @@ def _check(payload: Mapping[str, Any], *, whole: bool) -> None:
     from toolkit.lab.answer_types import declared_type
 
     context = typer._click.globals.get_current_context(silent=True)
-    # A request is answered after its command has ended.
-    declared = (
-        "toolkit.lab.decision_answer_types:RequestedAnswer"
-        if context is None
-        else getattr(context.command.callback, "answer", None)
-    )
+    declared = None if context is None else getattr(context.command.callback, "answer", None)
+    if context is None and "requested" in payload:  # a request is answered after its command has ended
+        declared = "toolkit.lab.decision_answer_types:RequestedAnswer"
     if declared is not None:
         document = {key: value for key, value in console._plain(payload).items() if key != "schema"}
         departs = [
