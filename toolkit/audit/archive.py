@@ -276,7 +276,7 @@ def audit_archive(
     if workers < 1:
         raise ConfigError(
             "an audit needs a worker", where="--workers", got=workers, expected="1 or more",
-            next_step="name the number of processes; the number of cores is a good one", rule="usage",
+            next_step="state the number of processes, such as the number of cores", rule="usage",
         )  # fmt: skip
     day = known_at or max([today(), *(registry.ledger(name).known_on() for name in registry.instruments())])
     todo = inventory(archive) if names is None else names

@@ -270,7 +270,7 @@ class _Drifted:
 
 def _refused(good: str, actual: str, expected: str) -> ConfigError:
     return ConfigError(
-        "there is no stretch to look at",
+        "there is no period to examine",
         where="--since-good",
         got=f"{good}: {actual}",
         expected=expected,

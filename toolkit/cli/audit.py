@@ -46,7 +46,7 @@ def command(
         typer.Option(
             "--out",
             callback=into_folder,
-            help="Folder that keeps the results: an audit goes on where it was ended.",
+            help="Folder for the results; an interrupted audit resumes from it.",
         ),
     ] = None,
     reports: Annotated[
@@ -55,7 +55,10 @@ def command(
     ] = None,
     since_good: Annotated[
         str | None,
-        typer.Option("--since-good", help="Record id: the tests since then that a failed as-found touches."),
+        typer.Option(
+            "--since-good",
+            help="Record id of the last good check: tests that a failed as-found check puts in doubt.",
+        ),
     ] = None,
     repair: Annotated[
         Path | None,

@@ -47,19 +47,22 @@ def budget(
         str | None, typer.Option("--indications", help="Predict from D51=..,D52=.. in the record's units.")
     ] = None,
     temperature_range: Annotated[
-        float | None, typer.Option("--temperature-range", help="Use within +- this many K of the session.")
+        float | None,
+        typer.Option(
+            "--temperature-range", help="Largest departure from the session's temperature in use [K]."
+        ),
     ] = None,
     temperature_coefficient: Annotated[
         float | None,
         typer.Option(
-            "--temperature-coefficient", help="Relative, a kelvin; default: what the session states."
+            "--temperature-coefficient", help="Relative change per kelvin; default: what the session states."
         ),
     ] = None,
     trials: Annotated[
         int | None, typer.Option("--monte-carlo", help="Check by this many trials; 0: until settled.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of the trials.")] = 0,
-    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Digits of u that count.")] = 2,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the trials.")] = 0,
+    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Significant digits of u.")] = 2,
     figure: Annotated[
         Path | None,
         typer.Option(

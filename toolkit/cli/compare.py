@@ -72,7 +72,10 @@ def command(
     ] = 0.05,
     reproducibility: Annotated[
         bool,
-        typer.Option("--reproducibility", help="Demand it: an error without another laboratory's tests."),
+        typer.Option(
+            "--reproducibility",
+            help="Require reproducibility: tests of one laboratory alone are then an error.",
+        ),
     ] = False,
     units: Annotated[
         str | None,

@@ -39,7 +39,7 @@ def init(
 
 @answers("toolkit.lab.installation_answer_types:DoctorAnswer")
 def doctor(json: Json = False, quiet: Quiet = False) -> int:
-    """Tell what this machine lacks, and what mends it.
+    """Report what this computer lacks, and how to install it.
 
     Example: toolkit doctor
     """

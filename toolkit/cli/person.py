@@ -155,7 +155,9 @@ def policy(
     action: Annotated[str, typer.Argument(help="enter, approve, withdraw, discard, import, issue or enrol.")],
     role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
     reason: Why,
-    signatures: Annotated[int, typer.Option("--signatures", help="Of different people.")] = 1,
+    signatures: Annotated[
+        int, typer.Option("--signatures", help="Number of signatures, each of another person.")
+    ] = 1,
     by: By = None,
     sign: Sign = None,
     request: RequestFile = None,

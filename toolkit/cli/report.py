@@ -113,7 +113,7 @@ def command(
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
+        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
     ] = False,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep a report that was not verified in rejected/ of the folder.")

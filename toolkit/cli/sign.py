@@ -31,7 +31,7 @@ def command(
         int | None, typer.Option("--passphrase-fd", help="File descriptor that gives the key's passphrase.")
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Sign without being asked, where no terminal is.")
+        bool, typer.Option("--yes", help="Sign without asking, for use without a terminal.")
     ] = False,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -34,14 +34,15 @@ def command(
     once: Annotated[bool, typer.Option("--once", help="Look until nothing more arrives, then end.")] = False,
     interval: Annotated[float, typer.Option("--interval", min=0.05, help="Seconds between looks.")] = 2.0,
     settle: Annotated[
-        float, typer.Option("--settle", min=0.0, help="Files unchanged for so many seconds have arrived.")
+        float,
+        typer.Option("--settle", min=0.0, help="Seconds after which an unchanged file counts as complete."),
     ] = 3.0,
     patience: Annotated[
         float,
         typer.Option(
             "--patience",
             min=0.0,
-            help="Seconds without a change after which a test that is not whole is judged.",
+            help="Seconds without a change after which an incomplete test is judged.",
         ),
     ] = 900.0,
     units: Annotated[
@@ -53,7 +54,7 @@ def command(
         ),
     ] = None,
     allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
+        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
     ] = False,
     calibrations: Calibrations = None,
     home: Home = None,

@@ -114,7 +114,7 @@ def compare(
             where="--reproducibility",
             got=f"tests of {len(laboratories)} laboratories ({listed})",
             expected="repeats of one tire in two laboratories or more, named in test.toml (laboratory = ...)",
-            next_step="leave the option away; repeatability and intermediate precision are given",
+            next_step="leave the option out; repeatability and intermediate precision are given",
             rule="no-other-laboratory",
         )
     return Comparison(
@@ -141,7 +141,7 @@ def infer_mode(entries: Sequence[Entry]) -> Mode:
 def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
     if len(entries) < 2:
         raise ConfigError(
-            "one thing cannot be compared", where="compare", got=f"{len(entries)} argument(s)",
+            "a comparison takes two tests or more", where="compare", got=f"{len(entries)} argument(s)",
             expected="two or more: tests, reduced tests, a maker's table", next_step="name another one",
             rule="too-few-entries",
         )  # fmt: skip

@@ -360,7 +360,7 @@ def _check_one_condition(table: TireTable) -> None:
         printed = from_si(values, si_unit)
         if float(np.ptp(printed)) > 2 * room:
             raise FitError(
-                f"the table varies {symbol}: a test is compared at one",
+                f"the table varies {symbol}; a test is compared at one value of it",
                 where=table.path,
                 got=f"{float(printed.min()):.4g} to {float(printed.max()):.4g} {si_unit}",
                 expected=f"one {symbol}, the test's",

@@ -154,7 +154,7 @@ def check_case(plan: Plan, record: str | None) -> str:
         wrong = "parameters of a tire that is no file", '[tire] file = "tire.tir" in the plan'
     if wrong is not None:
         raise ConfigError(
-            "the case cannot be made of this plan", where="[case]", got=wrong[0], expected=wrong[1],
+            "no case can be made from this plan", where="[case]", got=wrong[0], expected=wrong[1],
             next_step="change the plan's [case] or [tire]; nothing was written", rule="wrong-value",
         )  # fmt: skip
     return kind

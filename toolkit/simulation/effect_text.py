@@ -165,7 +165,8 @@ def _values(
     if not effect.parameters:
         if value_text is not None:
             raise _wrong(
-                f"effect {effect.name!r} is there or not", where, value_text or "nothing", "no value",
+                f"effect {effect.name!r} has no size: it is present or absent", where,
+                value_text or "nothing", "no value",
                 "leave out the = and what follows",
             )  # fmt: skip
         return {}
@@ -204,7 +205,8 @@ def _number(effect: Effect, parameter: EffectParameter, text: str, stated: str, 
         value *= _factor(match[2], stated, parameter, where)
     if not parameter.bounds[0] <= value <= parameter.bounds[1]:
         raise _wrong(
-            f"the parameter {parameter.name!r} of {effect.name!r} cannot be that", where, text.strip(),
+            f"the parameter {parameter.name!r} of {effect.name!r} cannot have that value", where,
+            text.strip(),
             f"from {parameter.bounds[0]:g} to {parameter.bounds[1]:g} {stated}", "give another value",
         )  # fmt: skip
     return value

@@ -53,7 +53,7 @@ def model_tire(path: Path, *, where: str) -> tuple[FileTire, tuple[str, ...]]:
     ours = [name for name in numbers if "." in name]
     if ours:
         raise _wrong(
-            "the model has a number of the machine refitted", where, ", ".join(ours),
+            "the model holds a refitted number of the machine", where, ", ".join(ours),
             "coefficients and scale factors of the tire alone",
         )  # fmt: skip
     file = read_file_tire(tire)

@@ -147,7 +147,7 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
     populated = count >= _FEW
     if not populated.any():
         raise FitError(
-            "nothing of the test is a sweep", where=file.path, got=f"{file.rows} samples",
+            "the test has no sweep", where=file.path, got=f"{file.rows} samples",
             expected="slip that is swept at levels of load", next_step="look at the channels of the file",
             rule="no-curve",
         )  # fmt: skip

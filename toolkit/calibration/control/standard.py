@@ -47,7 +47,7 @@ def evaluate_record(
     if (load is None and len(loads) > 1) or (indication is None and len(record.indications) > 1):
         raise _refused(
             record_id,
-            f"which load and which indication is not said: {COMBINED}",
+            f"the load and the indication are not stated: {COMBINED}",
             f"loads {', '.join(loads)}; indications {', '.join(record.indications)}",
             "--load and --indication",
         )

@@ -146,7 +146,7 @@ def approve(
         if status.in_force_from is not None and in_force_from > status.in_force_from:
             # The first approval stands: the days between would stay in force, whatever was answered here.
             raise _refused(
-                record_id, "an approval takes no day away from a record",
+                record_id, "an approved record cannot come into force later than it did",
                 in_force_from.isoformat(),
                 f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void",
                 "approval",

@@ -342,7 +342,7 @@ def _entry(line: bytes, number: int, prev: str) -> Entry:
             body[key] = tuple(body[key])
     for row in body.get("signatures", ()):
         if type(row) is not dict or {*row} != SIGNATURE or not all(isinstance(row[key], str) for key in row):
-            raise ValueError("a signature says other than by whom, by which key, for what")
+            raise ValueError("a signature states more than its person, its key and its purpose")
     parsed = object.__new__(Entry)
     object.__setattr__(parsed, "__dict__", body)
     return parsed

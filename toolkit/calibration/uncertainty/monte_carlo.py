@@ -109,7 +109,7 @@ def monte_carlo(
         ``budget``: under 10 000 or too many trials; nothing in the budget is uncertain
     """
     if trials is not None and not 10_000 <= trials <= MOST_TRIALS:
-        raise _refused("so many trials tell nothing, or take for ever", trials, f"10000 to {MOST_TRIALS}")
+        raise _refused("the number of trials cannot be used", trials, f"10000 to {MOST_TRIALS}")
     if not (math.isfinite(budget.U) and budget.u > 0):
         raise _refused("the budget has no interval to check", f"u = {budget.u:g}, k = {budget.k:g}", "u > 0")
     fitted = record.load(budget.load)
