@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from tests.declared_answers import hold_to_declarations
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
 
@@ -17,6 +18,7 @@ from toolkit.simulation.plan import Plan, read_plan
 # machine draws new ones each time.
 settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("toolkit")
+hold_to_declarations()
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "toolkit" / "examples"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

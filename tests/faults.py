@@ -133,9 +133,9 @@ class Runner:
 
 
 def _serve() -> None:
-    from toolkit.cli.main import _command
+    from toolkit.cli.main import command_tree
 
-    _command()
+    command_tree()
     for line in sys.stdin:
         with tempfile.TemporaryDirectory() as place:
             sys.stdout.write(json.dumps(_forked(json.loads(line), Path(place))) + "\n")

@@ -91,9 +91,9 @@ def round_uncertainty(U: float, *, digits: int = 2) -> str:
         return "0"
     if not (math.isfinite(U) and U > 0):
         return "not determined"
-    whole, place = _rounded(U, digits)
+    rounded, place = _rounded(U, digits)
     # As an integer, so that a last zero counts: 0.010 and not 0.01.
-    return format(Decimal(int(whole)).scaleb(place), "f")
+    return format(Decimal(int(rounded)).scaleb(place), "f")
 
 
 def round_to_uncertainty(value: float, U: float, *, digits: int = 2) -> str:
@@ -106,8 +106,8 @@ def round_to_uncertainty(value: float, U: float, *, digits: int = 2) -> str:
         return repr(float(value))
     place = last_place(U, digits=digits)
     # int drops the exponent of a zero, which would print as 0 where its neighbours print 0.00.
-    whole = int(Decimal(repr(float(value))).scaleb(-place).to_integral_value(rounding=ROUND_HALF_EVEN))
-    return format(Decimal(whole).scaleb(place) + 0, "f")
+    rounded = int(Decimal(repr(float(value))).scaleb(-place).to_integral_value(rounding=ROUND_HALF_EVEN))
+    return format(Decimal(rounded).scaleb(place) + 0, "f")
 
 
 def plus_minus(value: float, U: float, *, spec: str = ".4g", decimal_comma: bool = False) -> str:
@@ -123,7 +123,9 @@ def plus_minus(value: float, U: float, *, spec: str = ".4g", decimal_comma: bool
     if has_interval(value, U):
         text = f"{round_to_uncertainty(value, U)} ± {round_uncertainty(U)}"
         if last_place(U) < _SMALL:
-            text = " ± ".join(format(Decimal(one), "e") if float(one) else "0" for one in text.split(" ± "))
+            text = " ± ".join(
+                format(Decimal(number), "e") if float(number) else "0" for number in text.split(" ± ")
+            )
     else:
         text = format(value, spec)
     return text.replace(".", ",") if decimal_comma else text
@@ -153,9 +155,9 @@ def _rounded(U: float, digits: int) -> tuple[Decimal, int]:
     exact = Decimal(repr(float(U)))
     place = exact.adjusted() - digits + 1
     scaled = exact.scaleb(-place)
-    whole = scaled.to_integral_value(rounding=ROUND_HALF_EVEN)
-    if scaled - whole > _MOST_LOWERED * scaled:
-        whole = scaled.to_integral_value(rounding=ROUND_CEILING)
-    if whole == 10**digits:
-        return whole / 10, place + 1
-    return whole, place
+    rounded = scaled.to_integral_value(rounding=ROUND_HALF_EVEN)
+    if scaled - rounded > _MOST_LOWERED * scaled:
+        rounded = scaled.to_integral_value(rounding=ROUND_CEILING)
+    if rounded == 10**digits:
+        return rounded / 10, place + 1
+    return rounded, place

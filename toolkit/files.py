@@ -170,13 +170,13 @@ def is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
-def number_expected(got: object, expected: str) -> str:
+def number_expected(actual: object, expected: str) -> str:
     """Return what is expected in place of a value: where it is a number out of reach, the reach.
 
     >>> number_expected(1e101, "a finite number"), number_expected("1", "a finite number")
     ('a number of at most 1e+100 in size', 'a finite number')
     """
-    if isinstance(got, int | float) and LARGEST < abs(got) < math.inf:
+    if isinstance(actual, int | float) and LARGEST < abs(actual) < math.inf:
         return f"a number of at most {LARGEST:g} in size"
     return expected
 

@@ -377,6 +377,6 @@ def _read(stream: BinaryIO, size: int, path: Path) -> bytes:
     return data
 
 
-def _too_large(got: str, form: Form, path: Path) -> NoReturn:
-    text = f"{got}, over the limit of {size_text(limit_of(form))}; --max-size SIZE raises it"
-    raise TooLargeError(errno.EFBIG, text, str(path), None, got)
+def _too_large(actual: str, form: Form, path: Path) -> NoReturn:
+    text = f"{actual}, over the limit of {size_text(limit_of(form))}; --max-size SIZE raises it"
+    raise TooLargeError(errno.EFBIG, text, str(path), None, actual)

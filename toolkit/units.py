@@ -220,18 +220,20 @@ def _parse(text: str) -> Unit:
         expression = _SCALE.sub(lambda m: f"delta_deg{(m[1] or m[2]).upper()}", expression)
     try:
         read: Any = ureg.parse_expression(expression)
-        one: Any = read if hasattr(read, "units") else ureg.Quantity(float(read), "dimensionless")
-        if dict(one.dimensionality) == {"[temperature]": 1}:
-            zero = float(ureg.Quantity(0.0, one.units).to("kelvin").magnitude)
-            factor = float(ureg.Quantity(1.0, one.units).to("kelvin").magnitude) - zero
+        number: Any = read if hasattr(read, "units") else ureg.Quantity(float(read), "dimensionless")
+        if dict(number.dimensionality) == {"[temperature]": 1}:
+            zero = float(ureg.Quantity(0.0, number.units).to("kelvin").magnitude)
+            factor = float(ureg.Quantity(1.0, number.units).to("kelvin").magnitude) - zero
             return Unit(name, factor, zero, "K", "temperature")
-        if not one.dimensionality:
+        if not number.dimensionality:
             # pint counts an angle as a pure number; only a named angle becomes one here.
-            is_angle = any(part in _ANGLES for part in one._units)
-            factor = float(one.to("radian").magnitude if is_angle else one.to("dimensionless").magnitude)
+            is_angle = any(part in _ANGLES for part in number._units)
+            factor = float(
+                number.to("radian").magnitude if is_angle else number.to("dimensionless").magnitude
+            )
             return Unit(name, factor, 0.0, "rad" if is_angle else "1", "angle" if is_angle else "ratio")
-        base = one.to_base_units()
-        kind = _kind(dict(one.dimensionality))
+        base = number.to_base_units()
+        kind = _kind(dict(number.dimensionality))
         dimension, symbol = _DIMENSIONS.get(kind, (kind, f"{base.units:~}"))
         return Unit(name, float(base.magnitude), 0.0, symbol, dimension)
     except Exception as error:  # pint raises many kinds for text that is no unit
@@ -266,14 +268,14 @@ def to_si(values: ArrayLike, text: str, *, where: object = None) -> NDArray[np.f
     >>> float(to_si(20.0, "degC"))
     293.15
     """
-    found = unit(text, where=where)
-    return np.asarray(values, dtype=np.float64) * found.factor + found.offset
+    stated = unit(text, where=where)
+    return np.asarray(values, dtype=np.float64) * stated.factor + stated.offset
 
 
 def from_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
     """Return SI values in a unit for people; the inverse of `to_si`."""
-    found = unit(text)
-    return (np.asarray(values, dtype=np.float64) - found.offset) / found.factor
+    stated = unit(text)
+    return (np.asarray(values, dtype=np.float64) - stated.offset) / stated.factor
 
 
 def unit_examples(text: str) -> tuple[str, ...]:
@@ -297,12 +299,12 @@ def in_both(values: ArrayLike, text: str, spec: str = ".4g") -> str:
     >>> in_both([1112.06, 2522.2], "lbf", ".0f")
     '250, 567 lbf (1112, 2522 N)'
     """
-    shown = [
+    texts = [
         f"{', '.join(f'{one:{spec}}' for one in np.atleast_1d(from_si(values, unit_text)).tolist())} "
         + unit_text.replace("*", "·")
         for unit_text in (text, _BESIDE[text])
     ]
-    return f"{shown[0]} ({shown[1]})"
+    return f"{texts[0]} ({texts[1]})"
 
 
 def si_scale(text: str, dimension: str | None = None, *, where: object = None) -> float:
@@ -313,14 +315,14 @@ def si_scale(text: str, dimension: str | None = None, *, where: object = None) -
     UnitError
         the unit is unknown, of another dimension, or has an offset
     """
-    found = unit(text, where=where)
-    if (dimension is not None and found.dimension != dimension) or found.offset:
+    stated = unit(text, where=where)
+    if (dimension is not None and stated.dimension != dimension) or stated.offset:
         raise UnitError(
             f"unit {text!r} is not one of {dimension or 'a plain scale'}",
             where=where,
-            got=f"{text} ({found.dimension})",
+            got=f"{text} ({stated.dimension})",
             expected=dimension or "a unit without an offset",
             next_step="correct the unit in the file or the machine definition",
             rule="unit-dimension",
         )
-    return found.factor
+    return stated.factor

@@ -35,8 +35,7 @@ from toolkit.planning.design import Design, ordered, pace_of, standard, steps_of
 from toolkit.planning.expectation import EarlierTest, earlier_test, pooled
 from toolkit.planning.protocol_search import Question, least_plan
 from toolkit.simulation.file_tire import read_file_tire
-from toolkit.simulation.plan import Plan, read_plan, with_effects
-from toolkit.simulation.plan_model import with_numbers
+from toolkit.simulation.plan import Plan, read_plan, with_effects, with_numbers
 from toolkit.simulation.steady import settled
 from toolkit.simulation.truth import true_stiffness
 

@@ -20,7 +20,7 @@ import pytest
 from tests.cli.test_sign import keygen
 from tests.conftest import EXAMPLES
 from tests.fuzz.corpus import _model
-from toolkit.cli.main import _command, run
+from toolkit.cli.main import command_tree, run
 from toolkit.inputs import raise_limits
 from toolkit.lab.home import packaged_home
 
@@ -105,7 +105,7 @@ NOWHERE = ("pipe", "device", "socket", "loop", "closed", "huge", "below", "nul",
 
 def commands(command: Any = None, *names: str) -> Iterator[tuple[str, Any]]:
     """Every command of the command line, with its words."""
-    command = _command() if command is None else command
+    command = command_tree() if command is None else command
     if hasattr(command, "commands"):
         for name, below in command.commands.items():
             yield from commands(below, *names, name)

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from toolkit.comparison.compare import DEFAULT_ANGLES
-from toolkit.comparison.maker_characteristics import is_characteristics_table, maker_characteristics
-from toolkit.comparison.maker_table import maker_rows
+from toolkit.comparison.maker_table import is_characteristics_table, maker_characteristics, maker_rows
 from toolkit.errors import ToolkitError
 
 # A tire in SAE axes: FY = -D sin(C arctan(B SA)), MZ = Dm sin(Cm arctan(Bm SA)); D and Dm grow with the load.

@@ -73,6 +73,6 @@ def test_schema_and_page_say_what_is_declared() -> None:
     assert table["properties"]["extra"] == {"description": "whatever it is"}
     assert schema["$defs"]["Row"]["properties"]["grade"] == {"enum": ["good", "bad"]}
     page = answer_reference(Table)
-    assert "| `rows` | list of `Row` | one a load |" in page
+    assert "| `rows` | list of [`Row`](#row) | one a load |" in page
     assert "| `extra` | any value | not always: whatever it is |" in page
-    assert "## `rows[]`" in page
+    assert "### Row\n\n`rows[]`: A row of the table." in page

@@ -13,17 +13,19 @@ import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from tests.house.source import ROOT, read_package
 from toolkit.characteristics.catalogue import characteristics
+from toolkit.cli.groups import declared_answers
+from toolkit.cli.main import command_tree
 from toolkit.declared import Format, reference, starter, table_of
 from toolkit.declared.answers import answer_reference
 from toolkit.declared.declaration import form_of
 from toolkit.declared.describe import _sections
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, Stage
-from toolkit.lab.answer_types import ANSWERS
+from toolkit.lab.answer_types import declared_type
 from toolkit.lab.rules import effect_keys, rules_catalogue
 from toolkit.report.kinds import write_manual
 
@@ -134,10 +136,11 @@ def _characteristics_text() -> str:
 
 
 def _answers_text() -> str:
-    parts = []
-    for command, declared in ANSWERS.items():
-        text = answer_reference(declared).replace("\n## ", f"\n### {command}: ")
-        parts.append(f"## toolkit {command} --json\n\n{text}")
+    described: dict[Any, None] = {}
+    parts = [
+        f"## toolkit {command} --json\n\n{answer_reference(declared_type(declared), described=described)}"
+        for command, declared in declared_answers(command_tree()).items()
+    ]
     return "\n".join(parts).rstrip() + "\n"
 
 

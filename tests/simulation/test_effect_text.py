@@ -115,7 +115,7 @@ def test_conditions():
         ("crosstalk.FZ.FZ=0.01", "two signals"),
         ("crosstalk.D51.FY=0.01", "cannot join"),
         ("channel_swap.D51.FY", "cannot join"),
-        ("channel_sign.E5=1", "there or not"),
+        ("channel_sign.E5=1", "present or absent"),
         ("wrong_calibration", "not named"),
         ("coulomb_friction=1", "equation of motion"),
         ("load_lag@order=1s", "condition"),

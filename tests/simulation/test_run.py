@@ -10,9 +10,8 @@ import pytest
 from toolkit.channels import signs
 from toolkit.machine import load_machine
 from toolkit.simulation.acquisition import AcquisitionTruth
-from toolkit.simulation.carriage import CarriageTruth
+from toolkit.simulation.carriage import CarriageTruth, RoadTruth
 from toolkit.simulation.plan import Plan
-from toolkit.simulation.road import RoadTruth
 from toolkit.simulation.run import simulate
 from toolkit.simulation.tire import TireTruth, forces, lateral_force
 from toolkit.simulation.truth import true_pull, true_stiffness, truth_document

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolkit.simulation import acquisition, carriage, cells, road, tire
+from toolkit.simulation import acquisition, carriage, cells, tire
 from toolkit.simulation.tire import TireTruth, forces
 
 ANGLES = np.radians(np.linspace(-10, 10, 41))
@@ -61,8 +61,8 @@ def test_run_out_cancels_over_a_drum_revolution_but_not_over_one_of_the_tire():
     assert whole == pytest.approx(3.995, abs=1e-3)
     for seconds, cancels in ((whole, True), (0.9, False)):
         time = np.linspace(0, seconds, 4000, endpoint=False)
-        angle = road.drum_angle(time=time, **drum, start_rad=0.3, reverse=False)
-        load = road.load_on_drum(road.RoadTruth(), load=np.full(4000, 4000.0), angle=angle)
+        angle = carriage.drum_angle(time=time, **drum, start_rad=0.3, reverse=False)
+        load = carriage.load_on_drum(carriage.RoadTruth(), load=np.full(4000, 4000.0), angle=angle)
         assert bool(abs(load.mean() - 4000.0) < 1e-6) is cancels
 
 

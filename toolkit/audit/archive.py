@@ -276,7 +276,7 @@ def audit_archive(
     if workers < 1:
         raise ConfigError(
             "an audit needs a worker", where="--workers", got=workers, expected="1 or more",
-            next_step="name the number of processes; the number of cores is a good one", rule="usage",
+            next_step="state the number of processes, such as the number of cores", rule="usage",
         )  # fmt: skip
     day = known_at or max([today(), *(registry.ledger(name).known_on() for name in registry.instruments())])
     todo = inventory(archive) if names is None else names
@@ -323,9 +323,9 @@ def _remote(
     archive: Path, registry: Registry, day: dt.date, digest: str
 ) -> Callable[[], Callable[[str], Done]]:
     # Another machine has another working folder; links are kept, as the names in the archive have them.
-    there = Path(os.path.abspath(archive))  # noqa: PTH100
+    root = Path(os.path.abspath(archive))  # noqa: PTH100
     records = Registry(Path(os.path.abspath(registry.folder)))  # noqa: PTH100
-    return partial(_same, there, records, day, digest, __version__)
+    return partial(_same, root, records, day, digest, __version__)
 
 
 def _same(archive: Path, registry: Registry, day: dt.date, digest: str, version: str) -> _Worker:
@@ -336,14 +336,14 @@ def _same(archive: Path, registry: Registry, day: dt.date, digest: str, version:
     ConfigError
         ``cluster``: another version of the toolkit, another registry, or no such archive
     """
-    for what, got, expected in (
+    for place, got, expected in (
         ("toolkit", __version__, version),
         ("archive", str(archive) if archive.is_dir() else "nothing", str(archive)),
         ("registry", _hash(registry, day), digest),
     ):
         if got != expected:
             raise ConfigError(
-                f"a worker of the cluster has another {what}", where=registry.folder, got=got,
+                f"a worker of the cluster has another {place}", where=registry.folder, got=got,
                 expected=expected, next_step="let all workers see the same installation and the same folders",
                 rule="cluster",
             )  # fmt: skip

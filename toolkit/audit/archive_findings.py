@@ -115,11 +115,11 @@ class Across:
             yield from self._closed(name)
         yield from self._conventions()
         for (instrument, rotation), signs in self._slopes.items():
-            most = 1 if sum(sign for _, sign in signs) >= 0 else -1
-            against = [name for name, sign in signs if sign != most]
+            majority = 1 if sum(sign for _, sign in signs) >= 0 else -1
+            against = [name for name, sign in signs if sign != majority]
             if len(against) >= len(signs) / 2:
                 continue  # no convention to depart from
-            usual, direction = ("rises", "falls") if most > 0 else ("falls", "rises")
+            usual, direction = ("rises", "falls") if majority > 0 else ("falls", "rises")
             for name in against:
                 message = (
                     f"drum {rotation}: Fy {direction} with the slip angle, and {usual} in "
@@ -137,14 +137,14 @@ class Across:
 
     def _copies(self, line: Mapping[str, Any]) -> Iterator[Finding]:
         reported = False
-        for key, what in ((line["sha256"], "byte for byte"), (line["values_sha256"], "in every number")):
+        for key, extent in ((line["sha256"], "byte for byte"), (line["values_sha256"], "in every number")):
             if key is None:
                 continue
             short = bytes.fromhex(key[:32])
             first = self._first.setdefault(short, line["path"])
             if first != line["path"] and not reported:
                 reported = True
-                message = f"the same as {first}, {what}"
+                message = f"the same as {first}, {extent}"
                 yield Finding(rule="duplicate-file", where=line["path"], message=message, level="note")
 
     def _conventions(self) -> Iterator[Finding]:

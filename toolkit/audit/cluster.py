@@ -108,10 +108,10 @@ async def _greeted(distributed: Any, address: str, security: Any) -> None:
     await comm.close()
 
 
-def trouble(address: str, got: str, expected: str, next_step: str) -> ConfigError:
+def trouble(address: str, actual: str, expected: str, next_step: str) -> ConfigError:
     """Return the error of a cluster that cannot be used."""
     return ConfigError(
-        "the cluster cannot be used", where=f"--scheduler {address}", got=got, expected=expected,
+        "the cluster cannot be used", where=f"--scheduler {address}", got=actual, expected=expected,
         next_step=next_step, rule="cluster",
     )  # fmt: skip
 

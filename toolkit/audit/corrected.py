@@ -243,11 +243,11 @@ def _keep_test(path: Path, archive: Path, stage: Path) -> None:
         place.write_bytes(read_input(toml, SETTINGS_FILE))
 
 
-def _refused(target: Path, got: str, expected: str) -> OutputError:
+def _refused(target: Path, actual: str, expected: str) -> OutputError:
     return OutputError(
         "corrected copies cannot be written there",
         where=target,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="name another folder with --repair; the originals are never touched",
         rule="repair-target",

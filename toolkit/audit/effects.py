@@ -132,9 +132,9 @@ class TestSums:
             return
         planned = load_machine(self.instrument).protocol.slip_angles_rad
         for rotation in ROTATIONS:
-            there = {step for r, _, step in self.points if r == rotation}
-            absent = [a for a in (round(math.degrees(step), 6) for step in planned) if a not in there]
-            if there and absent:
+            measured = {step for r, _, step in self.points if r == rotation}
+            absent = [a for a in (round(math.degrees(step), 6) for step in planned) if a not in measured]
+            if measured and absent:
                 angles = ", ".join(f"{angle:g}" for angle in absent)
                 message = f"drum {rotation}: no recording at slip angle {angles} deg"
                 yield Finding(rule="missing-condition", where=self.test, message=message, level="note")

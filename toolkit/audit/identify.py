@@ -110,11 +110,11 @@ def repair(
     if new is None and unfit(record, columns) is not None:
         return None
     values = recompute(columns, record) if new is None else new
-    most = {
+    largest = {
         load: float(np.max(np.abs(values[load] - columns.y[load] * si_scale(columns.y_units[load]))))
         for load in columns.loads
     }
-    return Repair(FY_max_abs_N=most.get("FY"), MZ_max_abs_Nm=most.get("MZ"))
+    return Repair(FY_max_abs_N=largest.get("FY"), MZ_max_abs_Nm=largest.get("MZ"))
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -313,19 +313,19 @@ class _Judge:
         answers: list[_Answer] = []
         remaining = set(hits)
         while remaining:
-            same, queue = set(), [next(hit for hit in hits if hit in remaining)]
+            members, queue = set(), [next(hit for hit in hits if hit in remaining)]
             while queue:
                 hit = queue.pop()
-                if hit in same:
+                if hit in members:
                     continue
-                same.add(hit)
+                members.add(hit)
                 for key in (self._coefficients(hit), self._variant(hit)):
                     queue += by_key[key]
-            remaining -= same
-            answers.append(self._simplest(same, slack=slack))
+            remaining -= members
+            answers.append(self._simplest(members, slack=slack))
         return tuple(answers)
 
-    def _simplest(self, same: set[Hit], *, slack: bool) -> _Answer:
+    def _simplest(self, hits: set[Hit], *, slack: bool) -> _Answer:
         def rank(hit: Hit) -> tuple[object, ...]:
             group = self.groups[hit.group]
             not_in_force = self.in_force is None or group.record.id != self.in_force.id
@@ -334,7 +334,7 @@ class _Judge:
                 not group.issued, group.order, hit.signs,
             )  # fmt: skip
 
-        hit = min(same, key=rank) if len(same) > 1 else next(iter(same))
+        hit = min(hits, key=rank) if len(hits) > 1 else next(iter(hits))
         group = self.groups[hit.group]
         signs = {load: self._signs(hit, load, variant) for load, variant in hit.signs}
         return _Answer(

@@ -97,9 +97,9 @@ def interval_bounds(
     """
     if len(x) <= _MANY:
         return _bounds_of(x, y, half_x=half_x, half_y=half_y)[0]
-    chosen = _first_rows(x, y)
+    active = _first_rows(x, y)
     for _ in range(_ROUNDS):
-        bounds, points = _bounds_of(x[chosen], y[chosen], half_x=half_x[chosen], half_y=half_y[chosen])
+        bounds, points = _bounds_of(x[active], y[active], half_x=half_x[active], half_y=half_y[active])
         if bounds is None:
             return None  # a part of the rows that nothing fits
         if not np.isfinite(bounds).all():
@@ -107,7 +107,7 @@ def interval_bounds(
         broken = _broken(points, x, y, half_x, half_y)
         if not len(broken):
             return bounds
-        chosen = np.union1d(chosen, broken)
+        active = np.union1d(active, broken)
     return _bounds_of(x, y, half_x=half_x, half_y=half_y)[0]
 
 

@@ -260,11 +260,11 @@ def _is_sha(value: object) -> bool:
     return isinstance(value, str) and _SHA.fullmatch(value) is not None
 
 
-def _bad(source: Path, got: str, expected: str) -> ConfigError:
+def _bad(source: Path, actual: str, expected: str) -> ConfigError:
     return ConfigError(
         "the list of reports cannot be used",
         where=source,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="correct the file, or name a folder of reports",
         rule="reports",

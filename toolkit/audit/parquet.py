@@ -60,7 +60,7 @@ def write_parquet(
         except arrow.ArrowInvalid as error:
             raise OutputError(
                 "a result does not fit the table", where=target, got=error, expected="the audit's own keys",
-                next_step="take the JSON lines instead, and report this", rule="not-writable",
+                next_step="use the JSON lines instead, and report this", rule="not-writable",
             ) from error  # fmt: skip
 
 

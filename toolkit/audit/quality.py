@@ -51,14 +51,14 @@ def quality(recording: Recording, where: str) -> tuple[Finding, ...]:
 
 def _saturated(series: Series) -> str | None:
     values = series.values
-    same = values[1:] == values[:-1]
-    if int(same.sum()) < _STUCK - 1:
+    repeated = values[1:] == values[:-1]
+    if int(repeated.sum()) < _STUCK - 1:
         return None  # the usual case, and the cheap one
     for end in (float(values.max()), float(values.min())):
         start, length = _longest(values == end)
         # A channel printed so coarsely that it often repeats is not at an end of its range.
-        elsewhere = int(same.sum()) - (length - 1)
-        if length >= _STUCK and elsewhere < 0.2 * len(same):
+        elsewhere = int(repeated.sum()) - (length - 1)
+        if length >= _STUCK and elsewhere < 0.2 * len(repeated):
             return (
                 f"{series.header} stands at {end:g} {series.unit}, an end of its range, in "
                 f"rows {start + 1} to {start + length}"

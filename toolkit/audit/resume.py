@@ -270,11 +270,11 @@ def _opened(path: Path) -> IO[bytes]:
     return file
 
 
-def _refused(path: Path, got: str, expected: str, *, rule: str = "output") -> OutputError:
+def _refused(path: Path, actual: str, expected: str, *, rule: str = "output") -> OutputError:
     return OutputError(
         "the results cannot be written",
         where=path,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="name another folder with --out; what was written before is whole and will be used again",
         rule=rule,

@@ -60,14 +60,14 @@ class Runs:
         edges = np.concatenate([[0], self.stops]) != np.concatenate([self.starts, [self.rows]])
         return len(self.starts) + int(edges.sum())
 
-    def where(self, wanted: NDArray[np.bool_]) -> Runs:
+    def where(self, mask: NDArray[np.bool_]) -> Runs:
         """Return some of the runs (runs,)."""
-        pairs = wanted[self.run]
+        pairs = mask[self.run]
         return Runs(
             rows=self.rows,
-            starts=self.starts[wanted],
-            stops=self.stops[wanted],
-            run=(np.cumsum(wanted) - 1)[self.run[pairs]],
+            starts=self.starts[mask],
+            stops=self.stops[mask],
+            run=(np.cumsum(mask) - 1)[self.run[pairs]],
             group=self.group[pairs],
             variants={load: masks[pairs] for load, masks in self.variants.items()},
         )
@@ -160,11 +160,11 @@ class _Pairs:
     group: NDArray[np.int64]
     variants: dict[str, NDArray[np.bool_]]
 
-    def where(self, wanted: NDArray[np.bool_]) -> _Pairs:
+    def where(self, mask: NDArray[np.bool_]) -> _Pairs:
         return _Pairs(
-            run=self.run[wanted],
-            group=self.group[wanted],
-            variants={load: masks[wanted] for load, masks in self.variants.items()},
+            run=self.run[mask],
+            group=self.group[mask],
+            variants={load: masks[mask] for load, masks in self.variants.items()},
         )
 
 

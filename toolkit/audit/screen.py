@@ -90,7 +90,7 @@ class Screen:
     def _pairs(self, part: Columns, start: int) -> NDArray[np.int64]:
         # Row and linear group (pairs, 2) wherever some signs of each load may explain the row. The second
         # load is looked at where the first fits, which is nearly nowhere.
-        (load, equations), *others = self.equations.items()
+        (load, equations), *following = self.equations.items()
         values = np.column_stack([np.abs(part.x), np.ones(part.rows)])
         y = np.abs(part.y[load])
         limit = (
@@ -100,7 +100,7 @@ class Screen:
         )
         misses = _misses(values.T[:, :, None], equations.size.T[:, None, :], y[:, None])
         row, group = np.nonzero(~(misses > limit * _SPARE))
-        for load, equations in others:
+        for load, equations in following:
             size, y = equations.size[group], np.abs(part.y[load][row])
             limit = (
                 np.einsum("ij,ij->i", part.half_x[row], size[:, :-1])
@@ -141,11 +141,11 @@ class Screen:
     def _predicted(
         self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        chosen = self.equations[load].coefficients
-        if len(among) < len(chosen):
-            chosen = chosen[among]
-        groups, variants, n = chosen.shape
-        flat = chosen.reshape(groups * variants, n)
+        coefficients = self.equations[load].coefficients
+        if len(among) < len(coefficients):
+            coefficients = coefficients[among]
+        groups, variants, n = coefficients.shape
+        flat = coefficients.reshape(groups * variants, n)
         predicted = columns.x[rows] @ flat[:, :-1].T
         predicted += flat[:, -1]
         return predicted.reshape(len(rows), groups, variants)

@@ -268,11 +268,11 @@ class _Drifted:
         )
 
 
-def _refused(good: str, got: str, expected: str) -> ConfigError:
+def _refused(good: str, actual: str, expected: str) -> ConfigError:
     return ConfigError(
-        "there is no stretch to look at",
+        "there is no period to examine",
         where="--since-good",
-        got=f"{good}: {got}",
+        got=f"{good}: {actual}",
         expected=expected,
         next_step="see 'toolkit calibration chart' for the as-found results of the instrument",
         rule="since-good",

@@ -81,14 +81,14 @@ def check_units(record: CalibrationRecord, units: Mapping[str, str]) -> None:
         ``units``: the recording and the record differ
     """
     for name, expected in zip(record.indications, record.indication_units, strict=True):
-        got = units.get(name)
+        stated = units.get(name)
         needed = unit(expected, where=record.id)
-        present = None if got is None else unit(got, where=f"channel {name}")
+        present = None if stated is None else unit(stated, where=f"channel {name}")
         if present is None or (present.factor, present.dimension) != (needed.factor, needed.dimension):
             raise RecordError(
                 f"the unit of {name} is not that of record {record.id}",
                 where=f"{record.id}, {name}",
-                got=got or f"no unit for {name}",
+                got=stated or f"no unit for {name}",
                 expected=expected,
                 next_step="use a record fitted in the recording's unit, or correct the machine definition",
                 rule="units",

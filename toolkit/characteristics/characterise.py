@@ -68,11 +68,11 @@ def _curve(group: Group, channel: Literal["FY", "MZ"]) -> Curve:
 
 def _fit(groups: tuple[Group, ...]) -> tuple[tuple[DirectionFit, ...], tuple[Finding, ...]]:
     """Fit every curve that can be fitted, all in one batch; the others become findings and None."""
-    wanted = [
+    declared = [
         (index, curve) for index, g in enumerate(groups) for curve in (_curve(g, "FY"), _curve(g, "MZ"))
     ]
-    refused = {(index, curve.channel): why_not(curve) for index, curve in wanted}
-    good = [(index, curve) for index, curve in wanted if refused[index, curve.channel] is None]
+    refused = {(index, curve.channel): why_not(curve) for index, curve in declared}
+    good = [(index, curve) for index, curve in declared if refused[index, curve.channel] is None]
     solved = dict(
         zip(
             [(index, curve.channel) for index, curve in good],
@@ -99,14 +99,14 @@ def _refused_findings(
     groups: tuple[Group, ...], refused: Mapping[tuple[int, Literal["FY", "MZ"]], FitError | None]
 ) -> list[Finding]:
     """Return one finding for all curves of a direction that have the same problem."""
-    same: dict[tuple[str, str, str], dict[str, dict[int, None]]] = {}
+    places: dict[tuple[str, str, str], dict[str, dict[int, None]]] = {}
     for (index, channel), problem in refused.items():
         if problem is not None:
             text = f"{problem.what} (got {problem.got}, expected {problem.expected})"
             key = (groups[index].rotation, problem.rule or "not-fitted", text)
-            same.setdefault(key, {}).setdefault(channel, {})[index] = None
+            places.setdefault(key, {}).setdefault(channel, {})[index] = None
     findings = []
-    for (rotation, rule, text), channels in same.items():
+    for (rotation, rule, text), channels in places.items():
         loads = dict.fromkeys(index for indices in channels.values() for index in indices)
         where = in_both([groups[index].load_N for index in loads], "lbf", ".0f")
         findings.append(

@@ -138,8 +138,8 @@ def in_order(rows: Iterable[Row], fits: Iterable[DirectionFit]) -> tuple[Row, ..
     for row in sorted(listed, key=lambda row: row.SA_rad is not None):
         by_group.setdefault((row.load_N, row.rotation), []).append(row)
     loads = [row for (_, rotation), group in by_group.items() for row in group if rotation == BOTH]
-    others = [row for (_, rotation), group in by_group.items() for row in group if rotation != BOTH]
-    return (*loads, *others)
+    single = [row for (_, rotation), group in by_group.items() for row in group if rotation != BOTH]
+    return (*loads, *single)
 
 
 def answer_lists(rows: Iterable[Row]) -> dict[str, list[dict[str, Any]]]:

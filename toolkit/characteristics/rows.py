@@ -145,24 +145,24 @@ def point_u(
     Sources: the record, the cells' zeros or tares, the scatter of the rows and about the curves, and through
     the curve's slopes the slip angle (zero and scale), the load and the pressure.
     """
-    every = [
+    sources = [
         (direction, place) for direction in directions for place in range(len(direction.group.conditions))
     ]
-    groups = at_one_angle([direction.group.conditions[place] for direction, place in every])
+    groups = at_one_angle([direction.group.conditions[place] for direction, place in sources])
     scatter = scatter_of(directions)
     uncertainties: dict[tuple[str, int], dict[str, float]] = {}
     for channel in CHANNELS:
         squares = _squares(directions, channel, shared, scatter)
         for places in groups:
-            pairs = [every[index] for index in places]
+            pairs = [sources[index] for index in places]
             conditions = [direction.group.conditions[place] for direction, place in pairs]
             FZ = np.array([c.FZ for c in conditions])
             y = np.array([c.FY if channel == "FY" else c.MZ for c in conditions])
             for (direction, place), c, value, slope in zip(pairs, conditions, y, slopes(FZ, y), strict=True):
                 load = shared.load_part(float(value / c.FZ) if slope is None else slope.value, c.FZ)
                 pressure = shared.pressure_part(float(value))
-                more = load.u**2 + (pressure.u**2 if pressure else 0.0)
-                u = math.sqrt(squares[id(direction)][place] + more)
+                variance = load.u**2 + (pressure.u**2 if pressure else 0.0)
+                u = math.sqrt(squares[id(direction)][place] + variance)
                 uncertainties.setdefault((c.file, c.first_row), {})[channel] = u
     return uncertainties
 

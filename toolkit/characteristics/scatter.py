@@ -226,19 +226,19 @@ def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[
     from scipy.optimize import nnls
 
     variances, covariance = np.zeros(4), np.zeros((4, 4))
-    chosen = np.flatnonzero(free)
-    if not len(curves) or not len(chosen):
+    places = np.flatnonzero(free)
+    if not len(curves) or not len(places):
         return variances, covariance
     squares = sum(float(z @ z) for curve in curves for z in curve.z)
     total = squares / sum(len(curve.rows) for curve in curves)
-    variances[chosen] = total / len(chosen)
+    variances[places] = total / len(places)
     for _ in range(_STEPS):
-        information, right = _score(curves, variances, chosen)
+        information, right = _score(curves, variances, places)
         size = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-        lower = np.linalg.cholesky(information * np.outer(size, size) + 1e-10 * np.eye(len(chosen)))
+        lower = np.linalg.cholesky(information * np.outer(size, size) + 1e-10 * np.eye(len(places)))
         update = nnls(lower.T, np.linalg.solve(lower, right * size))[0] * size
-        change = np.abs(update - variances[chosen]).max()
-        variances[chosen] = update
+        change = np.abs(update - variances[places]).max()
+        variances[places] = update
         if change <= _SETTLED * update.max():
             break
     active = np.flatnonzero(variances > 0)
@@ -250,16 +250,16 @@ def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[
     return variances, covariance
 
 
-def _score(curves: Sequence[_Residuals], variances: Array, chosen: NDArray[np.intp]) -> tuple[Array, Array]:
+def _score(curves: Sequence[_Residuals], variances: Array, places: NDArray[np.intp]) -> tuple[Array, Array]:
     # The information on the variances, and the right side whose solution is the next step of scoring.
-    information, right = np.zeros((len(chosen), len(chosen))), np.zeros(len(chosen))
+    information, right = np.zeros((len(places), len(places))), np.zeros(len(places))
     for curve in curves:
         V = curve.rows + np.einsum("k,kij->ij", variances, curve.parts)
         inverse = np.linalg.inv(V)
-        through = inverse @ curve.parts[chosen]
+        through = inverse @ curve.parts[places]
         information += 0.5 * np.einsum("kij,lji->kl", through, through)
         for z in curve.z:
             weighted = inverse @ z
-            right += 0.5 * np.einsum("i,kij,j->k", weighted, curve.parts[chosen], weighted)
+            right += 0.5 * np.einsum("i,kij,j->k", weighted, curve.parts[places], weighted)
         right -= 0.5 * np.einsum("kij,ji->k", through, inverse @ curve.rows)
     return information, right

@@ -16,6 +16,7 @@ from toolkit.cli.console import (
     Json,
     KnownAt,
     Quiet,
+    answers,
     day,
     into_file,
     into_folder,
@@ -26,6 +27,7 @@ from toolkit.cli.console import (
 NAME = "audit"
 
 
+@answers("toolkit.lab.archive_answer_types:AuditAnswer")
 def command(
     archive: Annotated[Path, typer.Argument(help="A folder of recordings, in any depth.")],
     workers: Annotated[
@@ -44,7 +46,7 @@ def command(
         typer.Option(
             "--out",
             callback=into_folder,
-            help="Folder that keeps the results: an audit goes on where it was ended.",
+            help="Folder for the results; an interrupted audit resumes from it.",
         ),
     ] = None,
     reports: Annotated[
@@ -53,7 +55,10 @@ def command(
     ] = None,
     since_good: Annotated[
         str | None,
-        typer.Option("--since-good", help="Record id: the tests since then that a failed as-found touches."),
+        typer.Option(
+            "--since-good",
+            help="Record id of the last good check: tests that a failed as-found check puts in doubt.",
+        ),
     ] = None,
     repair: Annotated[
         Path | None,

@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     RequestFile,
     Sign,
     answer,
+    answers,
     exit_code,
     into_folder,
     new_registry,
@@ -27,7 +28,9 @@ from toolkit.cli.console import (
 from toolkit.errors import ConfigError
 
 NAME = "calibrate"
-Full = Annotated[bool, typer.Option("--full", help="Print the whole report of the fit; rows in the JSON.")]
+Full = Annotated[
+    bool, typer.Option("--full", help="Print the whole report of the fit; the JSON then has its rows.")
+]
 Figures = Annotated[
     Path | None,
     typer.Option(
@@ -36,6 +39,7 @@ Figures = Annotated[
 ]
 
 
+@answers("toolkit.lab.record_answer_types:CalibrateAnswer")
 def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
     calibrations: NewCalibrations = None,
@@ -45,7 +49,7 @@ def command(
     ] = None,
     machine: Machine = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Compute and judge everything, and make nothing.")
+        bool, typer.Option("--dry-run", help="Compute and judge everything; write nothing.")
     ] = False,
     again: Annotated[
         bool, typer.Option("--again", help="Enter a session anew whose record was discarded.")

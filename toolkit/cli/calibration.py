@@ -23,6 +23,7 @@ from toolkit.cli.console import (
     RequestFile,
     Sign,
     answer,
+    answers,
     exit_code,
     open_signers,
     open_travel,
@@ -42,6 +43,7 @@ KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known 
 
 
 @app.command("list")
+@answers("toolkit.lab.record_answer_types:ListAnswer")
 def list_records(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     everything: Annotated[bool, typer.Option("--all", help="Discarded candidates too.")] = False,
@@ -66,6 +68,7 @@ def list_records(
 
 
 @app.command()
+@answers("toolkit.lab.record_answer_types:ShowAnswer")
 def show(
     record_id: Id,
     known_at: KnownAt = None,
@@ -86,6 +89,7 @@ def show(
 
 
 @app.command()
+@answers("toolkit.lab.decision_answer_types:VerifyRegistryAnswer")
 def verify(
     head: Annotated[str | None, typer.Option("--head", help="A ledger hash printed earlier.")] = None,
     calibrations: Calibrations = None,
@@ -112,6 +116,7 @@ def verify(
 
 
 @app.command()
+@answers("toolkit.lab.record_answer_types:HistoryAnswer")
 def history(
     name: Annotated[str, typer.Argument(help="An instrument, or a record id.")],
     calibrations: Calibrations = None,
@@ -134,6 +139,7 @@ def history(
 
 
 @app.command("import")
+@answers("toolkit.lab.decision_answer_types:ImportAnswer")
 def import_record(
     file: Annotated[Path, typer.Argument(help="TOML with the coefficients and the source that names them.")],
     again: Annotated[
@@ -179,6 +185,7 @@ def import_record(
 
 
 @app.command()
+@answers("toolkit.lab.decision_answer_types:ApproveAnswer")
 def approve(
     record_id: Id,
     in_force_from: Annotated[str, typer.Option("--in-force-from", help=IN_FORCE)],
@@ -253,6 +260,7 @@ def approve(
 
 
 @app.command()
+@answers("toolkit.lab.decision_answer_types:WithdrawAnswer")
 def withdraw(
     record_id: Id,
     on: Annotated[str, typer.Option("--on", help="Day on which the fault became known (YYYY-MM-DD).")],
@@ -292,6 +300,7 @@ def withdraw(
     return 0
 
 
+@answers("toolkit.lab.control_answer_types:DifferenceAnswer")
 def diff(
     one: Id,
     other: Id,
@@ -311,6 +320,7 @@ def diff(
     return 1 if differs else 0
 
 
+@answers("toolkit.lab.decision_answer_types:DiscardAnswer")
 def discard(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
     reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
@@ -343,6 +353,7 @@ def discard(
     return 0
 
 
+@answers("toolkit.lab.control_answer_types:RecordReportAnswer")
 def report(
     record_id: Id,
     figures: Figures = None,

@@ -22,6 +22,7 @@ from toolkit.cli.console import (
     Sign,
     TimeStamp,
     answer,
+    answers,
     ask_passphrase,
     day,
     exit_code,
@@ -34,6 +35,7 @@ from toolkit.cli.console import (
 CERTIFICATE = "certificate"
 
 
+@answers("toolkit.lab.control_answer_types:BudgetAnswer")
 def budget(
     record_id: Id,
     load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
@@ -45,19 +47,22 @@ def budget(
         str | None, typer.Option("--indications", help="Predict from D51=..,D52=.. in the record's units.")
     ] = None,
     temperature_range: Annotated[
-        float | None, typer.Option("--temperature-range", help="Use within +- this many K of the session.")
+        float | None,
+        typer.Option(
+            "--temperature-range", help="Largest departure from the session's temperature in use [K]."
+        ),
     ] = None,
     temperature_coefficient: Annotated[
         float | None,
         typer.Option(
-            "--temperature-coefficient", help="Relative, a kelvin; default: what the session states."
+            "--temperature-coefficient", help="Relative change per kelvin; default: what the session states."
         ),
     ] = None,
     trials: Annotated[
         int | None, typer.Option("--monte-carlo", help="Check by this many trials; 0: until settled.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of the trials.")] = 0,
-    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Digits of u that count.")] = 2,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the trials.")] = 0,
+    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Significant digits of u.")] = 2,
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -85,6 +90,7 @@ def budget(
     return exit_code(findings)
 
 
+@answers("toolkit.lab.control_answer_types:ApplyAnswer")
 def apply(
     record_id: Id,
     data: Annotated[
@@ -126,6 +132,7 @@ def apply(
     return exit_code(loads.findings)
 
 
+@answers("toolkit.lab.document_answer_types:CertificateAnswer")
 def certificate(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
     template: Annotated[
@@ -198,6 +205,7 @@ def certificate(
     return 1 if delivered.warnings else exit_code(issued.findings)
 
 
+@answers("toolkit.lab.control_answer_types:StandardAnswer")
 def standard(
     record_id: Id,
     name: Annotated[str, typer.Option("--standard", help="e74 or iso376.")],
@@ -248,6 +256,7 @@ def standard(
     return 0
 
 
+@answers("toolkit.lab.control_answer_types:ChartAnswer")
 def chart(
     instrument: Annotated[str, typer.Argument(help="The instrument.")],
     out: Annotated[
@@ -279,6 +288,7 @@ def chart(
     return exit_code(findings)
 
 
+@answers("toolkit.lab.control_answer_types:DueAnswer")
 def due(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     on: Annotated[

@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     Quiet,
     Reader,
     answer,
+    answers,
     day,
     exit_code,
     into_folder,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 NAME = "compare"
 
 
+@answers("toolkit.lab.tire_answer_types:CompareForms")
 def command(
     sources: Annotated[
         list[Path] | None,
@@ -70,7 +72,10 @@ def command(
     ] = 0.05,
     reproducibility: Annotated[
         bool,
-        typer.Option("--reproducibility", help="Demand it: an error without another laboratory's tests."),
+        typer.Option(
+            "--reproducibility",
+            help="Require reproducibility: tests of one laboratory alone are then an error.",
+        ),
     ] = False,
     units: Annotated[
         str | None,
@@ -137,14 +142,14 @@ def command(
             expected="two tests or more, or --laboratories FILE", next_step="see 'toolkit compare --help'",
             rule="usage",
         )  # fmt: skip
-    chosen = choose_reader(reader)
+    engine = choose_reader(reader)
     style = unit_choice(units or "SI")
     started = time.perf_counter()
     opened = comparison_template(template, out, home)
     with progress(None, "reading", show=not (json or quiet)) as step:
         entries, findings = read_entries(
             sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,
-            home=home, draft=draft, reader=chosen, step=step,
+            home=home, draft=draft, reader=engine, step=step,
         )  # fmt: skip
     comparison = compare(
         entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility

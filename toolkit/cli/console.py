@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.trust.keys import Signer
     from toolkit.trust.signing import Travel
+
+
+_Command = TypeVar("_Command", bound=Callable[..., int])
 
 
 def into_folder(folder: Path | None) -> Path | None:
@@ -272,6 +275,19 @@ def open_travel(request: Path | None, answers: Sequence[Path] | None) -> Travel:
             rule="usage",
         )  # fmt: skip
     return Travel(request=request, answers=tuple(map(read_request, answers or ())))
+
+
+def answers(declared: str | type) -> Callable[[_Command], _Command]:
+    """Declare the JSON answer of a command: a type, or ``module:name`` of what is heavy to import.
+
+    `toolkit.lab.answer_types` prints it as page and schema; a test looks for commands without it.
+    """
+
+    def declare(command: _Command) -> _Command:
+        command.answer = declared  # type: ignore[attr-defined]
+        return command
+
+    return declare
 
 
 def answer(payload: Mapping[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:

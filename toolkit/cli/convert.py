@@ -16,6 +16,7 @@ from toolkit.cli.console import (
     KnownAt,
     Quiet,
     answer,
+    answers,
     day,
     exit_code,
     into_file,
@@ -24,6 +25,7 @@ from toolkit.cli.console import (
 NAME = "convert"
 
 
+@answers("toolkit.lab.tire_answer_types:ConvertAnswer")
 def command(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A .tir, .tdx, .csv or reduced .xlsx.")],
     target: Annotated[Path, typer.Argument(metavar="OUT", callback=into_file, help="A .tir, .tdx or .csv.")],
@@ -53,9 +55,9 @@ def command(
     started = time.perf_counter()
     resolve = partial(resolve_test, calibrations=calibrations, home=home, known_at=day(known_at), draft=draft)
     converted = convert(source, target, axes=axes, resolve=resolve)
-    shown = f"{target} written"
+    text = f"{target} written"
     if converted.findings:
-        shown += f"\n\n{findings_text(converted.findings)}"
+        text += f"\n\n{findings_text(converted.findings)}"
     payload = {
         "in": str(source),
         "out": str(target),
@@ -66,5 +68,5 @@ def command(
         "findings": [finding.as_dict() for finding in converted.findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, shown, as_json=json, quiet=quiet)
+    answer(payload, text, as_json=json, quiet=quiet)
     return exit_code(converted.findings)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, into_folder
+from toolkit.cli.console import Json, Quiet, answer, answers, into_folder
 from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ class Step:
     told: Callable[[Payload], str]
 
 
+@answers("toolkit.lab.document_answer_types:DemoAnswer")
 def command(
     context: typer.Context,
     out: Annotated[
@@ -71,7 +72,7 @@ def command(
         resolved = _resolved(stage)
         outcome = _tire_file(resolved, stage / "tire.tir")
         figures = _figures(resolved, stage)
-        certificates = sorted(one.name for one in (stage / "certificate").iterdir())
+        certificates = sorted(path.name for path in (stage / "certificate").iterdir())
         say(f"      {outcome}\n      {len(figures)} figures\n")
         report = steps_run[-1]
         (stage / _MARK).write_text(
@@ -246,9 +247,9 @@ def _told_certificate(payload: Payload) -> str:
 
 
 def _told_process(payload: Payload) -> str:
-    used = sum(entry["used"] for entry in payload["conditions"])
+    conditions = sum(entry["used"] for entry in payload["conditions"])
     findings = ", ".join(dict.fromkeys(entry["rule"] for entry in payload["findings"])) or "none"
-    return f"{used} conditions by {payload['calibration']['id']}; findings: {findings}"
+    return f"{conditions} conditions by {payload['calibration']['id']}; findings: {findings}"
 
 
 def _told_fit(payload: Payload) -> str:

@@ -17,12 +17,14 @@ from toolkit.cli.console import (
     Processes,
     Quiet,
     answer,
+    answers,
     into_folder,
 )
 
 NAME = "diagnose"
 
 
+@answers("toolkit.lab.simulation_answer_types:DiagnoseAnswer")
 def command(
     case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Simulation and recordings.")],
     out: Annotated[

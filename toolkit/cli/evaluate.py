@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, exit_code, into_file
+from toolkit.cli.console import Json, Quiet, answer, answers, exit_code, into_file
 
 NAME = "evaluate"
 
 
+@answers("toolkit.lab.tire_answer_types:EvaluateAnswer")
 def command(
     tire: Annotated[Path, typer.Argument(metavar="TIRE.tir", help="A tire property file, MF 5.2 or 6.x.")],
     grid: Annotated[
@@ -50,9 +51,9 @@ def command(
     text = grid_text(table, values)
     if out is not None:
         write_result(out, text)
-    shown = text.rstrip("\n") if out is None else f"{len(table.cells)} rows written to {out}"
+    printed = text.rstrip("\n") if out is None else f"{len(table.cells)} rows written to {out}"
     if findings:
-        shown += f"\n\n{findings_text(findings)}"
+        printed += f"\n\n{findings_text(findings)}"
     payload = {
         "tire": str(tire),
         "model": "mf52" if file.version == "5.2" else "mf61",
@@ -65,5 +66,5 @@ def command(
         "findings": [finding.as_dict() for finding in findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, shown, as_json=json, quiet=quiet)
+    answer(payload, printed, as_json=json, quiet=quiet)
     return exit_code(findings)

@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     KnownAt,
     Quiet,
     answer,
+    answers,
     day,
     exit_code,
     into_file,
@@ -27,6 +28,7 @@ from toolkit.cli.console import (
 NAME = "fit"
 
 
+@answers("toolkit.lab.tire_answer_types:FitAnswer")
 def command(
     source: Annotated[
         Path,
@@ -106,18 +108,18 @@ def command(
     started = time.perf_counter()
     in_field_form = is_field_file(source)
     names = model_choice(model or ["mf61" if tir is not None and in_field_form else "magic_formula"])
-    chosen = fit_options(loss, weights, rated_load, radius)
+    options = fit_options(loss, weights, rated_load, radius)
     into = check_tir(tir, source, names) if tir is not None else None
     refuse_unwritable(figures)
     if source.suffix.lower() != ".csv" and not in_field_form:
         fitted = fit_test_models(
-            source, names, axes=axes, loss=chosen, weights=weights, rated_load_N=rated_load, radius_m=radius,
+            source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius,
             calibration=calibration, calibrations=calibrations, home=home, known_at=day(known_at),
             draft=draft,
         )  # fmt: skip
     else:
         fitted = fit_table_models(
-            source, names, axes=axes, loss=chosen, weights=weights, rated_load_N=rated_load, radius_m=radius
+            source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius
         )
     findings = fitted.findings
     with nullcontext() if figures is None else publication(figures) as stage:

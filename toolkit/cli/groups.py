@@ -73,6 +73,24 @@ def build_group(app: Typer, finish: Finish, *, name: str | None = None) -> Any:
     return group
 
 
+def leaves(group: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
+    """Yield every command of a group and of the groups in it, with the words that call it."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from leaves(command, (*above, name))
+        else:
+            yield " ".join((*above, name)), command
+
+
+def declared_answers(group: Any) -> dict[str, Any]:
+    """Return what each command with ``--json`` declares as its answer; None: nothing."""
+    return {
+        name: getattr(command.callback, "answer", None)
+        for name, command in leaves(group)
+        if any("--json" in parameter.opts for parameter in command.params)
+    }
+
+
 def _command(info: CommandInfo, finish: Finish) -> Any:
     command = get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
     finish(command)

@@ -14,6 +14,7 @@ from toolkit.cli.console import (
     KnownAt,
     Quiet,
     answer,
+    answers,
     day,
     exit_code,
 )
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 NAME = "inspect"
 
 
+@answers("toolkit.lab.record_answer_types:InspectForms")
 def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, under any name.")],
     machine: Annotated[

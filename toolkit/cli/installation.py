@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, into_file, into_folder
+from toolkit.cli.console import Json, Quiet, answer, answers, into_file, into_folder
 
 
+@answers("toolkit.lab.installation_answer_types:InitAnswer")
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", callback=into_folder, help="The home to make.")],
     json: Json = False,
@@ -36,8 +37,9 @@ def init(
     return 0
 
 
+@answers("toolkit.lab.installation_answer_types:DoctorAnswer")
 def doctor(json: Json = False, quiet: Quiet = False) -> int:
-    """Tell what this machine lacks, and what mends it.
+    """Report what this computer lacks, and how to install it.
 
     Example: toolkit doctor
     """
@@ -59,6 +61,7 @@ def doctor(json: Json = False, quiet: Quiet = False) -> int:
     return 1 if mend else 0
 
 
+@answers("toolkit.lab.installation_answer_types:QualifyAnswer")
 def qualify(
     out: Annotated[
         Path | None,
@@ -86,7 +89,9 @@ def qualify(
     return 0 if record.passed else 1
 
 
+@answers("toolkit.lab.installation_answer_types:ExplainForms")
 def explain(
+    context: typer.Context,
     rule: Annotated[
         str | None,
         typer.Argument(
@@ -106,9 +111,10 @@ def explain(
     Examples: toolkit explain no-tare, toolkit explain relaxation, toolkit explain --answer process
     """
     if answer_of is not None:
+        from toolkit.cli.groups import declared_answers
         from toolkit.lab.answer_types import schema_text
 
-        typer.echo(schema_text(answer_of))
+        typer.echo(schema_text(answer_of, declared_answers(context.find_root().command)))
         return 0
     from toolkit.lab.rules import explained
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, into_file
+from toolkit.cli.console import Json, Quiet, answer, answers, into_file
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
@@ -17,6 +17,7 @@ app = typer.Typer(help="Machine definitions: show one, correct one by an answer.
 
 
 @app.command("show")
+@answers("toolkit.lab.installation_answer_types:MachineAnswer")
 def show(
     machine: Annotated[str, typer.Argument(help="Name of a packaged machine, or the path of a definition.")],
     json: Json = False,
@@ -38,6 +39,7 @@ def show(
 
 
 @app.command("correct")
+@answers("toolkit.lab.installation_answer_types:MachineAnswer")
 def correct(
     source: Annotated[
         Path, typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its model.toml.")

@@ -99,7 +99,8 @@ def _register() -> None:
 
 
 @cache
-def _command() -> Any:
+def command_tree() -> Any:
+    """Return the group of all commands."""
     # Built once: whoever calls `run` many times in a process would wait for the options every time.
     from toolkit.cli.groups import build_group
 
@@ -137,7 +138,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
     arguments = sys.argv[1:] if arguments is None else arguments
     as_json = "--json" in arguments
     try:
-        code = _command()(args=arguments, prog_name="toolkit", standalone_mode=False)
+        code = command_tree()(args=arguments, prog_name="toolkit", standalone_mode=False)
     except Requested as outcome:
         from toolkit.lab.signing import requested
 

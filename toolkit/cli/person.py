@@ -17,6 +17,7 @@ from toolkit.cli.console import (
     RequestFile,
     Sign,
     answer,
+    answers,
     ask_passphrase,
     into_file,
     into_folder,
@@ -40,6 +41,7 @@ Instrument = Annotated[str, typer.Argument(help="Instrument, such as m15.")]
 
 
 @person.command()
+@answers("toolkit.lab.decision_answer_types:KeyAnswer")
 def key(
     file: Annotated[
         Path, typer.Argument(callback=into_file, help="New private key; its public half is FILE.pub.")
@@ -61,6 +63,7 @@ def key(
 
 
 @person.command()
+@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
 def enrol(
     person_id: Annotated[str, typer.Argument(metavar="ID", help="Short name of the person.")],
     name: Annotated[str, typer.Option("--name", help="As documents print it.")],
@@ -99,6 +102,7 @@ def enrol(
 
 
 @person.command("list")
+@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
 def list_people(
     calibrations: Calibrations = None, home: Home = None, as_json: Json = False, quiet: Quiet = False
 ) -> int:
@@ -113,6 +117,7 @@ def list_people(
 
 
 @person.command()
+@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
 def revoke(
     person_id: Annotated[str, typer.Argument(metavar="ID", help="Whose key.")],
     since: Annotated[
@@ -145,11 +150,14 @@ def revoke(
 
 
 @person.command()
+@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
 def policy(
     action: Annotated[str, typer.Argument(help="enter, approve, withdraw, discard, import, issue or enrol.")],
     role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
     reason: Why,
-    signatures: Annotated[int, typer.Option("--signatures", help="Of different people.")] = 1,
+    signatures: Annotated[
+        int, typer.Option("--signatures", help="Number of signatures, each of another person.")
+    ] = 1,
     by: By = None,
     sign: Sign = None,
     request: RequestFile = None,
@@ -210,6 +218,7 @@ def prove(
 
 
 @ledger.command()
+@answers("toolkit.lab.decision_answer_types:CheckLedgerAnswer")
 def check(
     against: Annotated[
         Path,
@@ -234,10 +243,10 @@ def check(
     from toolkit.lab.stamping import stamp_of
 
     registry = _registry(calibrations, home)
-    named, comparison = check_against(registry, instrument, against)
+    concerned, comparison = check_against(registry, instrument, against)
     stamp = stamp_of(against, trusted(registry.folder.parent / TRUST))
     text = f"{comparison.continuity}: {comparison.why}"
-    payload = {"instrument": named, "ledger": comparison.continuity, "why": comparison.why}
+    payload = {"instrument": concerned, "ledger": comparison.continuity, "why": comparison.why}
     if stamp is not None:
         text += f"\n{stamp.text}"
         payload["time_stamp"] = f"{stamp.at:%Y-%m-%dT%H:%M:%SZ}"
@@ -247,6 +256,7 @@ def check(
 
 
 @ledger.command()
+@answers("toolkit.lab.decision_answer_types:WitnessAnswer")
 def witness(
     instrument: Instrument,
     folder: Annotated[

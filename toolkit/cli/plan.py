@@ -9,7 +9,18 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, KnownAt, Quiet, answer, day, exit_code, into_folder
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Json,
+    KnownAt,
+    Quiet,
+    answer,
+    answers,
+    day,
+    exit_code,
+    into_folder,
+)
 from toolkit.errors import ConfigError
 
 app = typer.Typer(help="Plans: what to measure next: sessions, tests, runs, intervals.", no_args_is_help=True)
@@ -21,6 +32,7 @@ Out = Annotated[
 
 
 @app.command("session")
+@answers("toolkit.lab.simulation_answer_types:PlanSessionAnswer")
 def session(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as m15: its record in force is the basis.")
@@ -99,6 +111,7 @@ def session(
 
 
 @app.command("interval")
+@answers("toolkit.lab.simulation_answer_types:PlanIntervalAnswer")
 def interval(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as m15: by the history of its check loads.")

@@ -20,6 +20,7 @@ from toolkit.cli.console import (
     Processes,
     Quiet,
     answer,
+    answers,
     into_folder,
     progress,
 )
@@ -27,6 +28,7 @@ from toolkit.cli.plan import app
 
 
 @app.command("test")
+@answers("toolkit.lab.simulation_answer_types:PlanTestAnswer")
 def protocol(
     like: Annotated[
         Path | None,
@@ -97,6 +99,7 @@ def protocol(
 
 
 @app.command("next")
+@answers("toolkit.lab.simulation_answer_types:PlanNextAnswer")
 def following(
     source: Annotated[
         Path,

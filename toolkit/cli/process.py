@@ -20,6 +20,7 @@ from toolkit.cli.console import (
     Reader,
     Units,
     answer,
+    answers,
     day,
     exit_code,
     into_file,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 NAME = "process"
 
 
+@answers("toolkit.lab.tire_answer_types:ProcessAnswer")
 def command(
     test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
     calibration: CalibrationId = None,
@@ -64,7 +66,7 @@ def command(
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
-    chosen, style = choose_reader(reader), unit_choice(units)
+    engine, style = choose_reader(reader), unit_choice(units)
     if out is not None:
         refuse_original(out, suffix=".xlsx")
     started = time.perf_counter()
@@ -76,7 +78,7 @@ def command(
             home=home,
             known_at=day(known_at),
             draft=draft,
-            reader=chosen,
+            reader=engine,
             protocol=protocol,
             step=step,
         )

@@ -24,6 +24,7 @@ from toolkit.cli.console import (
     Sign,
     TimeStamp,
     answer,
+    answers,
     ask_passphrase,
     day,
     into_folder,
@@ -35,6 +36,7 @@ from toolkit.cli.console import reader as choose_reader
 NAME = "report"
 
 
+@answers("toolkit.lab.document_answer_types:ReportForms")
 def command(
     tests: Annotated[
         list[Path],
@@ -111,7 +113,7 @@ def command(
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
+        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
     ] = False,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep a report that was not verified in rejected/ of the folder.")
@@ -134,7 +136,7 @@ def command(
     from toolkit.report.drawer import Drawer
     from toolkit.report.word.office import Office
 
-    chosen = choose_reader(reader)
+    engine = choose_reader(reader)
     started = time.perf_counter()
     issuing = None
     if issue or sign or seal is not None or time_stamp is not None or os.environ.get("TOOLKIT_SEAL_KEY"):
@@ -158,7 +160,7 @@ def command(
         from toolkit.report.word.package import read_template
 
         compared = model_choice(models) if models else ()
-        shown = None if units is None else unit_choice(units)
+        style = None if units is None else unit_choice(units)
         answer_and_file = diagnosis_of(diagnosis, by, tests)
         # The template is judged before anything is read: its error must not wait for a long reduction.
         opened = read_template(template or home_template("org.docx", home))
@@ -171,7 +173,7 @@ def command(
                 home=home,
                 known_at=day(known_at),
                 draft=draft,
-                reader=chosen,
+                reader=engine,
                 protocol=protocol,
                 step=step,
             ),
@@ -180,7 +182,7 @@ def command(
             tydex=tydex or hand_over,
             tir=tir or hand_over,
             models=compared,
-            units=shown,
+            units=style,
             diagnosis=answer_and_file,
             allow_missing=allow_missing,
             keep=keep,

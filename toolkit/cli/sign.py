@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, ask_passphrase, into_file
+from toolkit.cli.console import Json, Quiet, answer, answers, ask_passphrase, into_file
 from toolkit.errors import ConfigError
 
 NAME = "sign"
 
 
+@answers("toolkit.lab.decision_answer_types:SignAnswer")
 def command(
     request: Annotated[Path, typer.Argument(help="What --request wrote, or the answer of another person.")],
     key: Annotated[
@@ -30,7 +31,7 @@ def command(
         int | None, typer.Option("--passphrase-fd", help="File descriptor that gives the key's passphrase.")
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Sign without being asked, where no terminal is.")
+        bool, typer.Option("--yes", help="Sign without asking, for use without a terminal.")
     ] = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -66,8 +67,8 @@ def command(
     return 0
 
 
-def _usage(where: str, got: str, expected: str) -> ConfigError:
+def _usage(where: str, actual: str, expected: str) -> ConfigError:
     return ConfigError(
-        "it is not clear how to sign", where=where, got=got, expected=expected,
+        "it is not clear how to sign", where=where, got=actual, expected=expected,
         next_step="see 'toolkit sign --help'; nothing was signed", rule="usage",
     )  # fmt: skip

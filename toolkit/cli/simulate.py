@@ -16,6 +16,7 @@ from toolkit.cli.console import (
     Processes,
     Quiet,
     answer,
+    answers,
     exit_code,
     into_folder,
 )
@@ -23,6 +24,7 @@ from toolkit.cli.console import (
 NAME = "simulate"
 
 
+@answers("toolkit.lab.simulation_answer_types:SimulateForms")
 def command(
     plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="What the machine does, and what it is.")],
     out: Annotated[

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer
+from toolkit.cli.console import Json, Quiet, answer, answers
 
 NEW = "new"
 _FILE = typer.Argument(metavar="FILE", help="A new .toml file; nothing is written over.")
@@ -43,6 +43,7 @@ def _group() -> None:
 
 
 @session.command(NEW)
+@answers("toolkit.lab.installation_answer_types:StarterAnswer")
 def new_session(
     file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
     json: Json = False, quiet: Quiet = False,
@@ -54,6 +55,7 @@ def new_session(
     return _begin("session", file, entries, recording, ask=ask, json=json, quiet=quiet)
 
 
+@answers("toolkit.lab.installation_answer_types:StarterAnswer")
 def new_machine(
     file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
     json: Json = False, quiet: Quiet = False,
@@ -66,6 +68,7 @@ def new_machine(
 
 
 @test.command(NEW)
+@answers("toolkit.lab.installation_answer_types:StarterAnswer")
 def new_test(
     file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
     quiet: Quiet = False,
@@ -78,6 +81,7 @@ def new_test(
 
 
 @case.command(NEW)
+@answers("toolkit.lab.installation_answer_types:StarterAnswer")
 def new_case(
     file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
     quiet: Quiet = False,
@@ -89,6 +93,7 @@ def new_case(
     return _begin("case", file, entries, None, ask=ask, json=json, quiet=quiet)
 
 
+@answers("toolkit.lab.installation_answer_types:StarterAnswer")
 def new_plan(
     file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
     quiet: Quiet = False,

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, into_file
+from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, answers, into_file
 
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @app.command("check")
+@answers("toolkit.lab.document_answer_types:TemplateCheckAnswer")
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Word template, .docx or .dotx.")],
     json: Json = False,
@@ -46,6 +47,7 @@ def check(
 
 
 @app.command("tags")
+@answers("toolkit.lab.document_answer_types:TagsAnswer")
 def tags(
     test: Annotated[
         Path | None, typer.Option("--test", help="Show which tags this test has, and their values.")
@@ -113,6 +115,7 @@ def tags(
 
 
 @app.command("words")
+@answers("toolkit.lab.document_answer_types:WordsAnswer")
 def words(
     language: Annotated[
         str | None, typer.Option("--language", help="This language alone; default: all but English.")
@@ -133,30 +136,33 @@ def words(
     from toolkit.words.catalogue import SOURCE, languages, phrases
     from toolkit.words.phrasebook import phrasebook
 
-    others = [name for name in languages() if name != SOURCE]
-    if language is not None and language not in others:
-        raise typer.BadParameter(", ".join(others), param_hint="--language")
-    chosen = others if language is None else [language]
+    translated = [name for name in languages() if name != SOURCE]
+    if language is not None and language not in translated:
+        raise typer.BadParameter(", ".join(translated), param_hint="--language")
+    listed_languages = translated if language is None else [language]
     listed: list[str] = list(phrases(SOURCE))
     if template is not None:
         texts = fixed_texts(stories(open_package(read_template(template))))
         listed = list(dict.fromkeys(phrase_of(text.text or "") for text in texts))
-    books = {name: phrasebook(name) for name in chosen}
+    books = {name: phrasebook(name) for name in listed_languages}
     rows = [
         {"phrase": phrase} | {name: book.say(phrase) for name, book in books.items() if book.knows(phrase)}
         for phrase in listed
     ]
     missing = [
-        {"language": name, "phrase": row["phrase"]} for row in rows for name in chosen if name not in row
+        {"language": name, "phrase": row["phrase"]}
+        for row in rows
+        for name in listed_languages
+        if name not in row
     ]
     lines = [
         f"{'' if name == 'phrase' else f'  {name}  '}{row.get(name, 'MISSING')}"
         for row in rows
-        for name in ("phrase", *chosen)
+        for name in ("phrase", *listed_languages)
     ]
     lines.append(f"{len(rows)} phrases, {len(missing)} translations missing")
     answer(
-        {"languages": chosen, "phrases": rows, "missing": missing},
+        {"languages": listed_languages, "phrases": rows, "missing": missing},
         "\n".join(lines),
         as_json=json,
         quiet=quiet,
@@ -165,6 +171,7 @@ def words(
 
 
 @app.command("new")
+@answers("toolkit.lab.document_answer_types:NewTemplateAnswer")
 def new(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", callback=into_file, help="Where to write it: NAME.docx.")

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, answers
 
 NAME = "verify"
 
 
+@answers("toolkit.lab.decision_answer_types:VerifyForms")
 def command(
     files: Annotated[
         list[Path],
@@ -36,6 +37,7 @@ def command(
     """
     from functools import partial
 
+    from toolkit.declared import json_value
     from toolkit.lab.home import registry_if_any
     from toolkit.lab.proofs import registry_ledger
     from toolkit.lab.sealing import home_trust
@@ -45,7 +47,7 @@ def command(
     trust = with_files(home_trust(home), trusted or [])
     ledger = registry_ledger(partial(registry_if_any, calibrations, home))
     verdicts = [verify_file(path, trust, ledger=ledger) for path in files]
-    rows = [verdict.as_dict() for verdict in verdicts]
+    rows = [json_value(verdict) for verdict in verdicts]
     payload = {**(rows[0] if len(rows) == 1 else {}), "files": rows}
     answer(payload, "\n".join(verdict.line for verdict in verdicts), as_json=as_json, quiet=quiet)
     return max(verdict.code for verdict in verdicts)

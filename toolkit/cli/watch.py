@@ -11,11 +11,12 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, into_folder
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, answers, into_folder
 
 NAME = "watch"
 
 
+@answers("toolkit.lab.document_answer_types:WatchAnswer")
 def command(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", help="Folder in which tests arrive, each with test.toml.")
@@ -33,14 +34,15 @@ def command(
     once: Annotated[bool, typer.Option("--once", help="Look until nothing more arrives, then end.")] = False,
     interval: Annotated[float, typer.Option("--interval", min=0.05, help="Seconds between looks.")] = 2.0,
     settle: Annotated[
-        float, typer.Option("--settle", min=0.0, help="Files unchanged for so many seconds have arrived.")
+        float,
+        typer.Option("--settle", min=0.0, help="Seconds after which an unchanged file counts as complete."),
     ] = 3.0,
     patience: Annotated[
         float,
         typer.Option(
             "--patience",
             min=0.0,
-            help="Seconds without a change after which a test that is not whole is judged.",
+            help="Seconds without a change after which an incomplete test is judged.",
         ),
     ] = 900.0,
     units: Annotated[
@@ -52,7 +54,7 @@ def command(
         ),
     ] = None,
     allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
+        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
     ] = False,
     calibrations: Calibrations = None,
     home: Home = None,
@@ -86,12 +88,12 @@ def command(
             "the folder to watch does not exist", where=folder, got="no folder", expected="a folder",
             next_step="check the path", rule="no-test",
         )  # fmt: skip
-    shown = None if units is None else unit_choice(units)
+    style = None if units is None else unit_choice(units)
     find_soffice()
     options = Options(
         template=read_template(template or home_template("org.docx", home)),
         resolve=partial(resolve_test, calibrations=calibrations, home=home),
-        units=shown,
+        units=style,
         allow_missing=allow_missing,
     )
     target = out or folder / "reports"
@@ -116,13 +118,13 @@ def command(
 @contextlib.contextmanager
 def _stopping() -> Iterator[list[int]]:
     """Yield a list that is no longer empty once the command was asked to end."""
-    asked: list[int] = []
+    signals: list[int] = []
     old = {
-        request: signal.signal(request, lambda number, _frame: asked.append(number))
+        request: signal.signal(request, lambda number, _frame: signals.append(number))
         for request in (signal.SIGTERM, signal.SIGINT)
     }
     try:
-        yield asked
+        yield signals
     finally:
         for number, handler in old.items():
             signal.signal(number, handler)

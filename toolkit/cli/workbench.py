@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer
+from toolkit.cli.console import Json, Quiet, answer, answers
 
 NAME = "open"
 
 
+@answers("toolkit.lab.installation_answer_types:OpenAnswer")
 def command(
     home: Annotated[
         Path | None,

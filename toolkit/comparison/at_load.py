@@ -56,7 +56,7 @@ def _through(rows: Sequence[Row], load_N: float) -> Uncertain:
     terms = []
     for row in rows:
         weight = math.prod(
-            (load_N - other.load_N) / (row.load_N - other.load_N) for other in rows if other is not row
+            (load_N - node.load_N) / (row.load_N - node.load_N) for node in rows if node is not row
         )
         terms.append((weight, row.number))
     return weighted(terms)

@@ -94,7 +94,7 @@ def compare(
     """
     _check(entries, mode, level)
     labelled = _labelled(entries)
-    chosen = mode or infer_mode(labelled)
+    kind = mode or infer_mode(labelled)
     table, left_out = differences(labelled, level=level)
     if not table:
         raise ConfigError(
@@ -105,7 +105,7 @@ def compare(
             next_step="compare tests whose loads overlap, in the same direction of rotation",
             rule="nothing-in-common",
         )
-    repeats = repeats_of(labelled, level=level) if chosen == "repeats" else None
+    repeats = repeats_of(labelled, level=level) if kind == "repeats" else None
     if reproducibility and (repeats is None or repeats.reproducibility is None):
         laboratories = {entry.condition("laboratory") for entry in labelled} - {None}
         listed = ", ".join(map(str, laboratories)) or "none named"
@@ -114,18 +114,18 @@ def compare(
             where="--reproducibility",
             got=f"tests of {len(laboratories)} laboratories ({listed})",
             expected="repeats of one tire in two laboratories or more, named in test.toml (laboratory = ...)",
-            next_step="leave the option away; repeatability and intermediate precision are given",
+            next_step="leave the option out; repeatability and intermediate precision are given",
             rule="no-other-laboratory",
         )
     return Comparison(
-        mode=chosen,
+        mode=kind,
         entries=labelled,
         level=level,
         differences=table,
         repeats=repeats,
         pattern=pattern_effects(labelled),
         left_out=left_out,
-        findings=tuple(_findings(labelled, chosen, repeats, stated=mode is not None)),
+        findings=tuple(_findings(labelled, kind, repeats, stated=mode is not None)),
     )
 
 
@@ -141,7 +141,7 @@ def infer_mode(entries: Sequence[Entry]) -> Mode:
 def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
     if len(entries) < 2:
         raise ConfigError(
-            "one thing cannot be compared", where="compare", got=f"{len(entries)} argument(s)",
+            "a comparison takes two tests or more", where="compare", got=f"{len(entries)} argument(s)",
             expected="two or more: tests, reduced tests, a maker's table", next_step="name another one",
             rule="too-few-entries",
         )  # fmt: skip

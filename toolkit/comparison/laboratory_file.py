@@ -136,12 +136,14 @@ def _number(path: Path, row: int, column: str, text: str, least: float = -math.i
     return value
 
 
-def _refuse_cell(path: Path, row: int, column: str, got: object, expected: str, rule: str) -> NoReturn:
+def _refuse_cell(path: Path, row: int, column: str, actual: object, expected: str, rule: str) -> NoReturn:
     where = f"{path}, row {row}" + (f", column {column}" if column else "")
     raise CellError(
-        "a row cannot be used", where=where, got=got, expected=expected, next_step="mend it", rule=rule
+        "a row cannot be used", where=where, got=actual, expected=expected, next_step="mend it", rule=rule
     )
 
 
-def _refuse_column(path: Path, rule: str, what: str, got: str, expected: str) -> NoReturn:
-    raise ColumnError(what, where=path, got=got, expected=expected, next_step="mend the header", rule=rule)
+def _refuse_column(path: Path, rule: str, problem: str, actual: str, expected: str) -> NoReturn:
+    raise ColumnError(
+        problem, where=path, got=actual, expected=expected, next_step="mend the header", rule=rule
+    )

@@ -70,18 +70,18 @@ def factors_of(entries: Sequence[Entry]) -> tuple[Factor, ...]:
     for name, listed in levels.items():
         stated = None not in listed
         varied = stated and len(set(listed)) > 1
-        same = tuple(
+        aliases = tuple(
             other for other, parts in split.items() if varied and other != name and parts == split[name]
         )
         if not stated:
             note = f"not stated by {sum(level is None for level in listed)} of {len(listed)} tests"
         elif not varied:
             note = "the same in all tests"
-        elif same:
-            note = f"changed together with {', '.join(same)}: what they add cannot be told apart"
+        elif aliases:
+            note = f"changed together with {', '.join(aliases)}: what they add cannot be told apart"
         else:
             note = None
-        factors.append(Factor(name=name, levels=listed, varied=varied, same_as=same, note=note))
+        factors.append(Factor(name=name, levels=listed, varied=varied, same_as=aliases, note=note))
     return tuple(factors)
 
 
@@ -122,7 +122,7 @@ def _within(values: NDArray[np.float64], levels: Sequence[Hashable]) -> tuple[fl
     """Return the pooled variance inside levels and its degrees of freedom."""
     squares, dof = 0.0, 0
     for level in set(levels):
-        members = values[[other == level for other in levels]]
+        members = values[[entry == level for entry in levels]]
         squares += float(np.sum((members - members.mean()) ** 2))
         dof += len(members) - 1
     return (squares / dof if dof else 0.0), dof
@@ -134,7 +134,7 @@ def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, fa
 
     N = len(values)
     sizes = np.array(
-        [sum(other == level for other in levels) for level in dict.fromkeys(levels)], dtype=float
+        [sum(entry == level for entry in levels) for level in dict.fromkeys(levels)], dtype=float
     )
     p = len(sizes)
     if p == N:
@@ -142,7 +142,7 @@ def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, fa
         s = float(values.std(ddof=1))
         return FactorSpread(factor=factor, levels=p, s=s, s_between=None, F=None, p=None)
     within, dof = _within(values, levels)
-    means = np.array([values[[other == level for other in levels]].mean() for level in dict.fromkeys(levels)])
+    means = np.array([values[[entry == level for entry in levels]].mean() for level in dict.fromkeys(levels)])
     between = float(np.sum(sizes * (means - values.mean()) ** 2)) / (p - 1)
     n0 = (N - float(np.sum(sizes**2)) / N) / (p - 1)
     s_between = math.sqrt(max(0.0, (between - within) / n0))

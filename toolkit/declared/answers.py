@@ -1,6 +1,6 @@
 """Answers declared as typed dictionaries: the page that describes one, its schema, and what departs from it.
 
-An answer is what a command prints with ``--json``. The function that makes it returns a `TypedDict`, so that
+An answer is what a command prints with ``--json``. The function that builds it returns a `TypedDict`, so that
 the type checker holds its keys and values to the declaration; page and schema are of the same lines:
 
 >>> from typing import Annotated, TypedDict
@@ -9,6 +9,10 @@ the type checker holds its keys and values to the declaration; page and schema a
 ...     FY_N: Annotated[float, "lateral force"]
 ...     at_rad: Annotated[float | None, "slip angle; null where the peak was not reached"]
 >>> print(answer_reference(Peak))
+[`Peak`](#peak).
+<BLANKLINE>
+### Peak
+<BLANKLINE>
 The largest force.
 <BLANKLINE>
 | key | holds | meaning |
@@ -20,18 +24,24 @@ The largest force.
 ["FY_N: 'much' is no number", 'at_rad: missing']
 
 A text beside a type in ``Annotated`` says what the entry means. Keys that not every answer has are
-`NotRequired`.
+`NotRequired`. A dataclass that `declared.answer` prints declares its answer as it is; `merged` joins the keys
+of several declarations, and an answer of several forms is a union of them.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import datetime as dt
 import inspect
 import pathlib
+import re
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, is_typeddict
+from typing import Annotated, Any, Literal, TypedDict, Union, get_args, get_origin, is_typeddict
+
+from toolkit.declared.declaration import keys_of
+from toolkit.declared.marks import Entry
 
 _WORDS: dict[Any, tuple[str, str]] = {
     str: ("text", "string"),
@@ -45,15 +55,30 @@ _WORDS: dict[Any, tuple[str, str]] = {
 """The word for people and the type of JSON of single values."""
 
 
-def answer_reference(cls: Any) -> str:
-    """Return the description of an answer, Markdown: a table of its keys, then one for each kind of entry."""
-    lines: list[str] = []
-    for number, (place, table) in enumerate(_tables(cls, "", {})):
-        lines += [f"## `{place}`", ""] if number else []
-        lines += [_summary(table), "", "| key | holds | meaning |", "|---|---|---|"]
+def merged(*tables: Any, name: str | None = None) -> Any:
+    """Return the declaration of an answer that has the keys of several; the text is the first's."""
+    entries = {
+        key: held if required else typing.NotRequired[held]
+        for table in reversed(tables)
+        for key, held, required in _entries(table)
+    }
+    joined = TypedDict(name or tables[0].__name__, entries)  # type: ignore[misc]
+    joined.__doc__ = tables[0].__doc__
+    return joined
+
+
+def answer_reference(cls: Any, *, described: dict[Any, None] | None = None) -> str:
+    """Return the description of an answer, Markdown: its name, then a table of keys for each kind of entry.
+
+    Kinds of entries in ``described`` are not described again; those that are enter it.
+    """
+    lines = [f"{_linked(cls)}.", ""]
+    for place, table in tables_of(cls, described=described):
+        lines += [f"### {table.__name__}", "", (f"`{place}`: " if place else "") + _summary(table), ""]
+        lines += ["| key | holds | meaning |", "|---|---|---|"]
         for key, annotation, required in _entries(table):
             held, meaning = _bare(annotation)
-            cells = (f"`{key}`", _words(held), ("" if required else "not always: ") + meaning)
+            cells = (f"`{key}`", _linked(held), ("" if required else "not always: ") + meaning)
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         lines.append("")
     return "\n".join(lines)
@@ -61,12 +86,17 @@ def answer_reference(cls: Any) -> str:
 
 def answer_schema(cls: Any) -> dict[str, Any]:
     """Return the JSON schema (2020-12) of an answer."""
-    definitions = {table.__name__: _table_schema(table) for _, table in _tables(cls, "", {})}
+    forms = [_table_schema(table, document=True) for _, table in _inner(cls, "")]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$ref": f"#/$defs/{cls.__name__}",
-        "$defs": definitions,
+        **(forms[0] if len(forms) == 1 else {"anyOf": forms}),
+        "$defs": {table.__name__: _table_schema(table) for _, table in tables_of(cls)},
     }
+
+
+def tables_of(cls: Any, *, described: dict[Any, None] | None = None) -> Iterator[tuple[str, Any]]:
+    """Yield each kind of entry of an answer with the place where it first stands, but for those described."""
+    return _tables(cls, "", {} if described is None else described)
 
 
 def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
@@ -75,7 +105,7 @@ def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
     origin, inner = get_origin(annotation), get_args(annotation)
     if annotation is Any:
         return
-    if is_typeddict(annotation) and isinstance(value, Mapping):
+    if _is_table(annotation) and isinstance(value, Mapping):
         entries = {key: (held, required) for key, held, required in _entries(annotation)}
         for key in (*entries, *(key for key in value if key not in entries)):
             path = f"{place}.{key}".lstrip(".")
@@ -114,7 +144,16 @@ def _holds(value: Any, annotation: Any) -> bool:
     return annotation in _WORDS and isinstance(value, annotation)
 
 
+def _is_table(annotation: Any) -> bool:
+    return is_typeddict(annotation) or (isinstance(annotation, type) and dataclasses.is_dataclass(annotation))
+
+
 def _entries(cls: Any) -> Iterator[tuple[str, Any, bool]]:
+    """Yield key, annotation and whether every answer has it."""
+    if not is_typeddict(cls):
+        hints = typing.get_type_hints(cls, include_extras=True)
+        yield from ((key, hints[name], True) for name, key in keys_of(cls))
+        return
     for key, annotation in typing.get_type_hints(cls, include_extras=True).items():
         # `__required_keys__` does not know the marks of annotations that are kept as texts.
         yield key, annotation, get_origin(annotation) is not typing.NotRequired
@@ -124,8 +163,12 @@ def _bare(annotation: Any) -> tuple[Any, str]:
     """Return an annotation without its marks, and the text beside it."""
     meaning = ""
     while get_origin(annotation) in (Annotated, typing.NotRequired, typing.Required):
-        meaning = meaning or next((m for m in get_args(annotation)[1:] if isinstance(m, str)), "")
+        marks = (mark.help if isinstance(mark, Entry) else mark for mark in get_args(annotation)[1:])
+        meaning = meaning or next((mark for mark in marks if isinstance(mark, str)), "")
         annotation = get_args(annotation)[0]
+    if _is_table(annotation) and callable(as_dict := getattr(annotation, "as_dict", None)):
+        # An object that says how it is printed is declared by that.
+        annotation = typing.get_type_hints(as_dict, include_extras=True)["return"]
     return annotation, meaning
 
 
@@ -134,7 +177,7 @@ def _is_mapping(origin: Any) -> bool:
 
 
 def _is_list(origin: Any) -> bool:
-    return isinstance(origin, type) and issubclass(origin, Sequence | Iterator)
+    return isinstance(origin, type) and issubclass(origin, Sequence | Iterator | frozenset)
 
 
 def _words(annotation: Any) -> str:
@@ -142,23 +185,34 @@ def _words(annotation: Any) -> str:
     origin, inner = get_origin(annotation), get_args(annotation)
     if annotation is Any:
         return "any value"
-    if is_typeddict(annotation):
+    if _is_table(annotation):
         return f"`{annotation.__name__}`"
     if origin in (Union, types.UnionType):
         return " or ".join(map(_words, inner))
     if origin is Literal:
         return " or ".join(f'"{word}"' if isinstance(word, str) else str(word) for word in inner)
     if _is_mapping(origin):
-        return f"by name: {_words(inner[1])}"
+        return f"by name: {_grouped(inner[1])}"
     if origin is tuple and inner[-1] is not Ellipsis:
         return f"[{', '.join(map(_words, inner))}]"
     if _is_list(origin):
-        return f"list of {_words(inner[0])}"
+        return f"list of {_grouped(inner[0])}"
     return _WORDS[annotation][0]
 
 
-def _table_schema(cls: Any) -> dict[str, Any]:
-    properties, required = {}, []
+def _grouped(annotation: Any) -> str:
+    words = _words(annotation)
+    return f"({words})" if " or " in words else words
+
+
+def _linked(annotation: Any) -> str:
+    return re.sub(r"`(\w+)`", lambda name: f"[{name[0]}](#{name[1].lower()})", _words(annotation))
+
+
+def _table_schema(cls: Any, *, document: bool = False) -> dict[str, Any]:
+    """Return the schema of a table; a document begins with ``"schema": 1``."""
+    properties: dict[str, Any] = {"schema": {"const": 1}} if document else {}
+    required = list(properties)
     for key, annotation, always in _entries(cls):
         held, meaning = _bare(annotation)
         properties[key] = ({"description": meaning} if meaning else {}) | _schema(held)
@@ -174,7 +228,7 @@ def _schema(annotation: Any) -> dict[str, Any]:
     origin, inner = get_origin(annotation), get_args(annotation)
     if annotation is Any:
         return {}
-    if is_typeddict(annotation):
+    if _is_table(annotation):
         return {"$ref": f"#/$defs/{annotation.__name__}"}
     if origin in (Union, types.UnionType):
         return {"anyOf": [_schema(form) for form in inner]}
@@ -190,11 +244,15 @@ def _schema(annotation: Any) -> dict[str, Any]:
 
 
 def _tables(cls: Any, place: str, described: dict[Any, None]) -> Iterator[tuple[str, Any]]:
-    """Yield every typed dictionary of an answer with the place where it first stands."""
+    """Yield every table of an answer with the place where it first stands; its forms first."""
+    if not _is_table(cls):
+        for path, table in _inner(cls, place):
+            yield from _tables(table, path, described)
+        return
     if cls in described:
         return
     described[cls] = None
-    yield place or cls.__name__, cls
+    yield place, cls
     for key, annotation, _ in _entries(cls):
         for path, table in _inner(annotation, f"{place}.{key}".lstrip(".")):
             yield from _tables(table, path, described)
@@ -203,7 +261,7 @@ def _tables(cls: Any, place: str, described: dict[Any, None]) -> Iterator[tuple[
 def _inner(annotation: Any, place: str) -> Iterator[tuple[str, Any]]:
     annotation = _bare(annotation)[0]
     origin = get_origin(annotation)
-    if is_typeddict(annotation):
+    if _is_table(annotation):
         yield place, annotation
         return
     path = f"{place}.NAME" if _is_mapping(origin) else f"{place}[]" if _is_list(origin) else place

@@ -165,8 +165,8 @@ class Effect:
     def confining(self, conditions: Iterable[str]) -> tuple[str, ...]:
         """Return those of some conditions' names by which the effect may be confined to some runs."""
         present = dict.fromkeys(conditions)
-        others = (key for key in present if key not in _CONDITIONS) if ANY_OTHER in self.confined_by else ()
-        return (*(key for key in self.confined_by if key in present), *others)
+        further = (key for key in present if key not in _CONDITIONS) if ANY_OTHER in self.confined_by else ()
+        return (*(key for key in self.confined_by if key in present), *further)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -204,8 +204,8 @@ class Effect:
             if parameter.needless is not None and parameter.needless(case):
                 equation = parameter.equation_without or equation
                 continue
-            most = None if parameter.most is None else parameter.most(case)
+            limit = None if parameter.most is None else parameter.most(case)
             parameters.append(
-                parameter if most is None else replace(parameter, bounds=(parameter.bounds[0], most))
+                parameter if limit is None else replace(parameter, bounds=(parameter.bounds[0], limit))
             )
         return replace(self, equation=equation, parameters=tuple(parameters))

@@ -1,51 +1,41 @@
 """What the commands answer with ``--json``: the declaration of each command's keys.
 
-The functions that make an answer return these types, so that the type checker holds them to the declaration;
-`docs/answers.md` is printed from it. Every answer begins with ``"schema": 1``. Numbers are in the unit that
-the key ends with, in SI and in the axes that the answer names; a number that does not exist is null.
+A command names its type where it is defined (`toolkit.cli.console.answers`), mostly that of the function
+which builds the answer, so that the type checker holds it to the declaration; `docs/answers.md` is printed
+from it. Every answer begins with ``"schema": 1``. Numbers are in the unit that the key ends with, in SI and
+in the axes that the answer names; a number that does not exist is null.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 from toolkit.declared.answers import answer_schema
 from toolkit.errors import ConfigError
-from toolkit.lab.record_answer_types import (
-    CalibrateAnswer,
-    HistoryAnswer,
-    InspectAnswer,
-    ListAnswer,
-    ShowAnswer,
-)
-from toolkit.lab.tire_answer_types import CompareAnswer, FitAnswer, ProcessAnswer
-
-ANSWERS: Mapping[str, Any] = {
-    "inspect": InspectAnswer,
-    "calibrate": CalibrateAnswer,
-    "calibration list": ListAnswer,
-    "calibration show": ShowAnswer,
-    "calibration history": HistoryAnswer,
-    "process": ProcessAnswer,
-    "fit": FitAnswer,
-    "compare": CompareAnswer,
-}
-"""The declared answers by command."""
 
 
-def schema_text(command: str) -> str:
-    """Return the JSON schema of a command's answer as text.
+def declared_type(declaration: Any) -> Any:
+    """Return the type that a declaration stands for, imported where it is ``module:name``."""
+    if not isinstance(declaration, str):
+        return declaration
+    module, _, name = declaration.partition(":")
+    return getattr(import_module(module), name)
+
+
+def schema_text(command: str, declared: Mapping[str, Any]) -> str:
+    """Return the JSON schema of a command's answer as text; ``declared`` has the declarations by command.
 
     Raises
     ------
     ConfigError
-        ``usage``: its answer is not declared; those that are are named
+        ``usage``: there is no such command; those that answer are named
     """
-    if command not in ANSWERS:
+    if command not in declared:
         raise ConfigError(
-            "no answer of such a command is declared", where="--answer", got=command,
-            expected=" | ".join(ANSWERS), next_step="choose one of them", rule="usage",
+            "no such command answers in JSON", where="--answer", got=command,
+            expected=" | ".join(declared), next_step="choose one of them", rule="usage",
         )  # fmt: skip
-    return json.dumps(answer_schema(ANSWERS[command]), indent=2, ensure_ascii=False)
+    return json.dumps(answer_schema(declared_type(declared[command])), indent=2, ensure_ascii=False)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.lab.control_answer_types import AppliedRange, ApplyAnswer
     from toolkit.lab.record import Loads, Record
 
 Table = Mapping[str, "NDArray[Any]"]
@@ -66,7 +67,7 @@ def _parquet(data: bytes, path: Path) -> Vectors:
     vectors = [
         Vector(name=name, unit=None, values=values) for name, values in zip(names, columns, strict=True)
     ]
-    return Vectors(where=str(path), vectors=[one for one in vectors if one.values.dtype.kind != "O"])
+    return Vectors(where=str(path), vectors=[vector for vector in vectors if vector.values.dtype.kind != "O"])
 
 
 def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, NDArray[np.float64]]:
@@ -77,11 +78,11 @@ def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, NDArray
     ConfigError
         ``doubled-column``: the file has a column of a load already
     """
-    columns = {f"{one.symbol} [{one.unit}]": one.values for one in series}
-    taken = {one.symbol for one in series} & set(loads.value)
-    if taken:
+    columns = {f"{column.symbol} [{column.unit}]": column.values for column in series}
+    clash = {column.symbol for column in series} & set(loads.value)
+    if clash:
         raise ConfigError(
-            "the file has columns of loads already", where=", ".join(sorted(taken)),
+            "the file has columns of loads already", where=", ".join(sorted(clash)),
             got="a column in the file", expected="indications, and other columns of other names",
             next_step="take it out of a copy of the file, or rename it there", rule="doubled-column",
         )  # fmt: skip
@@ -196,7 +197,7 @@ WRITERS: dict[str, Callable[[Table, CalibrationUse], bytes]] = {
 
 def apply_answer(
     record: Record, source: Path, out: Path, *, tare: Mapping[str, float] | None, draft: bool
-) -> tuple[dict[str, Any], str, Loads]:
+) -> tuple[ApplyAnswer, str, Loads]:
     """Compute a file's loads by a record and write them; return both forms of the answer, and the loads."""
     from toolkit.lab.answers import finding_lines
 
@@ -209,7 +210,7 @@ def apply_answer(
     write_applied(out, applied_columns(series, loads), loads.use)
     ranges = {name: _range(loads, name) for name in loads.value}
     rows = len(series[0].values)
-    payload = {
+    payload: ApplyAnswer = {
         "out": out, "rows": rows, "calibration": loads.use.as_dict(), "mark": loads.use.mark, "loads": ranges,
         "findings": [finding.as_dict() for finding in loads.findings],
     }  # fmt: skip
@@ -220,7 +221,7 @@ def apply_answer(
     return payload, "\n".join(lines), loads
 
 
-def _range(loads: Loads, name: str) -> dict[str, Any]:
+def _range(loads: Loads, name: str) -> AppliedRange:
     values, U = loads.value[name], loads.U[name]
     return {
         "unit": loads.units[name], "least": float(values.min()), "largest": float(values.max()),

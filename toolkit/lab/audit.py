@@ -171,9 +171,11 @@ def write_folder(
             lines.write(json.dumps(head).encode() + b"\n")
             linked = answer.linked is not None
             files = (
-                (json.dumps(one).encode() for one in files_of(answer)) if linked else answer.made.files.raw()
+                (json.dumps(line).encode() for line in files_of(answer))
+                if linked
+                else answer.made.files.raw()
             )
-            lines.writelines(one + b"\n" for one in files)
+            lines.writelines(line + b"\n" for line in files)
         write_page(stage / PAGE, view)
         if template is None:
             return out / PAGE, out / LINES

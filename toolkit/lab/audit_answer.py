@@ -112,13 +112,15 @@ def text_of(answer: AuditAnswer, *, width: int = 80) -> str:
 def _table(rows: list[list[str]], width: int) -> list[str]:
     """Return the table of files; what is the same for all of them stands below it."""
     header, align = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"], "<<<<<>>"
-    same = [
+    constant = [
         len(rows) > 1 and side == "<" and len({row[at] for row in rows}) == 1 for at, side in enumerate(align)
     ]
-    kept = [at for at, alone in enumerate(same) if not alone]
-    cells = [[row[at] for at in kept] for row in rows]
-    lines = [table([header[at] for at in kept], cells, align="".join(align[at] for at in kept), width=width)]
-    common = [f"{header[at]} {rows[0][at]}" for at, alone in enumerate(same) if alone and rows[0][at]]
+    columns = [at for at, alone in enumerate(constant) if not alone]
+    cells = [[row[at] for at in columns] for row in rows]
+    lines = [
+        table([header[at] for at in columns], cells, align="".join(align[at] for at in columns), width=width)
+    ]
+    common = [f"{header[at]} {rows[0][at]}" for at, alone in enumerate(constant) if alone and rows[0][at]]
     return [*lines, *textwrap.wrap(f"all of them: {', '.join(common)}", width)] if common else lines
 
 
@@ -170,13 +172,13 @@ def _asked(answer: AuditAnswer, width: int) -> Iterator[str]:
 
 
 def _rows(audit: ArchiveAudit) -> Iterator[list[str]]:
-    shown = 0
+    listed = 0
     for file in audit.files.plain():
         if file["grade"] in CLEAN:
             continue
-        if shown == _SHOWN:
+        if listed == _SHOWN:
             return
-        shown += 1
+        listed += 1
         repair = file["repair"] or {"FY_max_abs_N": None, "MZ_max_abs_Nm": None}
         FY, MZ = repair["FY_max_abs_N"], repair["MZ_max_abs_Nm"]
         yield [

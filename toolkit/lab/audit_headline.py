@@ -49,14 +49,14 @@ class Headline:
             parts += [self._size(), f"cause: {self._cause()}", self._since()]
         if self.impossible:
             verb = "holds" if self.impossible == 1 else "hold"
-            more = " more" if self.wrong else ""
-            parts.append(f"{_files(self.impossible)}{more} {verb} an Fy or Mz that no tire has")
+            further = " more" if self.wrong else ""
+            parts.append(f"{_files(self.impossible)}{further} {verb} an Fy or Mz that no tire has")
         if not (self.wrong or self.unjudged or self.impossible):
-            what = "The file carries" if readable == 1 else f"All {readable} files carry"
-            parts.append(f"{what} the values of the record in force")
+            subject = "The file carries" if readable == 1 else f"All {readable} files carry"
+            parts.append(f"{subject} the values of the record in force")
         if self.unjudged:
-            more = " more" if self.wrong else ""
-            parts.append(f"{_files(self.unjudged)}{more} cannot be judged: no record in force is known")
+            further = " more" if self.wrong else ""
+            parts.append(f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known")
         if self.unreadable:
             parts.append(f"{_files(self.unreadable)} cannot be read")
         return "; ".join(parts)
@@ -71,9 +71,9 @@ class Headline:
     def _cause(self) -> str:
         if len(self.causes) == 1:
             return self.causes[0][0]
-        named = [f"{cause} ({count})" for cause, count in self.causes[:_CAUSES]]
-        left = sum(count for _, count in self.causes[_CAUSES:])
-        return ", ".join(named) + (f", others ({left})" if left else "")
+        counted = [f"{cause} ({count})" for cause, count in self.causes[:_CAUSES]]
+        remaining = sum(count for _, count in self.causes[_CAUSES:])
+        return ", ".join(counted) + (f", others ({remaining})" if remaining else "")
 
     def _since(self) -> str:
         if self.first is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.findings import Finding
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
     from toolkit.calibration.uncertainty.model import Budget, Temperature
     from toolkit.calibration.uncertainty.monte_carlo import MonteCarlo
+    from toolkit.lab.control_answer_types import BudgetAnswer, LoadBudget
 
 RANGE_POINTS = 11
 
@@ -42,7 +43,7 @@ class BudgetOrder:
 
 def budget_answer(
     registry: Registry, record_id: str, order: BudgetOrder
-) -> tuple[dict[str, Any], str, list[Finding]]:
+) -> tuple[BudgetAnswer, str, list[Finding]]:
     """Return the budgets of a record's loads as JSON, as text, and their findings.
 
     Raises
@@ -87,7 +88,7 @@ def budget_answer(
         from toolkit.report.calibration.chart_figures import write_figure
 
         written = write_figure(order.figure, budgets[0][0], budgets[0][1])
-    payload = {
+    payload: BudgetAnswer = {
         "record": record_id,
         "sha256": record.sha256,
         "loads": {budget.load: _payload(budget, curve, result) for budget, curve, result in budgets},
@@ -144,7 +145,7 @@ def _not_validated(record: CalibrationRecord, budget: Budget, result: MonteCarlo
     return [Finding(rule="monte-carlo", where=f"{record.id}, {budget.load}", message=why)]
 
 
-def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> dict[str, Any]:
+def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> LoadBudget:
     from toolkit.estimate import round_uncertainty
 
     return {
@@ -282,10 +283,12 @@ def temperature_of(span: float | None, coefficient: float | None) -> Temperature
 
 
 def _wrong(
-    what: str,
+    problem: str,
     where: str,
-    got: object,
+    actual: object,
     expected: str,
     next_step: str = "see 'toolkit calibration budget --help'",
 ) -> ToolkitError:
-    return ConfigError(what, where=where, got=got, expected=expected, next_step=next_step, rule="budget")
+    return ConfigError(
+        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="budget"
+    )

@@ -122,8 +122,7 @@ def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
 
 
 def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, list[Finding]]:
-    from toolkit.comparison.maker_characteristics import is_characteristics_table, maker_characteristics
-    from toolkit.comparison.maker_table import maker_rows
+    from toolkit.comparison.maker_table import is_characteristics_table, maker_characteristics, maker_rows
     from toolkit.comparison.model import Entry
     from toolkit.files import sha256_file
 

@@ -167,18 +167,18 @@ def comparison_text(
 def _conditions(comparison: Comparison) -> str:
     """Return what the entries state: what differs as a table, what is the same in one line each."""
     names = dict.fromkeys(name for entry in comparison.entries for name, value in entry.conditions if value)
-    rows, same = [], []
+    rows, shared = [], []
     for name in names:
         values = [entry.condition(name) for entry in comparison.entries]
         if len(set(values)) == 1:
-            same.append(f"{name}: {values[0]}")
+            shared.append(f"{name}: {values[0]}")
         else:
             rows.append([name, *(str(value or "-") for value in values)])
     head = table(
         ["", *(entry.label for entry in comparison.entries)], rows, align="<" * (len(comparison.entries) + 1)
     )
     return "\n".join(
-        one for one in (head, "the same in all:" if same else "", *(f"  {s}" for s in same)) if one
+        line for line in (head, "the same in all:" if shared else "", *(f"  {s}" for s in shared)) if line
     )
 
 
@@ -186,10 +186,10 @@ def _table(rows: Sequence[Difference], style: Style) -> str:
     from toolkit.report.comparison.cells import named, p_text, shown_unit, with_U
 
     load_unit, load_factor = style.unit("N")
-    shown = []
+    cells = []
     for row in rows:
         unit, factor = shown_unit(row.name, style)
-        shown.append(
+        cells.append(
             [
                 named(row.name, row.rotation, row.SA_rad),
                 f"{row.load_N * load_factor:.0f}",
@@ -203,7 +203,7 @@ def _table(rows: Sequence[Difference], style: Style) -> str:
             ]
         )
     head = ["quantity", f"FZ [{load_unit}]", "unit", "reference", "other", "value", "difference", "p (Holm)"]
-    return table([*head, ""], shown, align="<><><>>><")
+    return table([*head, ""], cells, align="<><><>>><")
 
 
 def _factors(comparison: Comparison) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
@@ -17,13 +17,12 @@ if TYPE_CHECKING:
     from toolkit.calibration.standards.e74 import E74Result
     from toolkit.calibration.standards.evaluation import Evaluation
     from toolkit.calibration.standards.iso376 import Iso376Result
-
-Answer = tuple[dict[str, Any], str, list[Finding]]
+    from toolkit.lab.control_answer_types import ChartAnswer, ChartSeries, DueAnswer, DueInstrument
 
 
 def chart_answer(
     registry: Registry, instrument: str, *, load: str | None, baseline: int | None, out: Path | None
-) -> Answer:
+) -> tuple[ChartAnswer, str, list[Finding]]:
     """Return the control charts of an instrument as JSON, as text, and their findings; draw them to ``out``.
 
     Raises
@@ -71,7 +70,7 @@ def chart_answer(
         text.append("limits of fewer than 20 sessions are provisional")
     text += ["findings:", *finding_lines(findings)] if findings else []
     text += [f"picture: {out}"] if out else []
-    payload = {
+    payload: ChartAnswer = {
         "instrument": instrument,
         "series": [_series(series) for series in chart.series],
         "left_out": [{"id": record_id, "reason": why} for record_id, why in chart.left_out],
@@ -81,7 +80,9 @@ def chart_answer(
     return payload, "\n".join(text), list(findings)
 
 
-def due_answer(registry: Registry, instrument: str | None, date: dt.date) -> Answer:
+def due_answer(
+    registry: Registry, instrument: str | None, date: dt.date
+) -> tuple[DueAnswer, str, list[Finding]]:
     """Return when each instrument is due, as JSON, as text, and the findings.
 
     Raises
@@ -92,7 +93,7 @@ def due_answer(registry: Registry, instrument: str | None, date: dt.date) -> Ans
     from toolkit.calibration.control.recall import due_findings, due_of
     from toolkit.errors import ToolkitError
 
-    rows: list[dict[str, Any]] = []
+    rows: list[DueInstrument] = []
     findings: list[Finding] = []
     for name in [instrument] if instrument else registry.instruments():
         try:
@@ -109,7 +110,7 @@ def due_answer(registry: Registry, instrument: str | None, date: dt.date) -> Ans
         advice = due.recommendation
         rows.append({
             "instrument": name, "record": due.record, "session_date": due.session_date.isoformat(),
-            "recall": due.recall, "due": due.due and due.due.isoformat(), "days_left": due.days_left,
+            "recall": due.recall, "due": due.due.isoformat() if due.due else None, "days_left": due.days_left,
             "overdue": due.overdue,
             "recommended": {
                 "days": advice.days, "drift_per_year": advice.drift_per_year, "results": advice.results,
@@ -127,7 +128,11 @@ def due_answer(registry: Registry, instrument: str | None, date: dt.date) -> Ans
     ]  # fmt: skip
     lines += [f"{r['instrument']}: {r['recommended']['reason']}" for r in rows]
     lines += ["findings:", *finding_lines(findings)] if findings else []
-    payload = {"on": date.isoformat(), "instruments": rows, "findings": [f.as_dict() for f in findings]}
+    payload: DueAnswer = {
+        "on": date.isoformat(),
+        "instruments": rows,
+        "findings": [f.as_dict() for f in findings],
+    }
     return payload, "\n".join(lines), findings
 
 
@@ -142,7 +147,7 @@ def _row(series: Series) -> list[str]:
     ]  # fmt: skip
 
 
-def _series(series: Series) -> dict[str, Any]:
+def _series(series: Series) -> ChartSeries:
     limits = series.limits
     return {
         "load": series.load,
@@ -197,10 +202,10 @@ def _e74(result: E74Result, force: str, reading: str) -> list[str]:
          "-" if c.lack_of_fit is None else f"{c.lack_of_fit.p:.3g}"]
         for c in result.curves
     ]  # fmt: skip
-    chosen = "as asked for" if result.requested else "by the annex"
+    origin = "as asked for" if result.requested else "by the annex"
     return [
         f"{result.points} points at {result.levels} forces in {result.runs} runs; "
-        f"degree {result.degree} {chosen}",
+        f"degree {result.degree} {origin}",
         table(["degree", f"s_m [{reading}]", f"LLF [{force}]", "dof", "lack of fit F", "p"], rows),
         f"lower limit factor {result.llf:.6g} {force}",
         *(

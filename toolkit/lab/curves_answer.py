@@ -32,7 +32,7 @@ def curves_of_test(result: TestResult) -> dict[str, Any]:
     from toolkit.characteristics.groups import directions_of
     from toolkit.tires.evaluate import value_at
 
-    whole = {(point.file, point.first_row): point for point in result.characteristics.points}
+    by_row = {(point.file, point.first_row): point for point in result.characteristics.points}
     charts: dict[str, dict[str, Any]] = {
         "FY": _chart("SA [deg]", "FY [N]"),
         "MZ": _chart("SA [deg]", "MZ [N·m]"),
@@ -47,7 +47,7 @@ def curves_of_test(result: TestResult) -> dict[str, Any]:
         if rotation not in rotations:
             rotations.append(rotation)
         belongs = {"load": loads.index(group.load_N), "rotation": rotation, "load_N": group.load_N}
-        points = [whole[c.file, c.first_row] for c in group.conditions]
+        points = [by_row[c.file, c.first_row] for c in group.conditions]
         SA = [math.degrees(c.SA) for c in group.conditions]
         FY, MZ = ([float(v) for v in group.values(channel)] for channel in ("FY", "MZ"))
         U_FY, U_MZ = [K * p.u_FY for p in points], [K * p.u_MZ for p in points]
@@ -111,7 +111,7 @@ def shown_conditions(
 
 
 def _nearest(loads: Sequence[float], load: float) -> float:
-    return min(loads, key=lambda one: abs(one - load))
+    return min(loads, key=lambda candidate: abs(candidate - load))
 
 
 def _thin(values: Rows, step: int) -> list[float]:

@@ -249,9 +249,9 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
         lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
     for place in answer.mismatch:
         for at in place.where[:1]:
-            much = "over all of" if at.whole else "mostly where"
+            extent = "over all of" if at.whole else "mostly where"
             lines.append(
-                f"{place.channel}: mismatch {much} {at.variable}{',' if at.whole else ' is'} "
+                f"{place.channel}: mismatch {extent} {at.variable}{',' if at.whole else ' is'} "
                 f"{at.ends('{:.4g}'.format)} {at.unit}".rstrip()
             )
     rows = [

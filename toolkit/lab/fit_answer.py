@@ -203,11 +203,11 @@ def comparison_text(comparison: Comparison) -> str:
         lines.append([label, *errors, "-" if floor is None else f"{floor:.2f}"])
         away = [None if entry is None else entry.prediction_error_percent for entry in entries]
         if any(value is not None for value in away):
-            shown = ["-" if value is None else f"{value:.2f}" for value in away]
-            lines.append([f"  {channel}, load left out", *shown, ""])
+            cells = ["-" if value is None else f"{value:.2f}" for value in away]
+            lines.append([f"  {channel}, load left out", *cells, ""])
     if seconds := dict(comparison.seconds):
-        shown = [f"{seconds[model]:.2f}" if model in seconds else "-" for model in comparison.models]
-        lines.append(["time / s", *shown, ""])
+        cells = [f"{seconds[model]:.2f}" if model in seconds else "-" for model in comparison.models]
+        lines.append(["time / s", *cells, ""])
     header = ["error in %", *comparison.models, "floor"]
     note = (
         "100 sqrt(sum (model - measured)^2 / sum measured^2) over the rows fitted; floor: the rows about\n"
@@ -252,12 +252,12 @@ def _stiffness(slope: Estimate, fit: CurveFit | GlobalFit) -> str:
 
 def _value_and_error(value: float, error: float | None) -> list[str]:
     # In two columns of a table: the same two texts that stand beside each other elsewhere.
-    shown = plus_minus(value, math.nan if error is None else error, spec=".5g").split(" ± ")
-    return shown if len(shown) == 2 else [*shown, "-"]
+    parts = plus_minus(value, math.nan if error is None else error, spec=".5g").split(" ± ")
+    return parts if len(parts) == 2 else [*parts, "-"]
 
 
 def _line(fit: CurveFit, rotation: str | None) -> list[str]:
-    shown = [
+    cells = [
         f"({p.value:.4g})" if p.standard_error is None else plus_minus(p.value, p.standard_error)
         for p in fit.parameters
     ]
@@ -269,6 +269,6 @@ def _line(fit: CurveFit, rotation: str | None) -> list[str]:
         f"{fit.error_percent:.2f}",
         "-" if fit.scatter_floor_percent is None else f"{fit.scatter_floor_percent:.2f}",
         "-" if fit.slope_at_zero is None else _stiffness(fit.slope_at_zero, fit),
-        *shown,
+        *cells,
         "yes" if fit.converged else "no",
     ]

@@ -63,9 +63,9 @@ def gates_answer(registry: Registry, record_id: str) -> dict[str, Any]:
         }
         for result in judged.results
     ]
-    told = {result.rule for result in judged.results}
+    judged_rules = {result.rule for result in judged.results}
     for rule, need in GATES.items():
-        if rule not in told:
+        if rule not in judged_rules:
             judgeable = need is None or present[need]
             gates.append(
                 {

@@ -184,20 +184,22 @@ def _tydex(resolved: Resolved, path: Path) -> None:
     from toolkit.channels import signs
     from toolkit.tires.tydex import tydex_text
 
-    used = resolved.result.reduced.used()
+    conditions = resolved.result.reduced.used()
     turn = signs("SAE", "ISO-W")
     columns = {
-        "SA": ("deg", np.degrees([condition.SA for condition in used])),
-        "FZ": ("N", np.array([condition.FZ for condition in used])),
-        "FY": ("N", np.array([condition.FY for condition in used])),
-        "MZ": ("N*m", np.array([condition.MZ for condition in used])),
+        "SA": ("deg", np.degrees([condition.SA for condition in conditions])),
+        "FZ": ("N", np.array([condition.FZ for condition in conditions])),
+        "FY": ("N", np.array([condition.FY for condition in conditions])),
+        "MZ": ("N*m", np.array([condition.MZ for condition in conditions])),
     }
     info = resolved.result.reduced.info
     for symbol, unit, value in (("V", "m/s", info.speed_m_s), ("P", "Pa", info.pressure_Pa)):
         if value is not None:
-            columns[symbol] = (unit, np.full(len(used), value))
+            columns[symbol] = (unit, np.full(len(conditions), value))
     turned = {symbol: (unit, turn.get(symbol, 1) * values) for symbol, (unit, values) in columns.items()}
-    text, _ = tydex_text(turned, comments=[*_comments(resolved), _directions([c.rotation for c in used])])
+    text, _ = tydex_text(
+        turned, comments=[*_comments(resolved), _directions([c.rotation for c in conditions])]
+    )
     path.write_text(text, encoding="utf-8")
 
 

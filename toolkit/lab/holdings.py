@@ -57,12 +57,12 @@ def holdings_of(home: Path) -> Holdings:
     """Look through a home. Links are not followed; hidden folders, registry and templates are left out."""
     from toolkit.report.handover import MANIFEST
 
-    found: dict[Kind, dict[str, str]] = {kind: {} for kind in _marks()}
+    by_kind: dict[Kind, dict[str, str]] = {kind: {} for kind in _marks()}
     manifests: list[str] = []
     for place, names in home_folders(home):
         for kind, marks in _marks().items():
             if not marks.isdisjoint(names):
-                found[kind][holding_id(place)] = place
+                by_kind[kind][holding_id(place)] = place
         if MANIFEST in names:
             manifests.append(place)
     return Holdings(
@@ -70,7 +70,7 @@ def holdings_of(home: Path) -> Holdings:
         places=MappingProxyType(
             {
                 kind: MappingProxyType(dict(sorted(held.items(), key=lambda item: item[1])))
-                for kind, held in found.items()
+                for kind, held in by_kind.items()
             }
         ),
         manifests=tuple(manifests),

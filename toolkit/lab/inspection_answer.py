@@ -54,8 +54,8 @@ def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) 
             {"load": i.load, "name": i.name, "low": i.low, "high": i.high, "sign": i.sign} for i in intervals
         ],
         "refused_records": [
-            {"id": one.id, "rule": one.rule, "reason": one.reason}
-            for one in (inspection.choice.refused if inspection.choice else ())
+            {"id": refusal.id, "rule": refusal.rule, "reason": refusal.reason}
+            for refusal in (inspection.choice.refused if inspection.choice else ())
         ],
         "findings": [finding.as_dict() for finding in inspection.findings],
     }
@@ -147,8 +147,8 @@ def inspection_text(inspection: Inspection, intervals: tuple[Interval, ...]) -> 
         *_calibration_lines(inspection),
         *_interval_lines(intervals),
     ]
-    others = [finding for finding in inspection.findings if not finding.rule.startswith("identified-")]
-    return "\n".join([*lines, *finding_lines(others)]).rstrip()
+    remarks = [finding for finding in inspection.findings if not finding.rule.startswith("identified-")]
+    return "\n".join([*lines, *finding_lines(remarks)]).rstrip()
 
 
 def _block_table(inspection: Inspection) -> str:

@@ -105,9 +105,9 @@ def jobs_of(home: Path) -> Iterator[SeenJob]:
     except OSError:
         return
     for name in names:
-        seen = job_of(home, name)
-        if seen is not None:
-            yield seen
+        job = job_of(home, name)
+        if job is not None:
+            yield job
 
 
 def job_of(home: Path, job_id: str) -> SeenJob | None:
@@ -125,8 +125,8 @@ def job_of(home: Path, job_id: str) -> SeenJob | None:
 
 def cancel_job(home: Path, job_id: str) -> None:
     """Ask for the end of a job; its runner ends the command within seconds."""
-    seen = job_of(home, job_id)
-    if seen is not None and seen.state == "running":
+    job = job_of(home, job_id)
+    if job is not None and job.state == "running":
         write_atomic(home / FOLDER / job_id / CANCEL, "")
 
 

@@ -299,5 +299,7 @@ def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in conditions.items() if key != "file"}
 
 
-def _wrong(what: str, where: object, got: object, expected: str, next_step: str) -> ConfigError:
-    return ConfigError(what, where=where, got=got, expected=expected, next_step=next_step, rule="plan-next")
+def _wrong(problem: str, where: object, actual: object, expected: str, next_step: str) -> ConfigError:
+    return ConfigError(
+        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="plan-next"
+    )

@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolkit.calibration.registry.people_log import PeopleLog, enrol
 from toolkit.errors import RegistryError, ToolkitError, TrustError
@@ -27,6 +27,7 @@ from toolkit.trust.witness import SUFFIX, countersign
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.decision_answer_types import EnrolledPerson, PeopleAnswer
 
 RECOVERY = "recovery"
 _HEAD = re.compile(r"\b[0-9a-f]{64}\b")
@@ -113,7 +114,7 @@ def set_demand(
     return _enter(registry, replace(version.people, policy=policy), registry.signers, reason, by)
 
 
-def people_answer(log: PeopleLog) -> tuple[dict[str, Any], str]:
+def people_answer(log: PeopleLog) -> tuple[PeopleAnswer, str]:
     """Return who is enrolled, as a payload and for people."""
     from toolkit.lab.answers import table
 
@@ -121,7 +122,7 @@ def people_answer(log: PeopleLog) -> tuple[dict[str, Any], str]:
     if version is None:
         return {"people": [], "versions": 0}, "nobody is enrolled: decisions are unsigned"
     keys = [(person, key) for person in version.people.person for key in person.keys]
-    rows = [
+    rows: list[EnrolledPerson] = [
         {
             "id": person.id, "name": person.name, "roles": list(person.roles), "key": key.public.fingerprint,
             "from": key.since, "until": key.until,
@@ -133,7 +134,7 @@ def people_answer(log: PeopleLog) -> tuple[dict[str, Any], str]:
         for person, key in keys
     ]
     demands = {action: version.people.policy.demand(action) for action in MEANINGS}
-    payload = {
+    payload: PeopleAnswer = {
         "people": rows, "versions": len(log.history.versions), "since": version.since,
         "policy": {
             action: {"roles": list(demand.roles), "signatures": demand.signatures}
@@ -306,9 +307,9 @@ def _content(path: Path) -> bytes:
         ) from error  # fmt: skip
 
 
-def _nobody(got: str, expected: Sequence[str]) -> ToolkitError:
+def _nobody(actual: str, expected: Sequence[str]) -> ToolkitError:
     return TrustError(
-        "there is no such person or key", where="people", got=got,
+        "there is no such person or key", where="people", got=actual,
         expected=", ".join(expected) or "nobody is enrolled",
         next_step="see 'toolkit person list'; nothing was changed", rule="person",
     )  # fmt: skip

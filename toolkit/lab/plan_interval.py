@@ -97,8 +97,8 @@ def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) 
     return "\n".join([*lines, *([found] if found else [])])
 
 
-def _wrong(where: str, got: object, expected: str) -> ConfigError:
+def _wrong(where: str, actual: object, expected: str) -> ConfigError:
     return ConfigError(
-        "a number cannot be used", where=where, got=got, expected=expected, next_step="correct it",
+        "a number cannot be used", where=where, got=actual, expected=expected, next_step="correct it",
         rule="plan-demand",
     )  # fmt: skip

@@ -312,8 +312,8 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _wrong(what: str, where: object, got: object, expected: str) -> ConfigError:
+def _wrong(problem: str, where: object, actual: object, expected: str) -> ConfigError:
     return ConfigError(
-        what, where=where, got=got, expected=expected, next_step="correct it; nothing was written",
+        problem, where=where, got=actual, expected=expected, next_step="correct it; nothing was written",
         rule="plan-demand",
     )  # fmt: skip

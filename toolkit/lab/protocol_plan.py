@@ -201,9 +201,9 @@ def _quantity(text: str) -> float:
         raise _wrong_load(text, "a force with its unit: '833 lbf', '3700 N'") from error
 
 
-def _wrong_load(got: str, expected: str) -> ConfigError:
+def _wrong_load(actual: str, expected: str) -> ConfigError:
     return ConfigError(
-        "a load cannot be planned", where="--load", got=got, expected=expected,
+        "a load cannot be planned", where="--load", got=actual, expected=expected,
         next_step="name a load that the earlier test measured, or another test", rule="plan-load",
     )  # fmt: skip
 

@@ -86,14 +86,16 @@ def columns_of(
         stated = [text, (units or {}).get(name)]
         columns[name] = _column(name, data[header], [text for text in stated if text is not None])
     if missing := [name for name in needed if name not in columns]:
-        got = ", ".join(map(str, data)) or "no column"
+        present = ", ".join(map(str, data)) or "no column"
         raise _refused(
-            f"a column is missing: {', '.join(missing)}", got, ", ".join(needed), "add it, or name it so"
+            f"a column is missing: {', '.join(missing)}", present, ", ".join(needed), "add it, or name it so"
         )
     lengths = {name: len(column.numbers) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
-        got = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise _refused("the columns differ in length", got, "one length", "give every column the same rows")
+        present = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise _refused(
+            "the columns differ in length", present, "one length", "give every column the same rows"
+        )
     return columns
 
 
@@ -147,7 +149,8 @@ def _text(quantity: Any) -> str:
     return re.sub(r"\s*([*/])\s*", r"\1", f"{quantity.units:~}")
 
 
-def _refused(what: str, got: object, expected: str, next_step: str) -> ColumnError:
+def _refused(problem: str, actual: object, expected: str, next_step: str) -> ColumnError:
     return ColumnError(
-        what, where="the data's columns", got=got, expected=expected, next_step=next_step, rule="data-columns"
-    )
+        problem, where="the data's columns", got=actual, expected=expected, next_step=next_step,
+        rule="data-columns",
+    )  # fmt: skip

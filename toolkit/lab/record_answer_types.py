@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NotRequired, TypedDict
 
+from toolkit.declared.answers import merged
 from toolkit.findings import FindingEntry
 
 
@@ -138,10 +139,14 @@ class Inspected(TypedDict):
 
 
 class InspectAnswer(TypedDict):
-    """What recordings hold; of a single file its entries stand at the top too."""
+    """What recordings hold."""
 
     files: Annotated[list[Inspected | UnreadFile], "in the order of the command"]
     findings: list[FindingEntry]
+
+
+InspectForms = merged(InspectAnswer, Inspected, name="SingleInspectAnswer") | InspectAnswer
+"""Of a single file its entries stand at the top too."""
 
 
 class RecordRow(TypedDict):

@@ -165,15 +165,15 @@ def _from_file(
         )
     result = read_test_file(test)
     result = replace(result, reduced=checked(result.reduced))
-    used = result.reduced.calibration
-    record = registry.load(used.id)
-    chosen = record if calibration in (None, used.id) else registry.load(calibration)
-    if chosen.sha256 != used.sha256:
+    recorded = result.reduced.calibration
+    record = registry.load(recorded.id)
+    applied = record if calibration in (None, recorded.id) else registry.load(calibration)
+    if applied.sha256 != recorded.sha256:
         raise RecordError(
             "the reduced test was made with another calibration record",
             where=test,
-            got=f"{used.id}, {used.sha256[:16]}...",
-            expected=f"{chosen.id}, {chosen.sha256[:16]}...",
+            got=f"{recorded.id}, {recorded.sha256[:16]}...",
+            expected=f"{applied.id}, {applied.sha256[:16]}...",
             next_step="process the recordings again with the record that is wanted",
             rule="record-differs",
         )
@@ -184,12 +184,12 @@ def _from_file(
     # What the file was made with stays with it: a draft is issued by processing the recordings again.
     own_reasons = tuple(
         Reason(text=one, next_step="process the recordings again with a record in force")
-        for one in used.draft_reasons
+        for one in recorded.draft_reasons
         if one not in {reason.text for reason in stands.reasons}
     )
     use = replace(stands, reasons=(*own_reasons, *stands.reasons)).use(draft=draft, where=test)
-    later = dict.fromkeys(one for one in (*used.since, *use.since) if one not in use.draft_reasons)
+    later = dict.fromkeys(one for one in (*recorded.since, *use.since) if one not in use.draft_reasons)
     use = replace(use, since=tuple(later))
-    if use != used:
+    if use != recorded:
         result = replace(result, reduced=replace(result.reduced, calibration=use))
     return Resolved(result=result, record=record, findings=(*_findings(use), *result.findings))

@@ -58,20 +58,20 @@ def open_sealing(
     """
     from toolkit.trust.seal.key import open_key
 
-    named = seal or (Path(os.environ[KEY]) if os.environ.get(KEY) else None)
-    if named is None and stamps is not None:
+    path = seal or (Path(os.environ[KEY]) if os.environ.get(KEY) else None)
+    if path is None and stamps is not None:
         raise ConfigError(
             "a time stamp belongs to a seal", where="--time-stamp", got="no key", expected="--seal KEY too",
             next_step="name the key, or leave out --time-stamp; nothing was made", rule="usage",
         )  # fmt: skip
-    if named is None or (draft and seal is None):
+    if path is None or (draft and seal is None):
         return None
     if draft:
         raise ConfigError(
             "a draft is never sealed", where="--draft, --seal", got="both", expected="one of the two",
             next_step="approve the record first, or leave out --seal; nothing was made", rule="usage",
         )  # fmt: skip
-    key = open_key(named, ask=ask, chain=home / TRUST / "laboratory.pem", home=home)
+    key = open_key(path, ask=ask, chain=home / TRUST / "laboratory.pem", home=home)
     return Sealing(key=key, stamps=stamps)
 
 
@@ -112,8 +112,8 @@ def trusted(folder: Path) -> Trust:
     """Return what the folder ``trust`` of a home trusts: ``certificates/``, and ``laboratory.pem``."""
     from toolkit.trust.seal.x509 import Trust, read_certificates, read_trust
 
-    enrolled, own = read_trust(folder / "certificates"), folder / "laboratory.pem"
-    if not own.is_file():
+    enrolled, root_file = read_trust(folder / "certificates"), folder / "laboratory.pem"
+    if not root_file.is_file():
         return enrolled
-    chain = read_certificates(read_input(own, CERTIFICATE_FILE), where=own)
+    chain = read_certificates(read_input(root_file, CERTIFICATE_FILE), where=root_file)
     return Trust(certificates=(*enrolled.certificates, *chain), revocations=enrolled.revocations)

@@ -96,9 +96,9 @@ def _charts(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
                 yield f"{path.name}: {channel}", {"x_label": x_label, "y_label": channel, "series": series}
 
 
-def _none(folder: Path, got: str) -> UnreadableError:
+def _none(folder: Path, actual: str) -> UnreadableError:
     return UnreadableError(
-        "the answer of the diagnosis cannot be read", where=folder / ANSWER, got=got,
+        "the answer of the diagnosis cannot be read", where=folder / ANSWER, got=actual,
         expected="diagnosis.json as 'toolkit diagnose' writes it", next_step="run the diagnosis again",
         rule="no-file",
     )  # fmt: skip

@@ -183,10 +183,10 @@ def next_step(registry: Registry, record: CalibrationRecord, machine: str | None
             f"tells more); where the session is wrong, correct it, calibrate again and discard {record.id}"
         )
     words = f"toolkit calibration approve {record.id} --in-force-from {record.date} --checked-by NAME"
-    asked = {check.rule for check in failed}
+    rules = {check.rule for check in failed}
     words += f" --machine {machine}" if machine else ""
-    words += " --reason TEXT" if "replacement" in asked else ""
-    words += " --polarity FILE" if "polarity-reading" in asked else ""
+    words += " --reason TEXT" if "replacement" in rules else ""
+    words += " --polarity FILE" if "polarity-reading" in rules else ""
     return words
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError, OutputError, TrustError
 from toolkit.publication import publication
@@ -12,6 +12,9 @@ from toolkit.trust.keys import Signer, agent_keys, agent_signer
 from toolkit.trust.people import Person, inability
 from toolkit.trust.requested import Requested
 from toolkit.trust.requests import Request, shown, words
+
+if TYPE_CHECKING:
+    from toolkit.lab.decision_answer_types import RequestedAnswer
 
 _LONGEST = 4096  # bytes of a passphrase
 
@@ -73,10 +76,10 @@ def sign_request(request: Request, signer: Signer, out: Path | None = None) -> t
     return path, person
 
 
-def requested(outcome: Requested) -> tuple[dict[str, Any], str]:
+def requested(outcome: Requested) -> tuple[RequestedAnswer, str]:
     """Return what a command says that wrote a request, as a payload and for people."""
     request = outcome.request
-    payload = {
+    payload: RequestedAnswer = {
         "requested": True, "request": str(request.path), "action": request.action, "id": request.body["id"],
         "takes": request.takes,
     }  # fmt: skip

@@ -69,14 +69,14 @@ def _test(
 
     program = _program(plan, registry)
     record = None if program is None else program.record
-    others = other_programs(plan, registry)
+    programs = other_programs(plan, registry)
     for folder, names in ((csv, {*run_names(plan)}), (case, {CASE, RUNS, TIRE})):
         if folder is not None:
             _check_apart(folder, out)
             check_folder(folder, names)
     if case is not None:
         check_case(plan, record)
-    test = simulate(plan, program, others)
+    test = simulate(plan, program, programs)
     check_folder(out, set(test_names(test)))
     with ExitStack() as together:
         stages = {

@@ -212,8 +212,8 @@ def _session(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
     loads = [plain for plain, dimension in stated if dimension in ("force", "moment")]
     indications = [plain for plain, dimension in stated if dimension not in (None, "force", "moment", "time")]
     silent = [f"{plain}: no unit that is known; write 'NAME [unit]'" for plain, kind in stated if not kind]
-    there = {plain.lower() for _, plain, _ in columns}
-    silent += [f"the file has no column {key}" for key in ("run", "direction") if key not in there]
+    headers = {plain.lower() for _, plain, _ in columns}
+    silent += [f"the file has no column {key}" for key in ("run", "direction") if key not in headers]
     if loads and not indications:  # cells that are read in units of force: which is which, no unit tells
         silent.append("every column is a force or a moment: which are indications, the file does not tell")
         loads = []
@@ -249,9 +249,9 @@ def _symbol(name: str) -> str:
 
 
 def _role(symbol: str, dimension: str | None) -> str | None:
-    known = {"FZ": "load", "SA": "slip_angle", "t": "time"}
-    if symbol in known:
-        return known[symbol]
+    roles = {"FZ": "load", "SA": "slip_angle", "t": "time"}
+    if symbol in roles:
+        return roles[symbol]
     if symbol in CHANNELS:
         return "acquired" if dimension in ("force", "moment") else "covariate"
     return "indication"

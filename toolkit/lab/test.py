@@ -44,8 +44,8 @@ class Recording(Face):
 
         columns = {}
         for series in self.result.series:
-            shown = unit(series.unit).si if si else series.unit
-            columns[f"{series.symbol} [{shown}]"] = series.si if si else series.values  # noqa: PD011
+            printed_unit = unit(series.unit).si if si else series.unit
+            columns[f"{series.symbol} [{printed_unit}]"] = series.si if si else series.values  # noqa: PD011
         return DataFrame(columns)
 
     def _facts(self) -> Facts:
@@ -94,7 +94,11 @@ class Test(Face):
         """The recordings, all or none; empty of a reduced test."""
         from toolkit.pipeline import read_test as read
 
-        return () if self.folder is None else tuple(Recording(result=one) for one in read(self.folder))
+        return (
+            ()
+            if self.folder is None
+            else tuple(Recording(result=recording) for recording in read(self.folder))
+        )
 
     def process(
         self,
@@ -353,7 +357,7 @@ def write_report(
         models=model_choice(models) if models else (),
         xlsx=hand_over, tydex=hand_over, tir=hand_over, allow_missing=allow_missing,
     )  # fmt: skip
-    (made,) = make_reports([test.path], options, Path(out), step=step)
-    if isinstance(made.outcome, Exception):
-        raise made.outcome
-    return Report(result=made.outcome, made=made)
+    (report,) = make_reports([test.path], options, Path(out), step=step)
+    if isinstance(report.outcome, Exception):
+        raise report.outcome
+    return Report(result=report.outcome, made=report)

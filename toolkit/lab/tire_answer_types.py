@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import UsedRecord
+from toolkit.comparison.laboratories import LaboratoryComparison
+from toolkit.declared.answers import merged
 from toolkit.findings import FindingEntry
 
 
@@ -295,3 +297,46 @@ class CompareAnswer(Compared):
     document: Annotated[Mapping[str, Any] | None, "Word document and PDF, where they were asked for"]
     findings: list[FindingEntry]
     timing: Timing
+
+
+class _LaboratoryKeys(TypedDict):
+    mode: Annotated[str, "always laboratories"]
+    source: str
+    figures: Annotated[Mapping[str, Path], "pictures that were written, by name"]
+    timing: Timing
+
+
+CompareForms = CompareAnswer | merged(LaboratoryComparison, _LaboratoryKeys)
+"""Of tests, and with ``--laboratories``."""
+
+
+class EvaluateAnswer(TypedDict):
+    """A tire file, evaluated at every row of a grid."""
+
+    tire: str
+    model: Annotated[str, "mf52 or mf61"]
+    axes: Annotated[str, "of the grid and of the forces"]
+    angles: Annotated[str, "star: tan(alpha), sin(gamma); raw: the angles themselves"]
+    units: Annotated[Mapping[str, str], "of the columns"]
+    draft: bool
+    rows: Annotated[list[Mapping[str, float | None]], "each by column"]
+    out: Annotated[str | None, "file that was written"]
+    findings: list[FindingEntry]
+    timing: Timing
+
+
+ConvertAnswer = TypedDict(
+    "ConvertAnswer",
+    {
+        "in": str,
+        "out": str,
+        "from": Annotated[str, "kind of the source"],
+        "to": Annotated[str, "kind of the target"],
+        "axes": str,
+        "draft": bool,
+        "draft_reasons": list[str],
+        "findings": list[FindingEntry],
+        "timing": Timing,
+    },
+)
+ConvertAnswer.__doc__ = "A file, written in another format."

@@ -90,8 +90,8 @@ class TireFit(Face):
         from toolkit.lab.tire_files import check_tir, write_fit
 
         names = [model] if model else [fit.model for fit in self.result.globals]
-        chosen = check_tir(Path(path), Path(self.source), names)
-        fit = next(fit for fit in self.result.globals if fit.model == chosen)
+        surfaces = check_tir(Path(path), Path(self.source), names)
+        fit = next(fit for fit in self.result.globals if fit.model == surfaces)
         write_fit(
             Path(path), fit, self.result.data, source=Path(self.source), side=side.upper(),
             radius_m=self.result.radius_m, use=self.result.use,

@@ -12,8 +12,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from toolkit.declared import Entry
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
@@ -45,15 +46,15 @@ class Verdict:
     """The answer of one file; ``over`` is what it was issued over, ``certificate`` the signer's SHA-256."""
 
     file: str
-    kind: str
+    kind: Annotated[str, Entry("what the document is")]
     issued_by: str | None = None
     issued_at: str | None = None
     signature: Signature = "invalid"
-    ledger: Continuity = "unknown"
-    still_holds: bool | None = None
+    ledger: Annotated[Continuity, Entry("whether today's ledger continues the document's")] = "unknown"
+    still_holds: Annotated[bool | None, Entry("null where nothing says")] = None
     why: str = ""
-    over: str | None = None
-    certificate: str | None = None
+    over: Annotated[str | None, Entry("what it was issued over")] = None
+    certificate: Annotated[str | None, Entry("SHA-256 of the signer's")] = None
 
     @property
     def code(self) -> int:
@@ -62,10 +63,6 @@ class Verdict:
             return 2
         broken = self.still_holds is False or self.ledger in ("forked", "rolled_back")
         return 0 if self.signature == "valid" and not broken else 1
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the answer as JSON values."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     @property
     def line(self) -> str:
@@ -101,8 +98,8 @@ def verify_file(path: Path, trust: Trust, *, ledger: Ledger = no_ledger) -> Verd
             return _proof(path, data, ledger)
         return _by_its_issue(path, data, trust, ledger)
     except ToolkitError as error:
-        told = f"{error.what}: {error.got}" if error.got else error.what
-        return Verdict(file=str(path), kind="unreadable", why=told)
+        reason = f"{error.what}: {error.got}" if error.got else error.what
+        return Verdict(file=str(path), kind="unreadable", why=reason)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,15 +117,15 @@ class Carried:
         if self.anchor is None:
             return None
         entered = hashes_of(self.anchor)
-        other = [name for name, digest in self.files.items() if entered.get(name, digest) != digest]
+        changed = [name for name, digest in self.files.items() if entered.get(name, digest) != digest]
         # A digital certificate's entry is the hash of its content, before its proof and its seal.
-        other = [name for name in other if not name.endswith(".xml")]
+        changed = [name for name in changed if not name.endswith(".xml")]
         record = entry_of(self.anchor).get("id")
         if not self.anchor.proved:
             return "its proof does not hold: it was changed"
         if self.names and record not in [name.record for name in self.names]:
             return f"its proof is of another record, {record}"
-        return f"its proof is of another {other[0]}" if other else None
+        return f"its proof is of another {changed[0]}" if changed else None
 
 
 def carried(attachments: Mapping[str, bytes], *, where: object) -> Carried:
@@ -266,7 +263,9 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
         if check.signature == "unsigned":
             continue
         verdict = _verdict(path, "manifest", check, proof, proof.document, ledger)
-        if all(proof.files.get(other) == digest for other, digest in hashes.items() if other != name):
+        if all(
+            proof.files.get(companion) == digest for companion, digest in hashes.items() if companion != name
+        ):
             return replace(verdict, why=f"{len(hashes)} files as listed, proved by {name}: {verdict.why}")
         why = f"{name} does not list the other files"
         return Verdict(file=str(path), kind="manifest", signature="unsigned", why=why)
@@ -363,9 +362,9 @@ def _content(path: Path) -> bytes:
         raise _unreadable(path, getattr(error, "strerror", None) or str(error)) from error
 
 
-def _unreadable(path: Path, got: str) -> TrustError:
+def _unreadable(path: Path, actual: str) -> TrustError:
     return TrustError(
-        "the file cannot be read as a document", where=path, got=got,
+        "the file cannot be read as a document", where=path, got=actual,
         expected="a PDF, a digital calibration certificate, a manifest or a record",
         next_step="name it as it was issued", rule="unreadable-document",
     )  # fmt: skip

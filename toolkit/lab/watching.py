@@ -145,7 +145,7 @@ class Watcher:
         test is read, and the state is written once a batch: a look at tests that did not change reads none
         of their files, and one at many that did holds no more of them than a batch.
         """
-        made: list[MadeReport] = []
+        reports: list[MadeReport] = []
         waiting: list[Waiting] = []
         aside: list[Aside] = []
         self.heads = ""
@@ -194,13 +194,13 @@ class Watcher:
             else:
                 ready[test] = judged
                 if len(ready) == BATCH:
-                    made += self._make(ready, contents, waiting, aside)
+                    reports += self._make(ready, contents, waiting, aside)
                     ready = {}
-        made += self._make(ready, contents, waiting, aside)
+        reports += self._make(ready, contents, waiting, aside)
         if self.unsaved:
             self._save()
         waiting += [Waiting(test=path.name, reason=why) for path, (_, why) in self.unwritten.items()]
-        return Round(made=tuple(made), waiting=tuple(waiting), set_aside=tuple(aside))
+        return Round(made=tuple(reports), waiting=tuple(waiting), set_aside=tuple(aside))
 
     def _content(self, test: Path, name: str, listing: Listing) -> str:
         """Return one hash of all of a test's files, read again only where one of them has changed."""

@@ -23,9 +23,9 @@ _SI = {"FZ": "N", "FY": "N", "MZ": "N*m"}
 
 def correctable() -> dict[str, Effect]:
     """Return the effects that a machine can be corrected for by name, those of the whole machine first."""
-    chosen = [effect for effect in effects().values() if effect.correctable is not None]
-    chosen.sort(key=lambda effect: effect.correctable is not None and bool(effect.correctable.channels))
-    return {effect.name: effect for effect in chosen}
+    listed = [effect for effect in effects().values() if effect.correctable is not None]
+    listed.sort(key=lambda effect: effect.correctable is not None and bool(effect.correctable.channels))
+    return {effect.name: effect for effect in listed}
 
 
 _CORRECTABLE = correctable()
@@ -95,25 +95,27 @@ class Correction:
     def faults(self) -> Iterator[Fault]:
         """Yield a parameter, a place or a unit that is not the effect's."""
         effect = _CORRECTABLE[self.effect]
-        way = effect.correctable
-        if way is None:
+        correctable = effect.correctable
+        if correctable is None:
             return
-        expected, parameter = way.unit, effect.names[0]
+        expected, parameter = correctable.unit, effect.names[0]
         if self.parameter != parameter:
             yield Fault(key=("parameter",), got=self.parameter, expected=parameter)
-        if way.channels:
+        if correctable.channels:
             if (
-                self.channel not in way.channels
-                or self.source not in way.sources
+                self.channel not in correctable.channels
+                or self.source not in correctable.sources
                 or self.channel == self.source
             ):
                 yield Fault(
                     key=("channel",), got=f"{self.source} to {self.channel}",
                     what=f"the {self.effect} of these channels is not corrected in a reduction",
-                    expected=f"from {', '.join(way.sources)} to {' or '.join(way.channels)}",
+                    expected=f"from {', '.join(correctable.sources)} to {' or '.join(correctable.channels)}",
                 )  # fmt: skip
                 return
-            expected = way.unit.format_map({"channel": _SI[self.channel], "from": _SI[str(self.source)]})
+            expected = correctable.unit.format_map(
+                {"channel": _SI[self.channel], "from": _SI[str(self.source)]}
+            )
         elif self.channel or self.source:
             key = "channel" if self.channel else "source"
             yield Fault(

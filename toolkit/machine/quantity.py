@@ -29,7 +29,7 @@ def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
             expected=number_expected(number, "a number"),
             next_step="write value as a plain number", rule="wrong-value",
         )  # fmt: skip
-    found = unit(entry["unit"], where=where)
-    if found.dimension == dimension:
-        return float(number) * found.factor + found.offset
+    stated = unit(entry["unit"], where=where)
+    if stated.dimension == dimension:
+        return float(number) * stated.factor + stated.offset
     return float(number) * si_scale(entry["unit"], dimension, where=where)

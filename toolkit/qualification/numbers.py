@@ -88,10 +88,10 @@ def numbers(values: Any, where: Path) -> NDArray[np.float64]:
     return np.array([number(value, where) for value in values])
 
 
-def damaged(where: Path, got: str) -> ConfigError:
+def damaged(where: Path, actual: str) -> ConfigError:
     """Return the error of packaged numbers that cannot be used."""
     return ConfigError(
-        "the packaged numbers cannot be used", where=where.name, got=got,
+        "the packaged numbers cannot be used", where=where.name, got=actual,
         expected="the file as it was packaged",
         next_step="install the package again", rule="wrong-value",
     )  # fmt: skip
@@ -101,11 +101,11 @@ def check_whole(folder: Path) -> Check:
     """Check every packaged file against its digest: a changed requirement shows nowhere else."""
     try:
         listed: dict[str, str] = read_toml(folder / DIGESTS)["sha256"]
-        there = {path.name for path in folder.glob("*.toml")} - {DIGESTS}
-        changed = [n for n in sorted(there & listed.keys()) if sha256_file(folder / n) != listed[n]]
+        present = {path.name for path in folder.glob("*.toml")} - {DIGESTS}
+        changed = [n for n in sorted(present & listed.keys()) if sha256_file(folder / n) != listed[n]]
         differences = [f"{n} is changed" for n in changed]
-        differences += [f"{n} is missing" for n in sorted(listed.keys() - there)]
-        differences += [f"{n} is not listed" for n in sorted(there - listed.keys())]
+        differences += [f"{n} is missing" for n in sorted(listed.keys() - present)]
+        differences += [f"{n} is not listed" for n in sorted(present - listed.keys())]
     except (ToolkitError, KeyError, AttributeError) as error:
         differences = [f"{DIGESTS} cannot be used: {error}".splitlines()[0]]
     return Check(

@@ -163,13 +163,13 @@ def _raw(data: bytes, member: zipfile.ZipInfo, where: object) -> bytes:
 
 
 def _too_large(name: str, where: object) -> NoReturn:
-    most = size_text(limit_of(RECORDING_FILE))
+    limit = size_text(limit_of(RECORDING_FILE))
     _refuse(
         "inflation",
         "a member of the archive grows out of all proportion when it is unpacked",
         where,
         got=name,
-        expected=f"at most {most} in all and {MAX_RATIO} times its packed size",
+        expected=f"at most {limit} in all and {MAX_RATIO} times its packed size",
     )
 
 
@@ -187,7 +187,7 @@ def _damaged(name: str, how: str, where: object, cause: Exception | None = None)
 
 def _refuse(
     rule: str,
-    what: str,
+    problem: str,
     where: object,
     *,
     got: object,
@@ -196,5 +196,5 @@ def _refuse(
     cause: Exception | None = None,
 ) -> NoReturn:
     raise UnreadableError(
-        what, where=where, got=got, expected=expected, next_step=next_step, rule=rule
+        problem, where=where, got=got, expected=expected, next_step=next_step, rule=rule
     ) from cause

@@ -80,9 +80,9 @@ def separator_of(head: str, is_header: Callable[[str], bool], *, where: Path) ->
         rule ``ambiguous-text``: two separators do as well
     """
     counts = {mark: _headers(head, mark, is_header) for mark in SEPARATORS}
-    most = max(counts.values())
-    best = [mark for mark, count in counts.items() if count == most]
-    if most == 0:
+    highest = max(counts.values())
+    best = [mark for mark, count in counts.items() if count == highest]
+    if highest == 0:
         return None
     if len(best) > 1:
         raise UnreadableError(

@@ -165,11 +165,11 @@ def _single_floats(column: NDArray[np.float64]) -> bool:
         decade = _decades(values)
         places = _places(values, decade)
         decimals = np.where(places == _FULL, FULL_DIGITS - 1 - decade, places)
-        shown = 0.5 * 10.0 ** -decimals.astype(np.float64)
+        halves = 0.5 * 10.0 ** -decimals.astype(np.float64)
         nearest = values.astype(np.float32)
-        if not (np.abs(values - nearest) <= shown + np.spacing(values)).all():
+        if not (np.abs(values - nearest) <= halves + np.spacing(values)).all():
             return False
-        log_chance += float(np.log10(np.minimum(2 * shown / np.spacing(nearest), 1.0)).sum())
+        log_chance += float(np.log10(np.minimum(2 * halves / np.spacing(nearest), 1.0)).sum())
     return log_chance <= _BY_CHANCE
 
 
@@ -187,18 +187,18 @@ def _places(size: NDArray[np.float64], decade: NDArray[np.int64]) -> NDArray[np.
     quotient is the double nearest to that decimal number, as a reader of the text would have made it.
     """
     places = np.full(size.shape, _FULL)
-    most = FULL_DIGITS - 2 - decade  # decimals, with at most 14 significant digits
+    limit = FULL_DIGITS - 2 - decade  # decimals, with at most 14 significant digits
     small = decade < _SMALL
     if small.any():
         places[small] = [_decimals(value) for value in size[small].tolist()]
-        most[small] = -1
-    undecided = most >= 0
+        limit[small] = -1
+    undecided = limit >= 0
     for k, ten in enumerate(_TEN.tolist()):
         fits = np.rint(size * ten) / ten == size
         fits &= undecided
         places[fits] = k
         undecided &= ~fits
-        undecided &= most > k
+        undecided &= limit > k
         if not undecided.any():
             break
     return places

@@ -218,5 +218,7 @@ def _no_workbook(where: Path, kind: Kind) -> NoReturn:
             "give the file that the acquisition program wrote")  # fmt: skip
 
 
-def _refuse(rule: str, what: str, where: object, got: object, expected: object, next_step: str) -> NoReturn:
-    raise UnreadableError(what, where=where, got=got, expected=expected, next_step=next_step, rule=rule)
+def _refuse(
+    rule: str, problem: str, where: object, actual: object, expected: object, next_step: str
+) -> NoReturn:
+    raise UnreadableError(problem, where=where, got=actual, expected=expected, next_step=next_step, rule=rule)

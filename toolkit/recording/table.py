@@ -137,9 +137,9 @@ def _as_series(assigned: Assigned, values: NDArray[np.float64]) -> Series:
 
 def _refuse_first(assigned: Assigned, cells: list[Any], where: str, first_row: int) -> NoReturn:
     for offset, cell in enumerate(cells):
-        rule, got = judge(cell)
+        rule, content = judge(cell)
         if rule:
-            refuse_cell(rule, got, where, first_row + offset, assigned.index + 1, assigned.header)
+            refuse_cell(rule, content, where, first_row + offset, assigned.index + 1, assigned.header)
     raise AssertionError("a column was refused although all its cells are numbers")
 
 
@@ -162,12 +162,12 @@ def judge(cell: object) -> tuple[str | None, str]:
     return "text-cell", repr(cell)[:80]
 
 
-def refuse_cell(rule: str, got: str, where: str, row: int, column: int, header: str) -> NoReturn:
+def refuse_cell(rule: str, actual: str, where: str, row: int, column: int, header: str) -> NoReturn:
     """Raise the `CellError` of one cell; ``row`` and ``column`` count from 1 in the spreadsheet."""
     raise CellError(
         f"row {row}, column {header!r}: no number",
         where=f"{where}, row {row}, column {header!r} (cell {reference(row, column)})",
-        got=got,
+        got=actual,
         expected="a finite number",
         next_step="look at that cell in the file; repeat the recording or mend a copy of the file",
         rule=rule,
@@ -211,11 +211,11 @@ def _blank(row: Sequence[Any]) -> bool:
     return all(cell in _EMPTY or (isinstance(cell, str) and not cell.strip()) for cell in row)
 
 
-def _no_data(table: Table, got: str) -> NoReturn:
+def _no_data(table: Table, actual: str) -> NoReturn:
     raise UnreadableError(
         "the recording has no data",
         where=table.where,
-        got=got,
+        got=actual,
         expected="a header row and at least one row of numbers",
         next_step="repeat the recording, or leave the file out of the test",
         rule="no-data",

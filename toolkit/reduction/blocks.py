@@ -228,8 +228,8 @@ def _arrived(
     stretch = slice(start, stop)
     middle_SA, middle_FZ = float(np.median(SA[stretch])), float(np.median(FZ[stretch]))
     room_FZ = max(band_FZ * middle_FZ, floor_FZ)
-    there = (np.abs(SA[stretch] - middle_SA) <= _ARRIVED * band_SA) & (
+    near = (np.abs(SA[stretch] - middle_SA) <= _ARRIVED * band_SA) & (
         np.abs(FZ[stretch] - middle_FZ) <= _ARRIVED * room_FZ
     )
-    rows = np.flatnonzero(there)
+    rows = np.flatnonzero(near)
     return (start + int(rows[0]), start + int(rows[-1]) + 1) if rows.size else (start, stop)

@@ -87,8 +87,8 @@ def physics_findings(
     if not broken:
         return []
     cures = dict.fromkeys(text for text, changed in _changes(readings, cells) if not _all(*changed))
-    more = f"all is possible with {' or '.join(cures)}" if cures else ""
-    return [departure.finding(more=more if index == 0 else "") for index, departure in enumerate(broken)]
+    cure = f"all is possible with {' or '.join(cures)}" if cures else ""
+    return [departure.finding(more=cure if index == 0 else "") for index, departure in enumerate(broken)]
 
 
 def checked(reduced: ReducedTest) -> ReducedTest:

@@ -38,9 +38,9 @@ def u_SA(machine: Machine, MZ: NDArray[np.float64]) -> float:
     parts = [0.0]
     largest = float(np.max(np.abs(MZ))) if len(MZ) else 0.0
     for correction in machine.corrections:
-        way = correction.applied.effect.correctable
-        if way is not None and way.u_slip is not None:
-            parts.append(way.u_slip(correction.u * correction.factor, largest))
+        correctable = correction.applied.effect.correctable
+        if correctable is not None and correctable.u_slip is not None:
+            parts.append(correctable.u_slip(correction.u * correction.factor, largest))
     return math.hypot(*parts)
 
 

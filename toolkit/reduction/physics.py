@@ -246,15 +246,15 @@ def _reversal(r: Readings) -> list[Departure]:
                 places.append(r.place[second])
     if not places:
         return []
-    same, opposite = (float(np.sqrt(np.mean(np.square(values)))) for values in (sums, differences))
-    if opposite <= same:
+    even, opposite = (float(np.sqrt(np.mean(np.square(values)))) for values in (sums, differences))
+    if opposite <= even:
         return []
     return [
         Departure(
             rule="impossible-reversal",
             where=places[0],
             message=f"at equal slip angle and load FY has opposite signs in {len(places)} of {len(sums)} "
-            f"pairs of runs: they differ by {opposite:.0f} N (rms) where their sum is {same:.0f} N; a tire "
+            f"pairs of runs: they differ by {opposite:.0f} N (rms) where their sum is {even:.0f} N; a tire "
             "keeps its side force in axes that follow the travel, but for its pull",
             cause="a reversed run is not named as such in test.toml, or a cell was turned round between the "
             "runs",

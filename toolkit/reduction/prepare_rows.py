@@ -215,8 +215,8 @@ def split_rests(
         floor_FZ=protocol.load_tolerance * smallest,
         least_turns=protocol.average_revolutions,
     )
-    tare = tuple(rest for rest in rests if is_tare(rest, smallest_load=smallest))
-    loads = tuple(rest for rest in rests if not is_tare(rest, smallest_load=smallest))
+    tare = tuple(stretch for stretch in rests if is_tare(stretch, smallest_load=smallest))
+    loads = tuple(stretch for stretch in rests if not is_tare(stretch, smallest_load=smallest))
     if not loads or any(load.mean_FZ < 0 for load in loads):
         low, high = from_si([np.min(recording["SA"].si), np.max(recording["SA"].si)], "deg")
         raise RecordingError(

@@ -155,19 +155,19 @@ def _conditions(
 
 def _condition(
     file: OpenedFile,
-    chosen: Window,
+    window: Window,
     *,
     step_SA: float | None,
     machine: Machine,
     record: CalibrationRecord,
     reversal: Reversal,
 ) -> Condition:
-    recording, rows = file.recording, chosen.rows
+    recording, rows = file.recording, window.rows
     sign = signs(machine.axes, "SAE", seen_by_cells(file.rotation, reversal))
     load = file.channels[1, rows]
     SA, FZ = means(file.channels[:2, rows])
     # FY and MZ follow the load at which their means are stated, and the tire's own turn has no mean.
-    turns = _revolutions(chosen, machine)
+    turns = _revolutions(window, machine)
     explained = np.vstack([load / max(abs(FZ.value), 1e-300), turning(len(load), turns)])
     FY, MZ = means(file.channels[2:, rows], explained=explained)
     zero = {"FY": 0.0, "MZ": 0.0}
@@ -206,14 +206,14 @@ def _condition(
     )
 
 
-def _revolutions(chosen: Window, machine: Machine) -> float | None:
+def _revolutions(window: Window, machine: Machine) -> float | None:
     """Return the tire's revolutions that a window spans; None where they are not known to be the tire's."""
     protocol = machine.protocol
-    if protocol.revolutions_of != "tire" or chosen.short:
+    if protocol.revolutions_of != "tire" or window.short:
         return None
-    if chosen.revolutions is None:
+    if window.revolutions is None:
         return protocol.average_revolutions if protocol.acquisition == "after_settling" else None
-    return chosen.revolutions
+    return window.revolutions
 
 
 def _acquired(recording: Recording, symbol: str, rows: slice, sign: int) -> float | None:

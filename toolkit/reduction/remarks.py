@@ -45,8 +45,8 @@ def speed_findings(files: Sequence[OpenedFile], machine: Machine) -> list[Findin
         if not file.recording.has("V"):
             continue
         V = np.abs(file.recording["V"].si)
-        for chosen in file.windows:
-            mean = float(np.mean(V[chosen.rows]))
+        for window in file.windows:
+            mean = float(np.mean(V[window.rows]))
             if _speed([mean], file.name, machine):
                 speeds.setdefault(file.name, []).append(mean)
     if not speeds:
@@ -64,8 +64,8 @@ def _speed(speeds_m_s: Sequence[float], where: str, machine: Machine) -> list[Fi
     # A speed on the edge of the tolerance is inside it, however its unit rounds.
     if abs(worst - expected) <= tolerance * (1 + 1e-9):
         return []
-    got, nominal, room = from_si([worst, expected, tolerance], "km/h")
-    message = f"speed {got:.2f} km/h is outside {nominal:.2f} +- {room:g} km/h"
+    measured, nominal, room = from_si([worst, expected, tolerance], "km/h")
+    message = f"speed {measured:.2f} km/h is outside {nominal:.2f} +- {room:g} km/h"
     return [Finding(rule="speed", where=where, message=message)]
 
 

@@ -7,23 +7,90 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, ClassVar
 
-from toolkit.errors import ConfigError
-from toolkit.files import check_keys, read_toml
+from toolkit.declared import AtLeast, AtMost, Entry, Format, Keyed, Size, Text, UnitName, read
 from toolkit.units import si_scale
 from toolkit.words.catalogue import SOURCE, decimal_sign, languages
 from toolkit.words.phrasebook import phrasebook
 
-_KEYS = (
-    "schema language laboratory report words alt decimal_comma dates missing required styles decimals units"
-).split()
-_TABLES = ("laboratory", "report", "words", "alt", "styles", "decimals", "units")
-_LABORATORY = "name address contact place country accreditation".split()
-_REPORT = "method authorised_by function".split()
-_STYLES = ("heading", "caption", "table")
-_UNITS = ("force", "moment")
 _DEFAULT_REQUIRED = ("tk:calibration.hash",)
+
+
+def _is_language(name: str) -> bool:
+    return name in languages()
+
+
+_Phrases = Annotated[tuple[tuple[str, Annotated[str, Text(empty=True)]], ...], Keyed(), Size(0)]
+_Maybe = Annotated[str | None, Text(empty=True)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StyleLaboratory:
+    """The laboratory, as documents name it."""
+
+    name: Annotated[_Maybe, Entry("as documents print it")] = None
+    address: Annotated[_Maybe, Entry("in a line, or in several")] = None
+    place: Annotated[_Maybe, Entry("where certificates are issued")] = None
+    contact: Annotated[_Maybe, Entry("telephone, mail address")] = None
+    country: Annotated[_Maybe, Entry("ISO 3166-1, two letters")] = None
+    accreditation: Annotated[_Maybe, Entry("mark and number")] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StyleReport:
+    """What stands in a report whose test names none."""
+
+    method: Annotated[_Maybe, Entry("test method")] = None
+    authorised_by: Annotated[_Maybe, Entry("who authorises reports")] = None
+    function: Annotated[_Maybe, Entry("of that person")] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StyleNames:
+    """Names of the template's Word styles."""
+
+    heading: Annotated[_Maybe, Entry("of headings", example="Heading 1")] = None
+    caption: Annotated[_Maybe, Entry("of captions", example="Caption")] = None
+    table: Annotated[_Maybe, Entry("of tables")] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StyleUnits:
+    """Units of forces and moments as documents print them."""
+
+    force: Annotated[str, UnitName(("force",), as_written=True), Entry("N or lbf")] = "N"
+    moment: Annotated[str, UnitName(("moment",), as_written=True), Entry("N*m or lbf*ft")] = "N*m"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StyleFile:
+    """How the documents of a template write numbers and dates, and what the template must hold."""
+
+    FORMAT: ClassVar[Format] = Format(
+        title="style file", schema=1, next_step="correct {key} in the style file beside the template"
+    )
+
+    language: Annotated[
+        str, Text(accepts=_is_language),
+        Entry("of the toolkit's sentences", expected="en, de or fr"),
+    ] = SOURCE  # fmt: skip
+    decimal_comma: Annotated[bool, Entry("whether numbers have a comma")] = False
+    dates: Annotated[str, Text(empty=True), Entry("form of dates, as strftime has it")] = "%Y-%m-%d"
+    missing: Annotated[str, Entry("what --allow-missing prints", expected="a visible text")] = "n/a"
+    required: Annotated[
+        tuple[Annotated[str, Text(empty=True)], ...], Size(0), Entry("tags that the template must hold")
+    ] = _DEFAULT_REQUIRED
+    laboratory: Annotated[StyleLaboratory, Entry("of the documents")] = StyleLaboratory()
+    report: Annotated[StyleReport, Entry("what a test may leave out")] = StyleReport()
+    units: Annotated[StyleUnits, Entry("of forces and moments")] = StyleUnits()
+    styles: Annotated[StyleNames, Entry("of the template")] = StyleNames()
+    decimals: Annotated[
+        tuple[tuple[str, int], ...], Keyed(), Size(0), AtLeast(0), AtMost(12),
+        Entry("digits after the point, by unit, by tag or by table.column"),
+    ] = ()  # fmt: skip
+    words: Annotated[_Phrases, Entry("the organisation's own words for phrases and terms")] = ()
+    alt: Annotated[_Phrases, Entry("further words, for alternative texts alone")] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,66 +215,32 @@ def read_style(path: Path | None) -> Style:
     Raises
     ------
     ConfigError
-        not TOML, an unknown key, a value of the wrong type, a unit of the wrong dimension
+        not TOML; every entry that cannot be used, with its line
     """
     if path is None:
         return Style()
-    table = read_toml(path)
-    check_keys(table, _KEYS, where=path)
-    parts = {key: _typed(table, key, dict, {}, path) for key in _TABLES}
-    check_keys(parts["laboratory"], _LABORATORY, where=f"{path}: laboratory")
-    check_keys(parts["report"], _REPORT, where=f"{path}: report")
-    check_keys(parts["styles"], _STYLES, where=f"{path}: styles")
-    check_keys(parts["units"], _UNITS, where=f"{path}: units")
-    for name, digits in parts["decimals"].items():
-        if isinstance(digits, bool) or not isinstance(digits, int) or not 0 <= digits <= 12:
-            raise _wrong(path, f"decimals.{name}", digits, "a whole number from 0 to 12")
-    for name in _UNITS:
-        if name in parts["units"]:
-            si_scale(str(parts["units"][name]), name, where=f"{path}: units.{name}")
-    language = _typed(table, "language", str, SOURCE, path)
-    if language not in languages():
-        raise _wrong(path, "language", language, " or ".join(languages()))
-    required = _typed(table, "required", list, list(_DEFAULT_REQUIRED), path)
-    missing = _typed(table, "missing", str, "n/a", path)
-    if not missing.strip():
-        raise _wrong(path, "missing", missing, "a visible text")
+    file = read(StyleFile, path)
+    laboratory, styles = file.laboratory, file.styles
+    names = (("heading", styles.heading), ("caption", styles.caption), ("table", styles.table))
     return Style(
-        language=language,
-        laboratory=_text(parts["laboratory"], "name", path),
-        **{key: _text(parts["laboratory"], key, path) for key in _LABORATORY[1:]},
-        **{key: _text(parts["report"], key, path) for key in _REPORT},
-        decimal_comma=_typed(table, "decimal_comma", bool, False, path),
-        dates=_typed(table, "dates", str, "%Y-%m-%d", path),
-        missing=missing,
-        required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *(str(tag) for tag in required)])),
-        styles=tuple((str(k), str(v)) for k, v in parts["styles"].items()),
-        decimals=tuple(parts["decimals"].items()),
-        words=tuple((key, str(_text(parts["words"], key, path))) for key in parts["words"]),
-        alt=tuple((key, str(_text(parts["alt"], key, path))) for key in parts["alt"]),
-        force=str(parts["units"].get("force", "N")),
-        moment=str(parts["units"].get("moment", "N*m")),
-    )
-
-
-def _text(table: dict[str, Any], key: str, path: Path) -> str | None:
-    text: str | None = _typed(table, key, str, None, path)
-    return text
-
-
-def _typed(table: dict[str, Any], key: str, kind: type, default: Any, path: Path) -> Any:
-    value = table.get(key, default)
-    if value is default or isinstance(value, kind):
-        return value
-    names = {dict: "a table", list: "a list", str: "a text", bool: "true or false"}
-    raise _wrong(path, key, value, names[kind])
-
-
-def _wrong(path: Path, key: str, got: object, expected: str) -> ConfigError:
-    return ConfigError(
-        f"the style file has a wrong value for {key!r}",
-        where=path,
-        got=got,
-        expected=expected,
-        next_step="correct it in the style file beside the template",
+        language=file.language,
+        laboratory=laboratory.name,
+        address=laboratory.address,
+        place=laboratory.place,
+        contact=laboratory.contact,
+        country=laboratory.country,
+        accreditation=laboratory.accreditation,
+        method=file.report.method,
+        authorised_by=file.report.authorised_by,
+        function=file.report.function,
+        decimal_comma=file.decimal_comma,
+        dates=file.dates,
+        missing=file.missing,
+        required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *file.required])),
+        styles=tuple((key, name) for key, name in names if name is not None),
+        decimals=file.decimals,
+        words=file.words,
+        alt=file.alt,
+        force=file.units.force,
+        moment=file.units.moment,
     )

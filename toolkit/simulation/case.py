@@ -154,15 +154,15 @@ def check_case(plan: Plan, record: str | None) -> str:
         wrong = "parameters of a tire that is no file", '[tire] file = "tire.tir" in the plan'
     if wrong is not None:
         raise ConfigError(
-            "the case cannot be made of this plan", where="[case]", got=wrong[0], expected=wrong[1],
+            "no case can be made from this plan", where="[case]", got=wrong[0], expected=wrong[1],
             next_step="change the plan's [case] or [tire]; nothing was written", rule="wrong-value",
         )  # fmt: skip
     return kind
 
 
 def _tire_text(file: FileTire) -> bytes:
-    same = read_tir(file.path).coefficients() == file.tir.coefficients()
-    return read_input(file.path, TIRE_FILE) if same else file_text(file.tir).encode()
+    unchanged = read_tir(file.path).coefficients() == file.tir.coefficients()
+    return read_input(file.path, TIRE_FILE) if unchanged else file_text(file.tir).encode()
 
 
 def _inputs(test: VirtualTest) -> list[str]:
@@ -176,8 +176,8 @@ def _inputs(test: VirtualTest) -> list[str]:
             if not name.endswith("_CMD")
             and len({float(v) for file in test.files for v in shown(file.signals, name)[[0, -1]]}) > 1
         )
-    chosen = dict.fromkeys(("SA", "FZ" if load == "measured" else "FZ_CMD", *columns))
-    return [name for name in chosen if name != "FZ" or load == "measured"]
+    columns_in_order = dict.fromkeys(("SA", "FZ" if load == "measured" else "FZ_CMD", *columns))
+    return [name for name in columns_in_order if name != "FZ" or load == "measured"]
 
 
 def _judged(plan: Plan) -> list[str]:

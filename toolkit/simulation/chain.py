@@ -17,7 +17,7 @@ from toolkit.effects.applied import acting, in_order
 from toolkit.effects.filters import lag
 from toolkit.effects.forward import driven, similar
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
-from toolkit.simulation import carriage, road
+from toolkit.simulation import carriage
 from toolkit.simulation.places import through_machine
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.steady import loaded_radius, steady_of
@@ -74,19 +74,19 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
     start = driven(start, in_order(rolling, "road"), setting, tire)
     start = driven(start, commanded, setting, tire)
     angle = setting.channels["DRUM_ANGLE"]
-    FZ = road.load_on_drum(plan.road, load=start.FZ, angle=angle)
+    FZ = carriage.load_on_drum(plan.road, load=start.FZ, angle=angle)
     FZ = through_machine({"FZ": FZ}, rolling, setting, plan.machine)["FZ"]
     start = driven(dataclasses.replace(start, FZ=FZ), turned, setting, tire)
 
     on_tire = in_order(rolling, "tire")
     heats = any(applied.effect.by_temperature for applied in on_tire)
     for _ in range(_HEAT_TURNS if heats else 1):
-        made = driven(start, on_tire, setting, tire)
-        forces = tire(made)
-        power = np.abs(forces.FY * made.V * np.sin(made.SA))
+        driven_tire = driven(start, on_tire, setting, tire)
+        forces = tire(driven_tire)
+        power = np.abs(forces.FY * driven_tire.V * np.sin(driven_tire.SA))
         setting = _warmed(plan, setting, line, power, before)
     on_top = through_machine({"FY": forces.FY, "MZ": forces.MZ}, rolling, setting, plan.machine)
-    answer = HubTire(FY=on_top["FY"], MZ=on_top["MZ"], loaded_radius=loaded_radius(plan, made.FZ))
+    answer = HubTire(FY=on_top["FY"], MZ=on_top["MZ"], loaded_radius=loaded_radius(plan, driven_tire.FZ))
     if any(applied.effect.by_slip_work for applied in on_tire):
         # The effect counts the work of the tire as new: what wear itself adds to it is of second order.
         new = driven(
@@ -97,7 +97,7 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
     gap = plan.motion.between_files_s
     warmth = float(setting.channels["T_TREAD"][-1] - setting.channels["T_AMBIENT"][-1])
     return Walked(
-        hub=carriage.hub_loads(plan.carriage, tire=answer, FZ=made.FZ),
+        hub=carriage.hub_loads(plan.carriage, tire=answer, FZ=driven_tire.FZ),
         SA=start.SA,
         sensed=carriage.sensed_angle(plan.carriage, SA=wheel),
         setting=setting,
@@ -115,7 +115,7 @@ def _setting(plan: Plan, run: RunSteps, line: Timeline, before: Before, speed: f
     ambient = plan.motion.ambient_K + plan.motion.ambient_drift_K_s * elapsed
     pressure = plan.pressure_Pa if run.pressure_Pa is None else run.pressure_Pa
     turns = {
-        name: road.drum_angle(
+        name: carriage.drum_angle(
             time=line.clock, speed_m_s=speed, radius_m=radius, start_rad=0.0, reverse=reverse
         )
         for name, radius in (

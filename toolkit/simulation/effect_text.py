@@ -140,23 +140,23 @@ def _one_of(part: str, choices: Sequence[str], effect: Effect, where: str) -> st
 
 def _condition(text: str, where: str) -> Condition:
     key, colon, values = text.partition(":")
-    chosen = tuple(level.strip() for level in values.split("+"))
-    if not key.strip() or not colon or not all(chosen):
+    levels = tuple(level.strip() for level in values.split("+"))
+    if not key.strip() or not colon or not all(levels):
         raise _wrong(
             "a condition is not whole", where, f"@{text}", "@KEY:VALUE or @KEY:VALUE+VALUE",
             "write for example @order:1+2",
         )  # fmt: skip
-    return key.strip(), chosen
+    return key.strip(), levels
 
 
 def _unit(parameter: EffectParameter, machine: Machine, channel: str | None, source: str | None) -> str:
     if "{" not in parameter.unit:
         return parameter.unit
     names = {"channel": channel, "from": source}
-    shown = {key: "1" if name is None else unit_of(machine, name) for key, name in names.items()}
+    texts = {key: "1" if name is None else unit_of(machine, name) for key, name in names.items()}
     if parameter.unit != "{channel}":  # "1/N*m" would be read from left to right
-        shown = {key: f"({text})" if set("/*") & set(text) else text for key, text in shown.items()}
-    return re.sub(r"\((\w+)\)", r"\1", parameter.unit.format_map(shown))  # no brackets around one name
+        texts = {key: f"({text})" if set("/*") & set(text) else text for key, text in texts.items()}
+    return re.sub(r"\((\w+)\)", r"\1", parameter.unit.format_map(texts))  # no brackets around one name
 
 
 def _values(
@@ -165,7 +165,8 @@ def _values(
     if not effect.parameters:
         if value_text is not None:
             raise _wrong(
-                f"effect {effect.name!r} is there or not", where, value_text or "nothing", "no value",
+                f"effect {effect.name!r} has no size: it is present or absent", where,
+                value_text or "nothing", "no value",
                 "leave out the = and what follows",
             )  # fmt: skip
         return {}
@@ -204,7 +205,8 @@ def _number(effect: Effect, parameter: EffectParameter, text: str, stated: str, 
         value *= _factor(match[2], stated, parameter, where)
     if not parameter.bounds[0] <= value <= parameter.bounds[1]:
         raise _wrong(
-            f"the parameter {parameter.name!r} of {effect.name!r} cannot be that", where, text.strip(),
+            f"the parameter {parameter.name!r} of {effect.name!r} cannot have that value", where,
+            text.strip(),
             f"from {parameter.bounds[0]:g} to {parameter.bounds[1]:g} {stated}", "give another value",
         )  # fmt: skip
     return value
@@ -233,9 +235,9 @@ def _usual(parameter: EffectParameter) -> float:
 
 
 def _wrong(
-    what: str, where: str, got: object, expected: str, next_step: str, cause: UnitError | None = None
+    problem: str, where: str, actual: object, expected: str, next_step: str, cause: UnitError | None = None
 ) -> ConfigError:
     return ConfigError(
-        what, where=where, got=got, expected=expected, next_step=next_step,
+        problem, where=where, got=actual, expected=expected, next_step=next_step,
         rule=(cause.rule if cause else None) or "effect-value",
     )  # fmt: skip

@@ -196,11 +196,11 @@ def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[Fitted
         effect = find_effect(_text(table.get("name"), f"{where}.name"), where=where)
         parameters = _parameters(table.get("parameters", {}), f"{where}.parameters")
         check_keys({parameter.name: 0 for parameter in parameters}, effect.names, where=f"{where}.parameters")
-        there = {parameter.name for parameter in parameters}
+        names = {parameter.name for parameter in parameters}
         parameters += tuple(
             ModelParameter(name=parameter.name, value=parameter.absent, unit=parameter.unit)
             for parameter in effect.parameters
-            if parameter.name not in there and parameter.absent is not None
+            if parameter.name not in names and parameter.absent is not None
         )
         missing = [name for name in effect.names if name not in {parameter.name for parameter in parameters}]
         if missing:
@@ -365,9 +365,9 @@ def _number(entry: object, where: str) -> float:
     return float(entry)
 
 
-def _wrong(what: str, where: object, got: object, expected: str) -> ConfigError:
+def _wrong(problem: str, where: object, actual: object, expected: str) -> ConfigError:
     return ConfigError(
-        what, where=where, got="nothing" if got is None else got, expected=expected,
+        problem, where=where, got="nothing" if actual is None else actual, expected=expected,
         next_step="name a file that toolkit diagnose has written; it is not edited by hand",
         rule="model-file",
     )  # fmt: skip

@@ -11,10 +11,9 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar, cast
 from toolkit.channels import Rotation
 from toolkit.declared import Above, AtLeast, Day, Entry, Fault, Format, Keyed, Names, Size, Text, Unit
 from toolkit.simulation.acquisition import AcquisitionTruth
-from toolkit.simulation.carriage import CarriageTruth
+from toolkit.simulation.carriage import CarriageTruth, RoadTruth
 from toolkit.simulation.case_plan import CasePlan
 from toolkit.simulation.cells import CellsTruth
-from toolkit.simulation.road import RoadTruth
 from toolkit.simulation.steps import Motion, RunSteps
 
 Kind = Literal["test", "session", "table"]

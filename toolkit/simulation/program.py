@@ -85,11 +85,11 @@ def _linear(record: CalibrationRecord, fit: LoadFit) -> tuple[float, ...]:
     )
 
 
-def _unfit(record: CalibrationRecord, got: str, expected: str) -> RecordError:
+def _unfit(record: CalibrationRecord, actual: str, expected: str) -> RecordError:
     return RecordError(
         f"record {record.id} cannot be given to the virtual machine's acquisition program",
         where=record.id,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="simulate without a registry, or calibrate the virtual machine by a linear session",
     )

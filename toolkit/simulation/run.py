@@ -152,7 +152,7 @@ def _file(
     effects = acting(plan.effects, run.conditions)
     measured = _measured(plan, line, walked, effects)
     tared = {name: measured[name] - float(tare[name].mean()) for name in CELLS}
-    shown = _computed(plan, program, own_programs, measured, effects, walked.setting)
+    columns = _computed(plan, program, own_programs, measured, effects, walked.setting)
     right = _computed(plan, true_program(plan.cells), own_programs, measured | tared, effects, walked.setting)
     rows = line.recorded
     commands = {"SA_CMD": line.SA_CMD, "FZ_CMD": line.FZ_CMD}
@@ -161,7 +161,7 @@ def _file(
     return VirtualFile(
         name=name,
         rotation=run.rotation,
-        columns=acquisition.printed(plan.machine, {k: v[rows] for k, v in (measured | shown).items()}),
+        columns=acquisition.printed(plan.machine, {k: v[rows] for k, v in (measured | columns).items()}),
         truth=_truth(name, run, line, walked),
         run=run,
         signals={symbol: values[rows] for symbol, values in signals.items()},
@@ -180,16 +180,16 @@ def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Sequence[Appl
         plan.cells,
         hub=carriage.HubLoads(FY=sensed["FY"], MZ=sensed["MZ"], MX=sensed["MX"], FZ=hub.FZ),
     )
-    shown = {name: bridge[:, i] for i, name in enumerate(CELLS)}
-    shown = through_machine(
-        {**sensed, **shown},
+    readings = {name: bridge[:, i] for i, name in enumerate(CELLS)}
+    readings = through_machine(
+        {**sensed, **readings},
         [at_cell for at_cell in at_cells if at_cell.channel in CELLS],
         walked.setting,
         machine,
     )
     channels = acquisition.digitise(
         plan.acquisition,
-        cells=np.column_stack([shown[name] for name in CELLS]),
+        cells=np.column_stack([readings[name] for name in CELLS]),
         FZ=sensed["FZ"],
         SA=walked.sensed,
         noise=line.noise,
@@ -281,5 +281,5 @@ def _is_in_tare(applied: AppliedEffect) -> bool:
 def _tare_values(plan: Plan, rows: Signals) -> tuple[tuple[tuple[str, float], ...], str]:
     unit = plan.machine.column(CELLS[0]).unit
     means = {name: np.array([rows[name].mean()]) for name in CELLS}
-    shown = acquisition.printed(plan.machine, means)
-    return tuple((name, float(shown[name][0])) for name in CELLS), unit
+    printed = acquisition.printed(plan.machine, means)
+    return tuple((name, float(printed[name][0])) for name in CELLS), unit

@@ -70,9 +70,9 @@ def schedule() -> tuple[Point, ...]:
             points.append(Point(shares=(shares[0], shares[1], shares[2]), direction=direction))
     for FY, MZ, MX in itertools.product((1.0, -1.0), repeat=3):
         # A lateral force and an overturning moment of opposite signs load E5 most: its capacity limits.
-        most = 1.0 if FY == MX else 0.6
+        share = 1.0 if FY == MX else 0.6
         for level, direction in ((0.5, "up"), (1.0, "up"), (0.5, "down")):
-            scale = most * level
+            scale = share * level
             points.append(Point(shares=(FY * scale, MZ * scale, MX * scale), direction=direction))
     points.append(Point(shares=(0.0, 0.0, 0.0), direction="down"))
     return tuple(points)

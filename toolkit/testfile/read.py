@@ -66,8 +66,8 @@ def read_test_file(path: Path) -> TestResult:
     }
     items = {str(row["item"]): row["value"] for row in sheets["provenance"]}
     if items.get("kind") != KIND or items.get("schema") != SCHEMA:
-        got = f"{items.get('kind')}, schema {items.get('schema')}"
-        raise _broken(path, got, f"{KIND}, schema {SCHEMA}")
+        kind = f"{items.get('kind')}, schema {items.get('schema')}"
+        raise _broken(path, kind, f"{KIND}, schema {SCHEMA}")
     try:
         result = _result(sheets, items)
     except (KeyError, ValueError, TypeError, IndexError) as error:
@@ -90,11 +90,11 @@ def _open(path: Path) -> Any:
     return CalamineWorkbook.from_filelike(BytesIO(check_workbook(path).data))
 
 
-def _broken(path: Path, got: str, expected: str) -> RecordingError:
+def _broken(path: Path, actual: str, expected: str) -> RecordingError:
     return RecordingError(
         "the file is no reduced test",
         where=path,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="give the folder of the test, or a file made by 'toolkit process --out'",
         rule="not-a-test-file",
@@ -303,8 +303,8 @@ def _row(cells: Cells, budgets: _Budgets, directions: Sequence[Direction]) -> Ro
     SA = number(cells["SA_rad"]) if "SA_rad" in cells else None
     estimate = _estimate(cells["value"], cells["u"], cells["dof"], cells["unit"])
     if estimate is None:
-        there = [direction for direction in directions if direction.group.load_N == load]
-        return lacking_row(by_name()[name], (load, rotation, SA), there)
+        at_load = [direction for direction in directions if direction.group.load_N == load]
+        return lacking_row(by_name()[name], (load, rotation, SA), at_load)
     return Row(
         name=by_name()[name].name,
         load_N=load,

@@ -53,9 +53,9 @@ class Sheet:
 def in_unit(value: float | None, unit: str, digits: int) -> Shown:
     """Return a number whose cell shows its unit: the value itself stays a number."""
     place = f"0.{'0' * digits}" if digits else "0"
-    shown = unit.replace("*", "·").replace("deg", "°")
+    printed = unit.replace("*", "·").replace("deg", "°")
     finite = None if value is None or not math.isfinite(value) else value
-    return Shown(value=finite, number_format=f'#,##{place}" {shown}"')
+    return Shown(value=finite, number_format=f'#,##{place}" {printed}"')
 
 
 def readable_sheets(result: TestResult) -> tuple[Sheet, ...]:

@@ -136,33 +136,33 @@ def _machine_sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
 
 def _cell(sheet: Any, value: Any) -> Any:
     """Return a value as a sheet takes it: plain where openpyxl writes it as it is."""
-    shown = value if isinstance(value, Shown) else None
-    content = cell(value if shown is None else shown.value)
+    printed = value if isinstance(value, Shown) else None
+    content = cell(value if printed is None else printed.value)
     # openpyxl writes 16 digits; a double that needs 17 is given as its own shortest decimal, typed as the
     # number that it is.
     long = isinstance(content, float) and float(f"{content:.16g}") != content
     # A text is a text even where it begins like a formula: openpyxl would guess otherwise.
     formula = isinstance(content, str) and content.startswith("=")
-    if shown is None and not long and not formula:
+    if printed is None and not long and not formula:
         return content
-    return _styled(sheet, repr(content) if long else content, shown, is_number=long)
+    return _styled(sheet, repr(content) if long else content, printed, is_number=long)
 
 
 def _styled(sheet: Any, content: Any, shown: Shown | None, *, is_number: bool) -> Any:
     from openpyxl.cell import WriteOnlyCell
     from openpyxl.styles import Alignment, Font
 
-    made = WriteOnlyCell(sheet, value=content)
+    cell = WriteOnlyCell(sheet, value=content)
     if isinstance(content, str):
-        made.data_type = "n" if is_number else "s"
+        cell.data_type = "n" if is_number else "s"
     if shown is not None:
-        made.number_format = shown.number_format
+        cell.number_format = shown.number_format
         if shown.bold or shown.size or shown.warning:
             colour = "B3261E" if shown.warning else None
-            made.font = Font(name="Calibri", bold=shown.bold, size=shown.size or 11, color=colour)
+            cell.font = Font(name="Calibri", bold=shown.bold, size=shown.size or 11, color=colour)
         if shown.side:
-            made.alignment = Alignment(horizontal=shown.side)
-    return made
+            cell.alignment = Alignment(horizontal=shown.side)
+    return cell
 
 
 def _letter(column: int) -> str:

@@ -137,18 +137,18 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance
 def sharpened(tread: Tread, sx: Array, sy: Array, balance: Balance, *, lines: int = 1) -> Balance:
     """Return a balance with the ``inverse`` of differences: worth it where many states start from one."""
     inverse = balance.inverse.copy()
-    for one in _parts(tread, sx, lines):
-        part, here = tread.take(one), balance.take(one)
-        made = [here.sums]
+    for part_rows in _parts(tread, sx, lines):
+        part, state = tread.take(part_rows), balance.take(part_rows)
+        parts_sums = [state.sums]
         for nudge in np.eye(2) * _NUDGE:
-            moved = here.slopes + nudge[:, None]
-            made.append(_forces(part, sx[one], sy[one], moved, lines))
-        back = np.stack([_slopes(part, sums) for sums in made])
+            moved = state.slopes + nudge[:, None]
+            parts_sums.append(_forces(part, sx[part_rows], sy[part_rows], moved, lines))
+        back = np.stack([_slopes(part, sums) for sums in parts_sums])
         (a, c), (b, d) = np.eye(2)[:, :, None] - (back[1:] - back[0]) / _NUDGE
         det = a * d - b * c
         good = np.abs(det) > 1e-3
         sharp = np.array([[d, -b], [-c, a]]) / np.where(good, det, 1.0)
-        inverse[..., one] = np.where(good, sharp, here.inverse)
+        inverse[..., part_rows] = np.where(good, sharp, state.inverse)
     return Balance(sums=balance.sums, slopes=balance.slopes, inverse=inverse, settled=balance.settled)
 
 
@@ -179,11 +179,11 @@ def _balance(tread: Tread, sx: Array, sy: Array, lines: int, near: Balance | Non
     last: tuple[Array, Array] | None = None
     part = tread
     for round_ in range(_ROUNDS + _PATIENCE):
-        made = _forces(part, sx, sy, slopes, lines)
-        residual = _slopes(part, made) - slopes
+        forces = _forces(part, sx, sy, slopes, lines)
+        residual = _slopes(part, forces) - slopes
         if last is not None:
             inverse = _broyden(inverse, slopes - last[0], residual - last[1])
-        sums[:, todo], at[:, todo], answers[..., todo] = made, slopes, inverse
+        sums[:, todo], at[:, todo], answers[..., todo] = forces, slopes, inverse
         open_ = np.abs(residual).max(axis=0) > _TOLERANCE
         settled[todo] = ~open_
         far = np.flatnonzero(open_ & searched)
@@ -204,22 +204,22 @@ def across(tread: Tread, sy: Array, slopes: Array) -> Array:
     step, between, weight, lever = _quadrature(u)
     level, tilt = sy - slopes[0], slopes[1] + tread.curve
     gain, lean = tread.half_C * step * level, tread.half_C * step * tilt
-    most = tread.limit / (1.0 + tread.fade * np.abs(level - tilt * u[:, None]))
+    limit = tread.limit / (1.0 + tread.fade * np.abs(level - tilt * u[:, None]))
     rise = gain - lean * between[:, None]
     rise[0] *= 0.5  # the first middle lies half a step behind the edge
-    tried, w, least = np.empty_like(most), np.empty_like(most), -most
-    held = np.zeros_like(sy)
-    for wanted, kept, grows, low, high in zip(tried, w, rise, least, most, strict=True):
-        np.subtract(held, grows, out=wanted)
+    trial, w, least = np.empty_like(limit), np.empty_like(limit), -limit
+    shear = np.zeros_like(sy)
+    for wanted, kept, grows, low, high in zip(trial, w, rise, least, limit, strict=True):
+        np.subtract(shear, grows, out=wanted)
         np.maximum(wanted, low, out=kept)
         np.minimum(kept, high, out=kept)
-        held = kept
-    turns, edge, spare = _turns(most - np.abs(tried))
-    edge *= np.sign(tried[turns])
+        shear = kept
+    turns, edge, spare = _turns(limit - np.abs(trial))
+    edge *= np.sign(trial[turns])
     total = weight @ w + _added(edge, turns, sy.shape)
     moment = lever @ w + _added(edge * between[turns[0]], turns, sy.shape)
     # The last path ends at the last middle.
-    edge = _end(spare, np.abs(held), np.abs(gain - u[-1] * lean)) * np.sign(held)
+    edge = _end(spare, np.abs(shear), np.abs(gain - u[-1] * lean)) * np.sign(shear)
     return np.stack([np.zeros_like(sy), total + edge, moment - edge]) * step
 
 
@@ -238,18 +238,18 @@ def both(tread: Tread, sx: Array, sy: Array, slopes: Array, lines: int) -> Array
     gain, lean, ahead = reach * level, reach * tilt, reach * along
     rise = gain - lean * between[:, None]
     rise[0] *= 0.5
-    most = np.broadcast_to(tread.limit[:, None], (len(u), *along.shape))
+    limit = np.broadcast_to(tread.limit[:, None], (len(u), *along.shape))
     if np.any(tread.fade):
         speed = along**2 + ((level - tilt * u[:, None]) ** 2)[:, None]
         np.sqrt(speed, out=speed)
         speed *= tread.fade
         speed += 1.0
-        most = np.divide(most, speed, out=speed)
-    wx, wy, size = (np.empty(most.shape) for _ in range(3))
+        limit = np.divide(limit, speed, out=speed)
+    wx, wy, size = (np.empty(limit.shape) for _ in range(3))
     share, last_x, last_y = np.empty_like(along), np.zeros_like(along), np.zeros_like(along)
     grows_x = 0.5 * ahead
     with np.errstate(divide="ignore", invalid="ignore"):
-        for x, y, long, grows, high in zip(wx, wy, size, rise, most, strict=True):
+        for x, y, long, grows, high in zip(wx, wy, size, rise, limit, strict=True):
             np.add(last_x, grows_x, out=x)
             np.subtract(last_y, grows, out=y)
             np.multiply(x, x, out=long)
@@ -262,16 +262,16 @@ def both(tread: Tread, sx: Array, sy: Array, slopes: Array, lines: int) -> Array
             x *= share
             y *= share
             last_x, last_y, grows_x = x, y, ahead
-    turns, edge, spare = _turns(most - size)
-    edge /= np.maximum(most[turns], _TINY)
+    turns, edge, spare = _turns(limit - size)
+    edge /= np.maximum(limit[turns], _TINY)
     edge_y = edge * wy[turns]
     flat_x, flat_y = wx.reshape(len(u), -1), wy.reshape(len(u), -1)
     fx = (weight @ flat_x).reshape(along.shape) + _added(edge * wx[turns], turns, along.shape)
     fy = (weight @ flat_y).reshape(along.shape) + _added(edge_y, turns, along.shape)
     moment = (lever @ flat_y).reshape(along.shape)
     moment += _added(edge_y * between[turns[0]], turns, along.shape)
-    held = np.sqrt(last_x**2 + last_y**2)
-    end = _end(spare, held, reach * np.hypot(along, level - tilt * u[-1])) / np.maximum(held, _TINY)
+    shear = np.sqrt(last_x**2 + last_y**2)
+    end = _end(spare, shear, reach * np.hypot(along, level - tilt * u[-1])) / np.maximum(shear, _TINY)
     fx += last_x * end
     fy += last_y * end
     moment -= last_y * end

@@ -98,7 +98,7 @@ def restricted_likelihood(residual: Array, columns: Array, lengths: NDArray[np.i
     earlier *= ~last[:, None, :]
     later, head = rows[..., 1:], rows[..., :1]
     lag = later @ earlier.transpose(0, 2, 1)
-    squares = [one @ one.transpose(0, 2, 1) for one in (later, earlier, head)]
+    squares = [block @ block.transpose(0, 2, 1) for block in (later, earlier, head)]
     rho = RHO[:, None, None]
     M = squares[0][:, None] - rho * (lag + lag.transpose(0, 2, 1))[:, None]
     M = M + rho**2 * squares[1][:, None] + (1 - rho**2) * squares[2][:, None]
@@ -106,8 +106,8 @@ def restricted_likelihood(residual: Array, columns: Array, lengths: NDArray[np.i
     b = M[..., :p, p]
     rss = M[..., p, p] - np.vecdot(b, np.linalg.solve(A, b[..., None])[..., 0])
     _, logdet = np.linalg.slogdet(A)
-    left = (lengths - p)[:, None]
-    likelihood = -left * np.log(np.maximum(rss, 1e-300)) - logdet + np.log(1 - RHO**2)
+    remaining = (lengths - p)[:, None]
+    likelihood = -remaining * np.log(np.maximum(rss, 1e-300)) - logdet + np.log(1 - RHO**2)
     return np.asarray(0.5 * likelihood)
 
 
@@ -233,11 +233,11 @@ class _Part:
         G = moved @ self.basis.transpose(0, 2, 1)  # (nodes, curves, p, p)
         n = self.lengths
         trace = np.einsum("kcpp->kc", G)
-        left = np.maximum(n - trace, 1.0)
+        remaining = np.maximum(n - trace, 1.0)
         square = _sum_of_squares(rho, n) - 2 * np.einsum("kcpn,kcpn->kc", moved, moved)
         square = np.maximum(square + np.einsum("kcpq,kcqp->kc", G, G), 1e-300)
-        s2 = np.fmax(cost / left, known)
-        return s2[..., None, None] * G, s2, left**2 / square
+        s2 = np.fmax(cost / remaining, known)
+        return s2[..., None, None] * G, s2, remaining**2 / square
 
 
 def _correlated(rows: Array, rho: Array, lengths: NDArray[np.intp]) -> Array:
@@ -245,15 +245,15 @@ def _correlated(rows: Array, rho: Array, lengths: NDArray[np.intp]) -> Array:
     # length. Its inverse is tridiagonal, over 1 - rho^2: 1 + rho^2 (1 at both ends) and -rho beside.
     from scipy.linalg.lapack import dptsv
 
-    made = np.zeros((len(rho), *rows.shape))
+    products = np.zeros((len(rho), *rows.shape))
     for curve, n in enumerate(lengths):
         right = rows[curve, :, :n].T
-        for node, one in enumerate(rho[:, curve].tolist()):
-            diagonal = np.full(n, 1.0 + one * one)
+        for node, correlation in enumerate(rho[:, curve].tolist()):
+            diagonal = np.full(n, 1.0 + correlation * correlation)
             diagonal[0] = diagonal[-1] = 1.0
-            product = dptsv(diagonal, np.full(n - 1, -one), right)[2]
-            made[node, curve, :, :n] = (1.0 - one * one) * product.T
-    return made
+            product = dptsv(diagonal, np.full(n - 1, -correlation), right)[2]
+            products[node, curve, :, :n] = (1.0 - correlation * correlation) * product.T
+    return products
 
 
 def _sum_of_squares(rho: Array, n: NDArray[np.intp]) -> Array:

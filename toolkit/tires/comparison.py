@@ -65,8 +65,8 @@ class Comparison:
     @property
     def conditions(self) -> tuple[tuple[str, str], ...]:
         """(condition, channel) in their order: pure before combined."""
-        found = dict.fromkeys((row.condition, row.channel) for row in self.rows)
-        return tuple(sorted(found, key=lambda one: (one[0] != "pure", CHANNELS.index(one[1]))))
+        conditions = dict.fromkeys((row.condition, row.channel) for row in self.rows)
+        return tuple(sorted(conditions, key=lambda pair: (pair[0] != "pure", CHANNELS.index(pair[1]))))
 
     def get(self, model: str, condition: str, channel: str) -> ComparisonRow | None:
         """Return one entry of the table, None where the model has none."""
@@ -91,24 +91,24 @@ def compare(
     seconds: Mapping[str, float] | None = None,
 ) -> Comparison:
     """Return the table of the models that were fitted to these rows; ``curves`` are of single loads."""
-    made = []
+    rows = []
     for name in dict.fromkeys(curve.model for curve in curves):
-        own = [curve for curve in curves if curve.model == name]
+        fitted_curves = [curve for curve in curves if curve.model == name]
         for channel in ("FY", "MZ"):
-            if channel in data.channels and any(one.channel == channel for one in own):
-                made += _of_curves(data, [one for one in own if one.channel == channel])
+            if channel in data.channels and any(fitted.channel == channel for fitted in fitted_curves):
+                rows += _of_curves(data, [fitted for fitted in fitted_curves if fitted.channel == channel])
     for fit in models:
-        for one in fit.fits:
-            y, model = data[one.channel], fit.at_rows(one.channel)
-            free = sum(p.name not in dict(one.fixed) for p in one.parameters)
-            made += _rows(
-                data, one.model, one.channel, y, model, np.isfinite(y), free,
-                one.prediction_error_percent, one.converged, undetermined(one),
+        for fitted in fit.fits:
+            y, model = data[fitted.channel], fit.at_rows(fitted.channel)
+            free = sum(p.name not in dict(fitted.fixed) for p in fitted.parameters)
+            rows += _rows(
+                data, fitted.model, fitted.channel, y, model, np.isfinite(y), free,
+                fitted.prediction_error_percent, fitted.converged, undetermined(fitted),
             )  # fmt: skip
     floors = {
         channel: scatter_floor_percent(data.rows.SA, data[channel], cell(data)) for channel in data.channels
     }
-    return Comparison(rows=tuple(made), floors=tuple(floors.items()), seconds=tuple((seconds or {}).items()))
+    return Comparison(rows=tuple(rows), floors=tuple(floors.items()), seconds=tuple((seconds or {}).items()))
 
 
 def _of_curves(data: Measured, fits: Sequence[CurveFit]) -> list[ComparisonRow]:
@@ -116,8 +116,8 @@ def _of_curves(data: Measured, fits: Sequence[CurveFit]) -> list[ComparisonRow]:
     y, model = data[channel], np.full(len(data), np.nan)
     for fit in fits:
         if fit.load_N is not None:
-            own = data.block == int(np.argmin(np.abs(data.loads - fit.load_N)))
-            model[own] = value_at(fit, data.rows.SA[own])
+            in_block = data.block == int(np.argmin(np.abs(data.loads - fit.load_N)))
+            model[in_block] = value_at(fit, data.rows.SA[in_block])
     count = sum(len(fit.parameters) for fit in fits)
     converged = all(fit.converged for fit in fits)
     times = Counter(name for fit in fits for name in fit.not_determined)

@@ -55,12 +55,12 @@ def zero_crossing(fit: CurveFit, near: float = 0.0) -> Estimate | None:
     SA = 0.5 * (low + high)
     rising = float(y[at + 1]) > float(y[at])
     for _ in range(80):
-        here, slope = float(value_at(fit, SA)), float(slope_at(fit, SA))
-        if (here > 0) == rising:
+        force, slope = float(value_at(fit, SA)), float(slope_at(fit, SA))
+        if (force > 0) == rising:
             high = SA
         else:
             low = SA
-        step = SA - here / slope if slope else math.nan
+        step = SA - force / slope if slope else math.nan
         # Newton where it stays inside the bracket, else halve: the crossing cannot be lost.
         following = step if low <= step <= high else 0.5 * (low + high)
         if abs(following - SA) < 1e-15:

@@ -197,9 +197,10 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _cell(path: Path, line: int, name: str, got: str, expected: str, rule: str) -> CellError:
+def _cell(path: Path, line: int, name: str, actual: str, expected: str, rule: str) -> CellError:
     return CellError(
-        f"line {line}, {name}: no number", where=f"{path}, line {line}, {name}", got=got, expected=expected,
+        f"line {line}, {name}: no number", where=f"{path}, line {line}, {name}", got=actual,
+        expected=expected,
         next_step="export the file again, or mend a copy of it", rule=rule,
     )  # fmt: skip
 

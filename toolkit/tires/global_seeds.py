@@ -41,12 +41,12 @@ def seeds_of(data: Measured) -> Found:
     means, _, _ = binned(base)
     curves: list[Curve] = []
     for number, load in enumerate(base.loads):
-        own = means.block == number
+        in_block = means.block == number
         channels: tuple[Literal["FY", "MZ"], ...] = ("FY", "MZ")
         curves += [
-            _curve(means, own, channel, float(load))
+            _curve(means, in_block, channel, float(load))
             for channel in channels
-            if channel in base.channels and own.any()
+            if channel in base.channels and in_block.any()
         ]
     good = [curve for curve in curves if why_not(curve) is None]
     fits = fit_curves(good) if good else ()
@@ -75,8 +75,10 @@ def seeds_of(data: Measured) -> Found:
     return Found(seeds=seeds, fits=tuple(fits))
 
 
-def _curve(means: Measured, own: NDArray[np.bool_], channel: Literal["FY", "MZ"], load: float) -> Curve:
-    return Curve(SA=means.rows.SA[own], y=means[channel][own], channel=channel, load_N=load, axes="ISO-W")
+def _curve(means: Measured, in_block: NDArray[np.bool_], channel: Literal["FY", "MZ"], load: float) -> Curve:
+    return Curve(
+        SA=means.rows.SA[in_block], y=means[channel][in_block], channel=channel, load_N=load, axes="ISO-W"
+    )
 
 
 def _read(fit: CurveFit | None, curve: Curve, reach: float) -> tuple[float, float, float]:

@@ -172,10 +172,10 @@ def _van_der_corput(count: int, base: int) -> Array:
 
 
 def _primes(count: int) -> list[int]:
-    found: list[int] = []
+    primes: list[int] = []
     n = 2
-    while len(found) < count:
-        if all(n % prime for prime in found):
-            found.append(n)
+    while len(primes) < count:
+        if all(n % prime for prime in primes):
+            primes.append(n)
         n += 1
-    return found
+    return primes

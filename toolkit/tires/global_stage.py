@@ -104,11 +104,11 @@ class Misfit:
 
     def box(self) -> Box:
         """Return bounds and sizes of the free parameters."""
-        own = [self.model.parameters[place] for place in self.free]
+        parameters = [self.model.parameters[place] for place in self.free]
         return Box(
-            low=np.array([parameter.low for parameter in own]),
-            high=np.array([parameter.high for parameter in own]),
-            size=np.array([parameter.size for parameter in own]),
+            low=np.array([parameter.low for parameter in parameters]),
+            high=np.array([parameter.high for parameter in parameters]),
+            size=np.array([parameter.size for parameter in parameters]),
             cost_per_copy=len(self.data) * self.model.grid,
         )
 
@@ -195,18 +195,18 @@ def _search(misfit: Misfit, start: Array) -> tuple[Descent, int]:
     box = misfit.box()
     floor = _EXACT * float(np.sum(misfit.weight**2))
     best: Descent | None = None
-    asked = 0
+    evaluations = 0
     for (many, first, keep, last), reach in ((_PLAN, 3.0), (_PATIENT, 8.0)):
         x = np.concatenate([start, spread_starts(start, box, max(many - len(start), 0), reach=reach)])
-        best, more = _round(misfit, x, box, (first, keep, last), best)
-        asked += more
+        best, count = _round(misfit, x, box, (first, keep, last), best)
+        evaluations += count
         if best.agreeing(_SAME, floor) >= 2:
-            return best, asked
+            return best, evaluations
     # A deep and narrow valley is found again from about its end, or it is not confirmed.
     many, first, keep, last = _AGAIN
     x = spread_starts(best.x[:1], box, many, reach=5.0) if best is not None else start
-    best, more = _round(misfit, x, box, (first, keep, last), best)
-    return best, asked + more
+    best, count = _round(misfit, x, box, (first, keep, last), best)
+    return best, evaluations + count
 
 
 def _round(
@@ -286,7 +286,7 @@ def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tu
     from scipy.special import fdtri
 
     factor = coverage_factor(dof)
-    kept: set[int] = set()
+    survivors: set[int] = set()
     r = misfit(x)[0]
     total, rounding = float(r @ r), _EXACT * float(np.sum((misfit.y * misfit.weight) ** 2))
     while misfit.free:
@@ -295,16 +295,16 @@ def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tu
         allowed = np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
         bound = np.array(_at_bound(x[0], box))
         excess = np.where(bound, 10.0, factor * errors / allowed)
-        excess[[place in kept for place in misfit.free]] = 0.0
+        excess[[place in survivors for place in misfit.free]] = 0.0
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
             break
         place = misfit.free[worst]
         spec = misfit.model.parameters[place]
         value = float(x[0, worst])
-        others = np.delete(x, worst, axis=1)
+        remaining_starts = np.delete(x, worst, axis=1)
         misfit.hold(place, spec.default)
-        trial = descend(misfit, others.copy(), misfit.box(), steps=12, tolerance=1e-7)
+        trial = descend(misfit, remaining_starts.copy(), misfit.box(), steps=12, tolerance=1e-7)
         count = len(fixed) + 1
         allowed_rise = min(count * float(fdtri(count, dof, _LEVEL)) * variance, _SAME * total)
         if trial.cost[0] <= total + allowed_rise + rounding:
@@ -315,7 +315,7 @@ def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tu
             # with it stay true, and is named.
             misfit.base[place] = value
             misfit.free.insert(worst, place)
-            kept.add(place)
+            survivors.add(place)
     return x
 
 

@@ -41,14 +41,14 @@ def parameters(
     >>> one.low, one.needs, one.text
     (0.05, ('two_loads', 'camber'), 'friction at FNOMIN')
     """
-    made = []
+    rows = []
     for line in filter(None, text.splitlines()):
         name, line = line.split(maxsplit=1)
         own_unit, line = (unit, line) if unit is not None else line.split(maxsplit=1)
         default, low, high, size, line = line.split(maxsplit=4)
         own_stage, line = (stage, line) if stage is not None else line.split(maxsplit=1)
         needs, words = line.split(maxsplit=1)
-        made.append(
+        rows.append(
             GlobalParameter(
                 name=name,
                 unit=own_unit,
@@ -61,4 +61,4 @@ def parameters(
                 needs=tuple(cast("Need", _NEEDS[mark]) for mark in needs.replace("-", "")),
             )
         )
-    return tuple(made)
+    return tuple(rows)

@@ -44,12 +44,12 @@ def demand_possible(value: float, unit: str, *, where: str, U: bool = False) -> 
     limit = _CHARACTERISTIC.get(unit, math.inf)
     if abs(value) <= limit and not (U and value < 0):
         return
-    shown = _SHOWN.get(unit, f"{limit:g} {unit}")
+    printed = _SHOWN.get(unit, f"{limit:g} {unit}")
     raise CellError(
         "an uncertainty is negative" if U and value < 0 else "a value is larger than any tire's",
         where=where,
         got=f"{value:g} {unit}",
-        expected=f"0 to {shown}" if U else f"at most {shown}",
+        expected=f"0 to {printed}" if U else f"at most {printed}",
         next_step="correct the cell, or the unit in the header",
         rule="wrong-value",
     )

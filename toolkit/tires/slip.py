@@ -101,10 +101,10 @@ def state(
     fade: Array = np.asarray(1.0)
     if decay and V0:
         fade = 1 / (1 + decay * np.abs(speed) * np.hypot(kappa, np.tan(angle)) / abs(V0))
-    way = np.where(speed < 0, -1.0, 1.0)
+    direction = np.where(speed < 0, -1.0, 1.0)
     return State(
-        a=way * a,
-        cosine=way * np.cos(angle),
+        a=direction * a,
+        cosine=direction * np.cos(angle),
         g=np.sin(camber) if angles == "star" else camber,
         kappa=kappa,
         FZ=load,

@@ -66,12 +66,12 @@ def solve(groups: Sequence[Problems]) -> list[Solution]:
     if (open_ := np.flatnonzero(agreeing < _ENOUGH)).size:
         patient, _ = _search(coarse.take(open_), floor[open_], _PATIENT)
         first = state.take(_rows(open_, count))
-        both = np.concatenate([first.cost.reshape(-1, count), patient.cost.reshape(-1, count)], axis=1)
-        order = np.argsort(both, axis=1)[:, :count]
-        own = np.arange(len(open_))[:, None] * count
+        costs = np.concatenate([first.cost.reshape(-1, count), patient.cost.reshape(-1, count)], axis=1)
+        order = np.argsort(costs, axis=1)[:, :count]
+        offsets = np.arange(len(open_))[:, None] * count
         taken, new = (
-            np.where(order < count, order + own, 0).ravel(),
-            np.where(order < count, 0, order - count + own),
+            np.where(order < count, order + offsets, 0).ravel(),
+            np.where(order < count, 0, order - count + offsets),
         )
         merged = first.take(taken)
         merged.put((order >= count).ravel(), patient.take(new.ravel()))
@@ -111,10 +111,10 @@ def _finish(problems: Problems, p: Array, cost: Array, agreeing: NDArray[np.intp
     order = np.argsort(cost, axis=1)
     cost = np.take_along_axis(cost, order, axis=1)
     p = np.take_along_axis(p, order[..., None], axis=1)
-    chosen = (cost <= _NEARLY * cost[:, :1] + floor[:, None]) & ~_twins(p)
-    chosen[:, 0] = True
+    nearly_best = (cost <= _NEARLY * cost[:, :1] + floor[:, None]) & ~_twins(p)
+    nearly_best[:, 0] = True
     # Rivals take few steps on the rows, those that come close to the lowest go to the end with it.
-    owner, place = np.nonzero(chosen)
+    owner, place = np.nonzero(nearly_best)
     state = descend(p[owner, place], problems.take(owner), steps=_GLANCE, tolerance=_SETTLED)
     cost = np.full((len(curves), count), np.inf)
     cost[owner, place] = state.cost
@@ -198,11 +198,11 @@ def descend(start: Array | State, problems: Problems, *, steps: int, tolerance: 
     settled = np.zeros(count, dtype=np.bool_)
     for step in range(steps):
         delta, length, predicted = _step(state, part, damping, radius)
-        done = settled | (predicted <= tolerance * state.cost + 1e-30)
-        if done.any():
+        finished = settled | (predicted <= tolerance * state.cost + 1e-30)
+        if finished.any():
             if step:
-                final.put_at(alive[done], state.take(np.flatnonzero(done)))
-            keep = np.flatnonzero(~done)
+                final.put_at(alive[finished], state.take(np.flatnonzero(finished)))
+            keep = np.flatnonzero(~finished)
             if not len(keep):
                 return final
             alive, state, part = alive[keep], state.take(keep), part.take(keep)
@@ -339,11 +339,11 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
         state = descend(state.p, part, steps=6, tolerance=1e-9)
         if np.all(np.abs(state.cost - before) <= 1e-6 * before):
             break
-    used = problems.sw > 0
+    weighted = problems.sw > 0
     inside = np.clip(1.0 - share**2, 0.0, None)
-    count = used.sum(axis=1)
-    curvature = np.sum(np.where(used, inside * (1 - 5 * share**2), 0), axis=1) / count
-    mean = np.sum(np.where(used, inside**2, 0), axis=1) / count
+    count = weighted.sum(axis=1)
+    curvature = np.sum(np.where(weighted, inside * (1 - 5 * share**2), 0), axis=1) / count
+    mean = np.sum(np.where(weighted, inside**2, 0), axis=1) / count
     influence = np.sum((_residual(state, problems) * problems.sw * inside**2) ** 2, axis=1)
     inflation = influence * mean / (np.maximum(curvature, 0.1) ** 2 * np.maximum(state.cost, 1e-300))
     rivals = theta_of(state)[:, None, :]
@@ -354,11 +354,11 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
 def _cut(problems: Problems) -> Problems:
     # Ordinates that lie far beyond most of their curve, brought nearer. It serves the starts alone: a narrow
     # peak that is cut with them is found again on the rows.
-    used = problems.sw > 0
-    once = shares(problems.u, used)
+    weighted = problems.sw > 0
+    once = shares(problems.u, weighted)
     middle = median(problems.y, once)[:, None]
     room = _ROOM * median(np.abs(problems.y - middle), once, _MOST)[:, None]
-    cut = np.where(used, np.clip(problems.y, middle - room, middle + room), 0.0)
+    cut = np.where(weighted, np.clip(problems.y, middle - room, middle + room), 0.0)
     return Problems(u=problems.u, y=cut, sw=problems.sw, low=problems.low, high=problems.high)
 
 

@@ -47,8 +47,8 @@ def library() -> tuple[Array, Array32, Array32]:
 def pick(problems: Problems, count: int) -> Array:
     """Return the ``count`` best start shapes of every curve (curves, count, 4), best first."""
     # A few curves at a time: their scores by every shape then stay in the cache.
-    each = np.arange(len(problems.u))
-    parts = [each[first : first + _AT_ONCE] for first in range(0, len(each), _AT_ONCE)]
+    places = np.arange(len(problems.u))
+    parts = [places[first : first + _AT_ONCE] for first in range(0, len(places), _AT_ONCE)]
     return np.concatenate([_pick(problems.take(part), count) for part in parts])
 
 

@@ -75,15 +75,17 @@ def levels(values: NDArray[np.float64], width: float) -> tuple[NDArray[np.intp],
         for at in np.flatnonzero((padded[1:-1] > padded[:-2]) & (padded[1:-1] >= padded[2:]))
         if density[at] > 0
     ]
-    kept: list[int] = []
+    summits: list[int] = []
     for peak in peaks:
-        if kept and density[kept[-1] : peak + 1].min() > _VALLEY * min(density[kept[-1]], density[peak]):
-            kept[-1] = max(kept[-1], peak, key=lambda at: density[at])
+        if summits and density[summits[-1] : peak + 1].min() > _VALLEY * min(
+            density[summits[-1]], density[peak]
+        ):
+            summits[-1] = max(summits[-1], peak, key=lambda at: density[at])
         else:
-            kept.append(peak)
+            summits.append(peak)
     level = np.full(len(values), -1, dtype=np.intp)
     medians: list[float] = []
-    for peak in kept:
+    for peak in summits:
         near = np.abs(values - (low + (peak + 0.5) * step)) <= width
         if near.mean() >= _LEAST:
             centre = float(np.median(values[near]))
@@ -105,7 +107,9 @@ def split_file(path: Path, axes: str | None = None) -> Sweeps:
             f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
             next_step="name one of those expected", rule="unknown-axes",
         )  # fmt: skip
-    return split(read_field_file(path), axes=next((known for known in get_args(Axes) if known == axes), None))
+    return split(
+        read_field_file(path), axes=next((system for system in get_args(Axes) if system == axes), None)
+    )
 
 
 def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
@@ -126,8 +130,8 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
     slip = columns.get("KAPPA")
     driven = slip is not None and float(np.quantile(np.abs(slip), 0.99)) > _DRIVEN
     swept = "KAPPA" if driven else "SA"
-    held = {name: columns[name] for name in ("IA", "P", *(("SA",) if driven else ())) if name in columns}
-    marks = {name: levels(values, float(_WIDTHS[name])) for name, values in held.items()}
+    varied = {name: columns[name] for name in ("IA", "P", *(("SA",) if driven else ())) if name in columns}
+    marks = {name: levels(values, float(_WIDTHS[name])) for name, values in varied.items()}
     marks["FZ"] = levels(load, _LOAD_WIDTH * float(np.quantile(load, 0.99)))
     direction = _direction(columns[swept], columns["t"], float(_RATES[swept]))
     usable = np.all([at >= 0 for at, _ in marks.values()], axis=0)
@@ -140,22 +144,24 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
     ])[usable]  # fmt: skip
     cells, where, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
     sums = np.column_stack([np.bincount(where.reshape(-1), weights=column) for column in data[usable].T])
-    kept = count >= _FEW
-    if not kept.any():
+    populated = count >= _FEW
+    if not populated.any():
         raise FitError(
-            "nothing of the test is a sweep", where=file.path, got=f"{file.rows} samples",
+            "the test has no sweep", where=file.path, got=f"{file.rows} samples",
             expected="slip that is swept at levels of load", next_step="look at the channels of the file",
             rule="no-curve",
         )  # fmt: skip
-    means = sums[kept] / count[kept, None]
+    means = sums[populated] / count[populated, None]
     symbols = dict(zip(names, means.T, strict=True))
     table = TireTable(path=file.path, axes=axes or file.axes, columns=tuple(symbols.items()))
     return Sweeps(
         table=table,
-        sweeps=_sweeps(cells[kept], count[kept], {name: medians for name, (_, medians) in marks.items()}),
+        sweeps=_sweeps(
+            cells[populated], count[populated], {name: medians for name, (_, medians) in marks.items()}
+        ),
         swept=swept,
         samples=file.rows,
-        left_out=file.rows - int(count[kept].sum()),
+        left_out=file.rows - int(count[populated].sum()),
     )
 
 

@@ -166,9 +166,9 @@ def _without_marks(
     at = [i for i, cell in enumerate(header) if cell.strip().lower() == MARKS]
     if len(at) != 1:
         return lines, ()
-    rest = [(row, cells[: at[0]] + cells[at[0] + 1 :]) for row, cells in lines]
+    unmarked = [(row, cells[: at[0]] + cells[at[0] + 1 :]) for row, cells in lines]
     texts = [cells[at[0]].strip() for _, cells in lines[1:] if len(cells) > at[0]]
-    return rest, tuple(dict.fromkeys(mark for mark in texts if mark))
+    return unmarked, tuple(dict.fromkeys(mark for mark in texts if mark))
 
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:
@@ -199,18 +199,18 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
 
 def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
     # "SA [deg]" -> symbol, factor and offset to SI.
-    known = {symbol.upper(): symbol for symbol in CHANNELS}
+    symbols = {symbol.upper(): symbol for symbol in CHANNELS}
 
     def symbol_of(name: str) -> str | None:
-        return name if name in CHANNELS else known.get(name.upper() if len(name) > 1 else name)
+        return name if name in CHANNELS else symbols.get(name.upper() if len(name) > 1 else name)
 
     name, text = split_header(cell, lambda name: symbol_of(name) is not None)
     symbol = symbol_of(name)
     if symbol is None:
-        near = difflib.get_close_matches(name.upper(), known, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(name.upper(), symbols, n=1, cutoff=0.5)
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
-            f"{known[near[0]]} [unit]" if near else "SA FZ FY MZ, optional IA P V FX KAPPA t",
+            f"{symbols[near[0]]} [unit]" if near else "SA FZ FY MZ, optional IA P V FX KAPPA t",
         )  # fmt: skip
     if text is None:
         _refuse(
@@ -276,7 +276,12 @@ def _refuse_impossible(
     )
 
 
-def _refuse(path: Path, rule: str, what: str, got: str, expected: str) -> NoReturn:
+def _refuse(path: Path, rule: str, problem: str, actual: str, expected: str) -> NoReturn:
     raise ColumnError(
-        what, where=path, got=got, expected=expected, next_step="mend the header row of the table", rule=rule
+        problem,
+        where=path,
+        got=actual,
+        expected=expected,
+        next_step="mend the header row of the table",
+        rule=rule,
     )

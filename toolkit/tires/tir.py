@@ -72,18 +72,18 @@ class TirFile:
     @property
     def sections(self) -> tuple[tuple[str, tuple[tuple[str, str | float], ...]], ...]:
         """Entries as (section, ((key, value), ...)), in their order."""
-        found: dict[str, list[tuple[str, str | float]]] = {}
+        sections: dict[str, list[tuple[str, str | float]]] = {}
         for line in self.lines:
             if line.section:
-                found.setdefault(line.section, [])
+                sections.setdefault(line.section, [])
             if line.key:
-                found[line.section].append((line.key, line.value))
-        return tuple((name, tuple(entries)) for name, entries in found.items())
+                sections[line.section].append((line.key, line.value))
+        return tuple((name, tuple(entries)) for name, entries in sections.items())
 
     def comment(self, begins: str) -> str | None:
         """Return the first comment that begins with a text, without its sign; None where there is none."""
-        found = (line.text.lstrip("!$ ") for line in self.lines if not line.key and line.text)
-        return next((text.rstrip() for text in found if text.startswith(begins)), None)
+        comments = (line.text.lstrip("!$ ") for line in self.lines if not line.key and line.text)
+        return next((text.rstrip() for text in comments if text.startswith(begins)), None)
 
     def section(self, name: str) -> dict[str, str | float]:
         """Return a section's entries, empty where there is none."""
@@ -168,10 +168,10 @@ class TirFile:
         names = ignored(self.version, self._written())
         if not names:
             return ()
-        other = {"5.2": "6.x", "6.x": "5.2"}[self.version]
+        version = {"5.2": "6.x", "6.x": "5.2"}[self.version]
         text = (
             f"the file is of MF {self.version} ({self._kind_as_written(self.get('FITTYP'))}): "
-            f"{', '.join(names)} of MF {other} {'is' if len(names) == 1 else 'are'} not evaluated"
+            f"{', '.join(names)} of MF {version} {'is' if len(names) == 1 else 'are'} not evaluated"
         )
         return (Finding(rule="tir-foreign-names", where=self.where, message=text),)
 
@@ -224,9 +224,9 @@ def parse_tir(text: str, *, where: str = "") -> TirFile:
     return tir_file
 
 
-def _no_tir(where: object, got: str) -> UnreadableError:
+def _no_tir(where: object, actual: str) -> UnreadableError:
     return UnreadableError(
-        "the file is no tire property file", where=where, got=got, expected=_SHAPE,
+        "the file is no tire property file", where=where, got=actual, expected=_SHAPE,
         next_step="check the path", rule="not-a-tir",
     )  # fmt: skip
 

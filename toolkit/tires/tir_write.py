@@ -77,7 +77,7 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     sections: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
     for channel in _SECTIONS:
         if any(channel_fit.channel == channel for channel_fit in fit.fits):
-            own = [
+            channel_fits = [
                 parameter
                 for parameter in model.parameters
                 if parameter.stage == channel and (slips or not _of_slip(parameter))
@@ -86,7 +86,7 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
                 [("PKY4", 2.0)] if channel == "FY" and FITTYP[model.name] > 60 else []
             )
             sections.append(
-                (channel, (*((parameter.name, values[parameter.name]) for parameter in own), *extra))
+                (channel, (*((parameter.name, values[parameter.name]) for parameter in channel_fits), *extra))
             )
     return TireFit(
         FITTYP=FITTYP[model.name],
@@ -172,7 +172,7 @@ def in_si(tir: TirFile) -> tuple[TirFile, tuple[Finding, ...]]:
     units = factors(tir)
     if all(factor == 1.0 for factor in units.values()):
         return tir, ()
-    lines, kept = [], []
+    lines, preserved = [], []
     for line in tir.lines:
         value = line.value
         if line.key and line.section == "UNITS":
@@ -180,11 +180,11 @@ def in_si(tir: TirFile) -> tuple[TirFile, tuple[Finding, ...]]:
         elif isinstance(value, float) and (factor := scale(line.key, units)) is not None:
             value = value * factor
         elif _may_have_a_unit(line):
-            kept.append(line.key or f"a row of [{line.section}]")
+            preserved.append(line.key or f"a row of [{line.section}]")
         lines.append(TirLine(section=line.section, key=line.key, value=value, text=line.text))
     findings: tuple[Finding, ...] = ()
-    if kept:
-        names = ", ".join(dict.fromkeys(kept))
+    if preserved:
+        names = ", ".join(dict.fromkeys(preserved))
         findings = (
             Finding(
                 rule="tir-unit-kept",

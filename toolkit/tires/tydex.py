@@ -126,16 +126,16 @@ def _from_carrier(measured: list[TydexChannel], where: str) -> tuple[list[TydexC
     ]
     if not names:
         return measured, []
-    shown = ", ".join(names)
+    listed = ", ".join(names)
     if any(channel.symbol == "IA" and np.any(channel.values) for channel in measured):
         text = (
-            f"{shown}: not read, for with camber the axes of the wheel carrier (C) are not those of the road"
+            f"{listed}: not read, for with camber the axes of the wheel carrier (C) are not those of the road"
         )
         return measured, [Finding(rule="tydex-axes", where=where, message=text)]
     statement = (
         "the camber is zero" if "IA" in have else "the file names no camber, so that it counts as zero"
     )
-    text = f"{shown}: read from the axes of the wheel carrier (C) as of the road (W), for {statement}"
+    text = f"{listed}: read from the axes of the wheel carrier (C) as of the road (W), for {statement}"
     channels = [
         _made(channel.name, _CARRIER[channel.name.upper()], channel.unit, channel.values, where)
         if channel.name in names
@@ -273,18 +273,23 @@ def fitted(value: float) -> str:
     return f"{value:.0e}"
 
 
-def _number(text: str, where: str, what: str) -> float:
+def _number(text: str, where: str, problem: str) -> float:
     number = float(text.lower().replace("d", "e")) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
         raise CellError(
-            f"{what} is no number", where=where, got=repr(text) if text else "an empty field",
+            f"{problem} is no number", where=where, got=repr(text) if text else "an empty field",
             expected="a finite number with a decimal point", next_step="mend that line",
             rule="text-cell" if text else "empty-cell",
         )  # fmt: skip
     return number
 
 
-def _refuse(where: object, rule: str, what: str, got: object, expected: str) -> UnreadableError:
+def _refuse(where: object, rule: str, problem: str, actual: object, expected: str) -> UnreadableError:
     return UnreadableError(
-        what, where=where, got=got, expected=expected, next_step="export the file again, whole", rule=rule
+        problem,
+        where=where,
+        got=actual,
+        expected=expected,
+        next_step="export the file again, whole",
+        rule=rule,
     )

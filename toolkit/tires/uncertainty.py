@@ -235,13 +235,13 @@ def curve_columns(solution: Solution, problems: Problems) -> Array:
 
 def _box(theta: Array, problems: Problems) -> tuple[Array, Array, Array]:
     # Bounds of the six normalised parameters, and the standard deviation of "anywhere within them".
-    ones = np.ones(len(theta))
+    flat = np.ones(len(theta))
     h_low, h_high = problems.low[:, 3], problems.high[:, 3]
     low = np.stack(
-        [ones * SPAN_LOW / 2, ones * C_LOW, -D_LIMIT * ones, E_LOW * ones, h_low, -SV_LIMIT * ones], axis=1
+        [flat * SPAN_LOW / 2, flat * C_LOW, -D_LIMIT * flat, E_LOW * flat, h_low, -SV_LIMIT * flat], axis=1
     )
     high = np.stack(
-        [ones * SPAN_HIGH / 2, ones * C_HIGH, D_LIMIT * ones, E_HIGH * ones, h_high, SV_LIMIT * ones], axis=1
+        [flat * SPAN_HIGH / 2, flat * C_HIGH, D_LIMIT * flat, E_HIGH * flat, h_high, SV_LIMIT * flat], axis=1
     )
     width = (high - low) / np.sqrt(12.0)
     # B is a scale: its width is one of ratios, ln(50/0.05)/sqrt(12) = 2 times B itself.
@@ -270,17 +270,17 @@ def _rise(theta: Array, inverse: Array, half: Array, problems: Problems, low: Ar
     # interval, all else fitted again: (above and below, curves, 6). Bin means serve for long curves: their
     # rows' places count, not their values, for the curve is held against itself.
     curves = len(theta)
-    own = np.maximum(np.einsum("pii->pi", inverse), 1e-300)
+    variances = np.maximum(np.einsum("pii->pi", inverse), 1e-300)
     # Along its own row of the inverse normal matrix a parameter moves with all else where the parabola wants
     # it, and the cost rises by the square of its move over its own entry.
-    step = inverse * (half / own)[:, :, None]
+    step = inverse * (half / variances)[:, :, None]
     # Where rounding leaves no interval the cost cannot rise as it should.
-    expected = np.where(half > 0, half * half / own, np.inf)
+    expected = np.where(half > 0, half * half / variances, np.inf)
     moved = np.stack([theta[:, None] + step, theta[:, None] - step])  # (ends, curves, held, 6)
     moved = np.clip(moved, low[:, None], high[:, None]).reshape(-1, 6)
     repeat = np.tile(np.repeat(np.arange(curves), 6), 2)
     held = np.tile(np.arange(6), 2 * curves)
-    each = np.arange(len(held))
+    places = np.arange(len(held))
     part, low, high = problems.take(repeat), low[repeat], high[repeat]
     aim = value(theta.T[..., None], problems.u)[repeat]
     residual = _residual(moved, aim, part)
@@ -292,9 +292,9 @@ def _rise(theta: Array, inverse: Array, half: Array, problems: Problems, low: Ar
         diagonal[...] += 1e-9 * diagonal.max(axis=1)[:, None] + 1e-300
         right = np.matvec(columns, residual)
         # The held parameter has a row and column of the unit matrix: it stays.
-        normal[each, held, :] = normal[each, :, held] = 0.0
-        normal[each, held, held] = 1.0
-        right[each, held] = 0.0
+        normal[places, held, :] = normal[places, :, held] = 0.0
+        normal[places, held, held] = 1.0
+        right[places, held] = 0.0
         trial = np.clip(moved + _solve(normal, right), low, high)
         new = _residual(trial, aim, part)
         new_cost = np.vecdot(new, new)

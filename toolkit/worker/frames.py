@@ -86,11 +86,11 @@ def read_head(text: bytes) -> dict[str, Any]:
 def _error(content: object) -> ToolkitError:
     if not (isinstance(content, list) and len(content) == 3 and content[0] in _ERRORS):
         raise FrameError("an error of another form")
-    _, what, parts = content
-    if not (isinstance(what, str) and isinstance(parts, dict) and set(parts) <= set(_PARTS)):
+    _, problem, parts = content
+    if not (isinstance(problem, str) and isinstance(parts, dict) and set(parts) <= set(_PARTS)):
         raise FrameError("an error of another form")
     texts = {name: None if part is None else printable(str(part)) for name, part in parts.items()}
-    return _ERRORS[content[0]](printable(what), **texts)
+    return _ERRORS[content[0]](printable(problem), **texts)
 
 
 def read_arrays(

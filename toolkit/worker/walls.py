@@ -268,9 +268,9 @@ def _checked(answer: int, call: str) -> None:
         _refuse(f"{call}: {os.strerror(ctypes.get_errno())}")
 
 
-def _refuse(got: str) -> NoReturn:
+def _refuse(actual: str) -> NoReturn:
     raise ConfigError(
-        "the case's code cannot be isolated here", where="--isolated", got=got,
+        "the case's code cannot be isolated here", where="--isolated", got=actual,
         expected="a Linux kernel whose users may make name spaces, or with Landlock 6 (Linux 6.12)",
         next_step="allow name spaces to users (user.max_user_namespaces, the container's seccomp profile), "
         "or run the case without --isolated where you trust its code",

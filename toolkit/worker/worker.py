@@ -244,9 +244,9 @@ def _cause(report: bytes) -> str:
     """
     content = json.loads(report)
     if "refused" in content:
-        what, parts = content["refused"]
+        problem, parts = content["refused"]
         names = {"where", "got", "expected", "next_step", "rule"}
-        raise ConfigError(what, **{name: part for name, part in parts.items() if name in names})
+        raise ConfigError(problem, **{name: part for name, part in parts.items() if name in names})
     if "failed" in content:
         return f"it could not be started: {content['failed']}"
     if content["reason"]:
@@ -264,8 +264,8 @@ def last_words(output: bytes) -> str:
     "step 1 / Fatal Python error: Aborted / Thread 0x1: / File 'sim.py'"
     """
     text = output.decode("utf-8", "replace")
-    said, fatal, report = text.rpartition(_FATAL)
-    lines = [line for line in printable(said[-_WORDS:] if fatal else text[-_WORDS:]).splitlines() if line]
+    printed, fatal, report = text.rpartition(_FATAL)
+    lines = [line for line in printable(printed[-_WORDS:] if fatal else text[-_WORDS:]).splitlines() if line]
     if fatal:
         lines += [line for line in printable(fatal + report).splitlines() if line.strip()][:3]
     return " / ".join(line.strip() for line in lines)

@@ -22,8 +22,7 @@ from tests.calibration.dcc.dcc_factory import (
 )
 from tests.conftest import SHARED_DATA
 from tests.trust.seal.seal_factory import DAY, NOW, authority, key
-from toolkit.calibration.dcc.certificate import certificate_of
-from toolkit.calibration.dcc.standard import Standards
+from toolkit.calibration.dcc.standard import Standards, certificate_of
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.stored import stored_check, stored_loads, stored_session

@@ -16,7 +16,7 @@ from tests.calibration.registry.test_legacy import GOOD
 from tests.trust.forgeries.laboratory import KEYS, event_of, laboratory
 from toolkit.calibration.registry import approval, candidate, clock, ledger
 from toolkit.calibration.registry.approval import approve, withdraw
-from toolkit.calibration.registry.clock_state import clock_state
+from toolkit.calibration.registry.clock import clock_state
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
 from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry

@@ -9,7 +9,7 @@ import pytest
 from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
-from toolkit.errors import RecordError, ToolkitError
+from toolkit.errors import ConfigError, RecordError, ToolkitError
 
 GOOD = """
 schema = 1
@@ -75,6 +75,15 @@ def test_bad_files_write_nothing(tmp_path: Path, old: str, new: str) -> None:
         enter(tmp_path, GOOD.replace(old, new, 1))
     assert caught.value.exit_code == 2
     assert not (tmp_path / "cal").exists()
+
+
+def test_all_faults_are_named_at_once_with_their_lines(tmp_path: Path) -> None:
+    text = GOOD.replace('"included"', '"run"').replace("title", "titel").replace("S = 2", 'S = "2"')
+    with pytest.raises(ConfigError) as caught:
+        enter(tmp_path, text)
+    named = ("zero", "included or tared", "did you mean 'title'?", "loads[1].coefficients.S", "| coeff")
+    for words in named:
+        assert words in str(caught.value)
 
 
 TWO = GOOD.replace(

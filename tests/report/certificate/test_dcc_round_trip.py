@@ -10,8 +10,7 @@ from lxml import etree
 
 from tests.report.certificate.test_certificate import DAY, STYLE, registry_of
 from tests.trust.seal.seal_factory import key, trust
-from toolkit.calibration.dcc.certificate import certificate_of
-from toolkit.calibration.dcc.standard import Standards
+from toolkit.calibration.dcc.standard import Standards, certificate_of
 from toolkit.calibration.dcc.structure import check_structure
 from toolkit.calibration.session.read import read_session
 from toolkit.calibration.session.statements import DigitalSource, parse_statements

@@ -289,8 +289,8 @@ def _of_phase(registry: Registry, instrument: str, phase: str) -> list[Calibrati
     ]
     dated = []
     folder = registry.folder / instrument
-    chosen = [record_id for record_id in standing if _may_state(folder, record_id, ledger, phase)]
-    for at, record in enumerate(load_many(folder, chosen, ledger).values()):
+    records = [record_id for record_id in standing if _may_state(folder, record_id, ledger, phase)]
+    for at, record in enumerate(load_many(folder, records, ledger).values()):
         if isinstance(record, ToolkitError):
             raise record
         if phase_of(record) == phase:

@@ -47,7 +47,7 @@ def evaluate_record(
     if (load is None and len(loads) > 1) or (indication is None and len(record.indications) > 1):
         raise _refused(
             record_id,
-            f"which load and which indication is not said: {COMBINED}",
+            f"the load and the indication are not stated: {COMBINED}",
             f"loads {', '.join(loads)}; indications {', '.join(record.indications)}",
             "--load and --indication",
         )
@@ -71,9 +71,11 @@ def evaluate_record(
 
 def _refused(
     where: str,
-    what: str,
-    got: object,
+    problem: str,
+    actual: object,
     expected: object,
     next_step: str = "name one of each with --load and --indication",
 ) -> SessionError:
-    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule="standard")
+    return SessionError(
+        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="standard"
+    )

@@ -188,8 +188,8 @@ def _path(element: Any) -> str:
     return path.replace(f"{{{DCC}}}", "dcc:").replace(f"{{{SI}}}", "si:")
 
 
-def _unreadable(where: object, got: str, expected: str) -> SessionError:
+def _unreadable(where: object, actual: str, expected: str) -> SessionError:
     return SessionError(
-        "a quantity of the digital certificate cannot be read", where=where, got=got, expected=expected,
+        "a quantity of the digital certificate cannot be read", where=where, got=actual, expected=expected,
         next_step="ask the issuer for a valid DCC; nothing was written", rule="dcc-quantity",
     )  # fmt: skip

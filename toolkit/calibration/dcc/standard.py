@@ -6,6 +6,8 @@ lies beside the record, and a record is held against it on every load: seal, for
 its signer is trusted is asked when the session is entered.
 
 U is the largest u = U / k of the certificate's range, with its k: no smaller one is claimed at any load.
+
+`DigitalCertificate`, the whole of it, says what was calibrated, when, by whom, with what uncertainty.
 """
 
 from __future__ import annotations
@@ -19,9 +21,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from lxml import etree
 
-from toolkit.calibration.dcc.certificate import DigitalCertificate, Item, certificate_of
-from toolkit.calibration.dcc.quantities import Point
-from toolkit.calibration.dcc.structure import check_structure
+from toolkit.calibration.dcc.quantities import Point, points_of
+from toolkit.calibration.dcc.structure import DCC, check_structure
 from toolkit.errors import SessionError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.trust.seal.check import SealCheck
@@ -32,6 +33,115 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+_SPACES = {"dcc": DCC}
+_CORE = "dcc:administrativeData/dcc:coreData"
+_LABORATORY = "dcc:administrativeData/dcc:calibrationLaboratory"
+_STATEMENT = "dcc:administrativeData/dcc:statements/dcc:statement"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Item:
+    """What was calibrated: its name, and the numbers it is known by, the maker's first."""
+
+    name: str
+    numbers: tuple[str, ...]
+
+    @property
+    def serial(self) -> str:
+        """The maker's number, else the first."""
+        return self.numbers[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DigitalCertificate:
+    """What a DCC says; dates as stated, ``due`` where it states a day of recalibration."""
+
+    identifier: str
+    laboratory: str
+    accreditation: str | None
+    calibrated: dt.date
+    issued: dt.date | None
+    due: dt.date | None
+    items: tuple[Item, ...]
+    points: tuple[Point, ...]
+
+
+def certificate_of(root: Any, *, where: object) -> DigitalCertificate:
+    """Return what a document of the right form (`structure`) says.
+
+    Raises
+    ------
+    SessionError
+        ``dcc-quantity``, ``dcc-instrument``: it names no item by a number
+    """
+    items = [
+        _identified(node) for node in root.iterfind("dcc:administrativeData/dcc:items/dcc:item", _SPACES)
+    ]
+    if not all(item.numbers for item in items):
+        raise SessionError(
+            "the digital certificate names its item by no number", where=where, got="no identification",
+            expected="a serial number", next_step="ask its issuer; nothing was written",
+            rule="dcc-instrument",
+        )  # fmt: skip
+    issued = root.findtext(f"{_CORE}/dcc:issueDate", None, _SPACES)
+    return DigitalCertificate(
+        identifier=_text(root, f"{_CORE}/dcc:uniqueIdentifier"),
+        laboratory=_content(root.find(f"{_LABORATORY}/dcc:contact/dcc:name", _SPACES)),
+        accreditation=_accreditation(root),
+        calibrated=_date(_text(root, f"{_CORE}/dcc:endPerformanceDate")),
+        issued=None if issued is None else _date(issued),
+        due=_due(root),
+        items=tuple(items),
+        points=points_of(root, where=where),
+    )
+
+
+def _identified(node: Any) -> Item:
+    listed = [
+        (_text(entry, "dcc:issuer") != "manufacturer", _text(entry, "dcc:value"))
+        for entry in node.iterfind("dcc:identifications/dcc:identification", _SPACES)
+    ]
+    numbers = [number for _, number in sorted(listed, key=lambda pair: pair[0])]
+    return Item(name=_content(node.find("dcc:name", _SPACES)), numbers=tuple(numbers))
+
+
+def _accreditation(root: Any) -> str | None:
+    code = root.findtext(f"{_LABORATORY}/dcc:calibrationLaboratoryCode", None, _SPACES)
+    if code is not None and code.strip():
+        return str(code.strip())
+    for statement in root.iterfind(_STATEMENT, _SPACES):
+        if _content(statement.find("dcc:name", _SPACES)).casefold() == "accreditation":
+            return _content(statement.find("dcc:declaration", _SPACES)) or None
+    return None
+
+
+def _due(root: Any) -> dt.date | None:
+    days = [
+        _date(text)
+        for statement in root.iterfind(_STATEMENT, _SPACES)
+        if "basic_recalibration" in (statement.get("refType") or "").split()
+        and (text := statement.findtext("dcc:date", None, _SPACES)) is not None
+    ]
+    return min(days, default=None)
+
+
+def _date(text: str) -> dt.date:
+    return dt.date.fromisoformat(text.strip().removesuffix("Z"))
+
+
+def _text(node: Any, path: str) -> str:
+    return str(node.findtext(path, "", _SPACES)).strip()
+
+
+def _content(node: Any) -> str:
+    """Return a text in English where there is one, else its first."""
+    if node is None:
+        return ""
+    contents = node.findall("dcc:content", _SPACES)
+    english = [content for content in contents if content.get("lang") == "en"] or contents
+    return " ".join((english[0].text or "").split()) if english else ""
+
 
 _UNITS = {"force": "N", "moment": "N*m"}
 _FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
@@ -92,14 +202,14 @@ def with_standard(
                 f"reference.uncertainty.{name}", "one of the two",
                 "leave it out of the session", "dcc-stated",
             )  # fmt: skip
-    chosen = {name: points for name, points in loads.items() if points}
-    if missing := [name for name in loads if name not in chosen and name not in typed]:
+    points_by_load = {name: points for name, points in loads.items() if points}
+    if missing := [name for name in loads if name not in points_by_load and name not in typed]:
         raise _refused(
             "the digital certificate does not cover a load of the session", place,
             f"no expanded uncertainty of {', '.join(missing)}", "one in N or N·m, with its coverage factor",
             "name another certificate, or state the uncertainty of that load", "dcc-quantity",
         )  # fmt: skip
-    largest = {name: max(points, key=lambda p: p.U / p.k) for name, points in chosen.items()}
+    largest = {name: max(points, key=lambda p: p.U / p.k) for name, points in points_by_load.items()}
     reference["uncertainty"] = typed | {
         name: {"U": point.U, "k": point.k, "unit": _UNITS[point.dimension]} for name, point in largest.items()
     }
@@ -116,7 +226,7 @@ def with_standard(
         "calibrated": certificate.calibrated.isoformat(),
         "issued": certificate.issued and certificate.issued.isoformat(),
         "item": {"name": item.name, "serial": item.serial},
-        "taken": {name: _provenance(chosen[name], point) for name, point in largest.items()},
+        "taken": {name: _provenance(points_by_load[name], point) for name, point in largest.items()},
     }
     return dict(raw) | {"reference": reference}
 
@@ -133,8 +243,8 @@ def check_covered(reference: Mapping[str, Any], tables: Sequence[Columns | None]
     SessionError
         ``dcc-range``
     """
-    taken = reference.get("dcc")
-    for load, entry in taken["taken"].items() if isinstance(taken, Mapping) else ():
+    stated = reference.get("dcc")
+    for load, entry in stated["taken"].items() if isinstance(stated, Mapping) else ():
         low, high = entry["range"]
         for table in tables:
             if table is None or not table.has(load):
@@ -222,8 +332,8 @@ def _demand_valid(
 
 def _chosen(certificate: DigitalCertificate, load: str, place: str) -> tuple[Point, ...]:
     """Return the points of a load: those that name it, else those that name no channel."""
-    wanted = "force" if _FORCE.match(load) else "moment" if _MOMENT.match(load) else None
-    points = [p for p in certificate.points if wanted in (None, p.dimension)]
+    quantity = "force" if _FORCE.match(load) else "moment" if _MOMENT.match(load) else None
+    points = [p for p in certificate.points if quantity in (None, p.dimension)]
     points = [p for p in points if load in p.channels] or [p for p in points if not p.channels]
     if len({point.dimension for point in points}) > 1:
         raise _refused(
@@ -248,12 +358,12 @@ def _provenance(points: Sequence[Point], point: Point) -> dict[str, Any]:
 
 
 def _refused(
-    what: str, where: object, got: object, expected: object, next_step: str, rule: str
+    problem: str, where: object, actual: object, expected: object, next_step: str, rule: str
 ) -> SessionError:
     return SessionError(
-        what,
+        problem,
         where=where,
-        got=got,
+        got=actual,
         expected=expected,
         next_step=f"{next_step}; nothing was written",
         rule=rule,

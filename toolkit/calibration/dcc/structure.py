@@ -233,8 +233,8 @@ def _expected(name: str, parent: str) -> str:
         return "a date, YYYY-MM-DD"
     if name in _CHOICES:
         return _CHOICES[name].replace(" ", " | ")
-    known = name in _NOT_EMPTY | _BOOLEANS | _LISTS or name in _PATTERNS
-    return "another text" if known else f"no element of this name in {parent}"
+    ruled = name in _NOT_EMPTY | _BOOLEANS | _LISTS or name in _PATTERNS
+    return "another text" if ruled else f"no element of this name in {parent}"
 
 
 @cache
@@ -288,11 +288,11 @@ def _by_the_schema(root: Any, version: str, where: object, schemas: Path | None)
         raise _wrong(f"{where}: line {entry.line}", entry.message[:200], f"the schema, version {version}")
 
 
-def _wrong(where: object, got: str, expected: str) -> SessionError:
+def _wrong(where: object, actual: str, expected: str) -> SessionError:
     return SessionError(
         "the digital certificate has not the form of its schema",
         where=where,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="ask the issuer for a valid DCC; nothing was written",
         rule="dcc-schema",

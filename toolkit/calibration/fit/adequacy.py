@@ -280,21 +280,21 @@ def _unnamed(session: Session) -> list[str]:
     return ["one of " + ", ".join(n for n in ("FX", "FY", "FZ", "MX", "MY", "MZ") if n not in present)]
 
 
-def _missing(session: Session, names: list[str], got: str) -> SessionError:
+def _missing(session: Session, names: list[str], actual: str) -> SessionError:
     return _refused(
         session,
         f"the reference loads do not span the unknowns: {', '.join(names)} "
         f"{'is' if len(names) == 1 else 'are'} missing",
-        got,
+        actual,
         "each load varied independently of the others", "not-spanning",
         f"add rows in which {' and '.join(names)} varies by itself",
     )  # fmt: skip
 
 
 def _refused(
-    session: Session, what: str, got: object, expected: object, rule: str, next_step: str
+    session: Session, problem: str, actual: object, expected: object, rule: str, next_step: str
 ) -> SessionError:
     return SessionError(
-        what, where=session.path, got=got, expected=expected,
+        problem, where=session.path, got=actual, expected=expected,
         next_step=next_step + "; nothing was written", rule=rule,
     )  # fmt: skip

@@ -110,7 +110,9 @@ def fit_balance(
         responses=tuple(responses),
         loads=names,
         terms=terms,
-        coefficients=np.array([(*fit.coefficients, *more) for fit, more in zip(fits, fixed, strict=True)]),
+        coefficients=np.array(
+            [(*fit.coefficients, *constants) for fit, constants in zip(fits, fixed, strict=True)]
+        ),
         fits=fits,
         full_scale=np.array([float(np.abs(values).max()) for values in loads.values()]),
         not_excited=tuple(name for name in balance_terms if name not in terms),
@@ -216,10 +218,10 @@ def _derivatives(name: str, loads: Sequence[str], at: NDArray[np.float64]) -> ND
 
 
 def _failed(
-    what: str, got: object, expected: object, next_step: str, *, rule: str = "balance"
+    problem: str, actual: object, expected: object, next_step: str, *, rule: str = "balance"
 ) -> SessionError:
     return SessionError(
-        what, where="balance form", got=got, expected=expected, next_step=next_step, rule=rule
+        problem, where="balance form", got=actual, expected=expected, next_step=next_step, rule=rule
     )
 
 

@@ -67,9 +67,9 @@ def diagnose(
     freed = e / np.sqrt(complement)
     internal = freed / np.sqrt(max(variance, tiny))
     if dof > 1:
-        left = sse - freed**2
-        left /= dof - 1
-        external = freed / np.sqrt(np.maximum(left, tiny, out=left))
+        remaining = sse - freed**2
+        remaining /= dof - 1
+        external = freed / np.sqrt(np.maximum(remaining, tiny, out=remaining))
     else:
         external = internal
     deleted = e / complement

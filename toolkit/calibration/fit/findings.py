@@ -59,11 +59,11 @@ def _repeated(rows: NDArray[np.float64], where: str) -> list[Finding]:
     if not repeated.size:
         return []
     pairs = [f"{at + 1} = {first[inverse[at]] + 1}" for at in repeated[:MOST_NAMED].tolist()]
-    more = f" and {repeated.size - MOST_NAMED} more" if repeated.size > MOST_NAMED else ""
+    remainder = f" and {repeated.size - MOST_NAMED} more" if repeated.size > MOST_NAMED else ""
     share = repeated.size / len(rows)
     message = (
         f"{repeated.size} of {len(rows)} rows ({100 * share:.2g} %) repeat another row, indications and "
-        f"loads alike: rows {', '.join(pairs)}{more}"
+        f"loads alike: rows {', '.join(pairs)}{remainder}"
     )
     return [
         Finding(

@@ -341,7 +341,7 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
         # Brought back to few numbers at each step, so that the key stays far from its largest value.
         _, key = np.unique(key * (int(levels.max()) + 1) + levels, return_inverse=True)
     rises = up[loaded]
-    ups, downs = (np.bincount(key[which], minlength=int(key.max()) + 1) for which in (rises, ~rises))
+    ups, downs = (np.bincount(key[direction], minlength=int(key.max()) + 1) for direction in (rises, ~rises))
     paired = (ups > 0) & (downs > 0)
     if not paired.any():
         return ()
@@ -350,8 +350,8 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
     for load, full in zip(record.loads, largest.tolist(), strict=True):
         error = (_equation(load, columns) - table.column(load.load))[loaded]
         mean_up, mean_down = (
-            np.bincount(key[which], weights=error[which], minlength=len(ups))[paired] / count[paired]
-            for which, count in ((rises, ups), (~rises, downs))
+            np.bincount(key[direction], weights=error[direction], minlength=len(ups))[paired] / count[paired]
+            for direction, count in ((rises, ups), (~rises, downs))
         )
         apart = mean_up - mean_down
         worst, rms = float(np.abs(apart).max()), float(np.sqrt(np.mean(apart**2)))

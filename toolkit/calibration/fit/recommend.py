@@ -118,10 +118,10 @@ def recommend_wider(fit: SessionFit) -> Wider | None:
         return None
     model = min(enough, key=lambda m: _information([solved[m.name, load.setting.name] for load in loads]))
     rows = better[model.name]
-    ratio, probability, most = min(rows, key=lambda row: (row[1], -row[0]))
-    full = float(np.abs(session.table.column(most)).max())
-    before = 100 * next(load.fit.residual_sd for load in loads if load.setting.name == most) / full
-    old, new = solved[current.name, most], solved[model.name, most]
+    ratio, probability, largest = min(rows, key=lambda row: (row[1], -row[0]))
+    full = float(np.abs(session.table.column(largest)).max())
+    before = 100 * next(load.fit.residual_sd for load in loads if load.setting.name == largest) / full
+    old, new = solved[current.name, largest], solved[model.name, largest]
     shrink = float(np.sqrt(new.squares / new.dof / (old.squares / old.dof)))
     return Wider(
         name=model.name,

@@ -162,7 +162,7 @@ def coefficient_rows(fit: TermFit, extent: NDArray[np.float64], full_scale: floa
 
 
 def _report(fit: SessionFit, load_result: LoadResult, level: NDArray[np.int64] | None) -> FitReport:
-    session, table, solved, more = fit.session, fit.session.table, load_result.fit, load_result.diagnostics
+    session, table, solved, tests = fit.session, fit.session.table, load_result.fit, load_result.diagnostics
     load = table.column(load_result.setting.name)
     columns = table.columns(session.indications)
     full = float(np.abs(load).max())
@@ -193,16 +193,16 @@ def _report(fit: SessionFit, load_result: LoadResult, level: NDArray[np.int64] |
         fitted=load - solved.residuals,
         residuals=solved.residuals,
         leverage=solved.leverage,
-        internal=more.internal,
-        external=more.external,
-        cook=more.cook,
+        internal=tests.internal,
+        external=tests.external,
+        cook=tests.cook,
         robust_weight=robust_weights(solved, columns=columns, load=load),
-        outliers=more.outliers,
+        outliers=tests.outliers,
         direction=table.direction,
-        press=more.press,
+        press=tests.press,
         predicted_r_squared=1 - left_out / total,
-        heteroscedasticity=more.heteroscedasticity,
-        normality=None if noise_free else _normality(more.internal),
+        heteroscedasticity=tests.heteroscedasticity,
+        normality=None if noise_free else _normality(tests.internal),
         lack_of_fit=None if noise_free else lack_of_fit(solved, level),
         levels=int(np.count_nonzero(sizes > 1)),
         replicated_rows=int(sizes[sizes > 1].sum()),

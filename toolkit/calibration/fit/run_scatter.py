@@ -106,12 +106,12 @@ def spread(rows: SessionRows, scatter: RunScatter) -> NDArray[np.float64]:
     step = thin * rows.stride
     group, relative, mean = rows.group[order], rows.relative[order], rows.mean.columns[order]
     place = np.arange(len(group)) - np.searchsorted(group, group)
-    same = group[:, None] == group
+    together = group[:, None] == group
     lag = np.abs(place[:, None] - place) * step
     phi = scatter.correlation
-    R = np.where(same, phi**lag, 0.0)
-    slope = np.where(same & (lag > 0), lag * phi ** np.maximum(lag - 1, 0), 0.0) * scatter.within**2
-    between = same.astype(np.float64)
+    R = np.where(together, phi**lag, 0.0)
+    slope = np.where(together & (lag > 0), lag * phi ** np.maximum(lag - 1, 0), 0.0) * scatter.within**2
+    between = together.astype(np.float64)
     gains = between * np.outer(relative, relative)
     within, zero, gain = scatter.variances
     inverse = np.linalg.inv(within * R + zero * between + gain * gains)

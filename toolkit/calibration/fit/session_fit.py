@@ -61,7 +61,7 @@ def fit_gls(
     u = errors.u
     if u is None:
         if ordinary.residual_sd <= 1e-12 * largest:
-            raise ValueError("the residuals tell no uncertainty of single rows")
+            raise ValueError("the residuals do not give the uncertainty of single rows")
         u = np.full(len(load), ordinary.residual_sd)
     v = np.full(len(load), errors.u_shared)
     if errors.proportional:

@@ -139,11 +139,11 @@ def mean_of(design: NDArray[np.float64], relative: NDArray[np.float64], up: NDAr
 def _sample(group: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     """Return which rows stand for all (rows,), and how many rows of a run each of them stands for."""
     groups = int(group.max()) + 1
-    every = np.arange(len(group))
+    places = np.arange(len(group))
     if groups <= MOST_GROUPS and len(group) <= MOST_ROWS:
-        return every, 1
+        return places, 1
     picked = np.unique(np.linspace(0, groups - 1, min(groups, MOST_GROUPS)).round().astype(np.int64))
-    rows = every[np.isin(group, picked)]
+    rows = places[np.isin(group, picked)]
     stride = max(math.ceil(len(rows) / MOST_ROWS), 1)
     order = rows[np.argsort(group[rows], kind="stable")]
     sorted_group = group[order]

@@ -153,8 +153,8 @@ def _within(A: NDArray[np.float64], group: NDArray[np.int64], correlation: float
     # R = L + L^T - 1 with L the sum over all rows before; its geometric series doubles at every step.
     filtered, lag, weight = A.copy(), 1, correlation
     while lag < A.shape[1] and weight > _NEGLIGIBLE:
-        same = group[lag:] == group[:-lag]
-        before = filtered[:, :-lag] * same
+        neighbours = group[lag:] == group[:-lag]
+        before = filtered[:, :-lag] * neighbours
         filtered = filtered.copy()
         filtered[:, lag:] += weight * before
         lag, weight = 2 * lag, weight * weight

@@ -92,15 +92,15 @@ def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
     It names every record; why, as far as a line of a page has room for it.
     """
     marks = []
-    for word, chosen, why in (
+    for word, applies, why in (
         (DRAFT_MARK, [use for use in uses if use.draft], "draft_reasons"),
         (UNVERIFIED, [use for use in uses if use.unverified], None),
         (SINCE, [use for use in uses if use.since], "since"),
     ):
-        if chosen:
-            text = f"{word}: {', '.join(dict.fromkeys(use.id for use in chosen))}"
-            if why and len(chosen) == 1:
-                text += f": {'; '.join(getattr(chosen[0], why))}"
+        if applies:
+            text = f"{word}: {', '.join(dict.fromkeys(use.id for use in applies))}"
+            if why and len(applies) == 1:
+                text += f": {'; '.join(getattr(applies[0], why))}"
             marks.append(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}...")
     return " - ".join(marks) or None
 

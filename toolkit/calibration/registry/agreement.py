@@ -132,26 +132,28 @@ def _entries(
         yield f"{load.load}, tolerance", load.tolerance, tolerance
     if record.settings != settings.text:
         yield _first_difference(record.settings, settings.text)
-    hashes = {one.role: one.sha256 for one in record.data}
+    hashes = {file_entry.role: file_entry.sha256 for file_entry in record.data}
     if settings.check is not None or (settings.check_table and "check" in hashes):
         roles = {*roles, "check"}
     yield "files", (*sorted(hashes), len(record.data)), (*sorted(roles), len(roles))
 
 
-def _first_difference(got: str, expected: str) -> tuple[str, object, object]:
-    stored, refitted = json.loads(got), json.loads(expected)
+def _first_difference(actual: str, expected: str) -> tuple[str, object, object]:
+    stored, refitted = json.loads(actual), json.loads(expected)
     if isinstance(stored, dict):
         for key in sorted({*stored, *refitted}):
             if stored.get(key) != refitted.get(key):
                 return f"settings, {key}", stored.get(key), refitted.get(key)
-    return "settings", got, expected
+    return "settings", actual, expected
 
 
-def _differs(record: CalibrationRecord, file: str, name: str, got: object, expected: object) -> RecordError:
+def _differs(
+    record: CalibrationRecord, file: str, name: str, actual: object, expected: object
+) -> RecordError:
     return RecordError(
         f"record {record.id} differs from its stored session {file}: {name}",
         where=f"{record.id}, {name}",
-        got="nothing" if got is None else got,
+        got="nothing" if actual is None else actual,
         expected="nothing" if expected is None else f"{expected} by {file}",
         next_step=_RESTORE,
         rule="data",

@@ -146,7 +146,7 @@ def approve(
         if status.in_force_from is not None and in_force_from > status.in_force_from:
             # The first approval stands: the days between would stay in force, whatever was answered here.
             raise _refused(
-                record_id, "an approval takes no day away from a record",
+                record_id, "an approved record cannot come into force later than it did",
                 in_force_from.isoformat(),
                 f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void",
                 "approval",
@@ -183,11 +183,11 @@ def approve(
             "since": in_force_from.isoformat(),
             "unverifiable": list(terms),
         }
-        more = {
+        details = {
             "approved_by": approved_by, "reason": reason, "note": note, "recall": interval,
             "evidence": list(evidence),
         }  # fmt: skip
-        event |= {key: value for key, value in more.items() if value}
+        event |= {key: value for key, value in details.items() if value}
         return Change(files={}, event=event)
 
     registry.commit(folder.name, build)
@@ -246,11 +246,11 @@ def withdraw(
             "reason": reason,
         }
         late = (registry.today() - on).days
-        more = {
+        details = {
             "since": void_from and void_from.isoformat(),
             "note": f"entered {_days(late)} after it became known" if late > 0 else None,
         }
-        return Change(files={}, event=event | {key: value for key, value in more.items() if value})
+        return Change(files={}, event=event | {key: value for key, value in details.items() if value})
 
     if not folder.is_dir():
         raise _refused(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
@@ -303,9 +303,9 @@ def _days(count: int) -> str:
     return f"{count} day{'' if count == 1 else 's'}"
 
 
-def _refused(record_id: str, what: str, got: str, expected: str, rule: str) -> RegistryError:
+def _refused(record_id: str, problem: str, actual: str, expected: str, rule: str) -> RegistryError:
     return RegistryError(
-        what, where=record_id, got=got, expected=expected,
+        problem, where=record_id, got=actual, expected=expected,
         next_step="nothing was changed; see 'toolkit calibration show " + record_id + "'", rule=rule,
     )  # fmt: skip
 

@@ -318,14 +318,14 @@ def _precise(
         weights = None if u is None else (1.0 / u**2).tolist()
         return solve_exactly(terms=session.terms, columns=columns, load=load, weights=weights)
     errors = load_errors(session, setting)
-    each = None if errors.u is None else errors.u.tolist()
+    deviations = None if errors.u is None else errors.u.tolist()
     if session.method == "gls":
         return solve_gls_precisely(
-            terms=session.terms, columns=columns, load=load, u=each, group=errors.group.tolist(),
+            terms=session.terms, columns=columns, load=load, u=deviations, group=errors.group.tolist(),
             u_shared=errors.u_shared, proportional=errors.proportional,
         )  # fmt: skip
     return solve_odr_precisely(
-        terms=session.terms, columns=columns, load=load, u=each or [], u_cells=errors.u_cells.tolist()
+        terms=session.terms, columns=columns, load=load, u=deviations or [], u_cells=errors.u_cells.tolist()
     )
 
 

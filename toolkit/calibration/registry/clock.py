@@ -3,13 +3,39 @@
 Days are those that people write (a session, a decision) and belong to the calendar where they are; the time
 of a ledger entry is UTC. A day lies in the future only where it has not begun anywhere on earth, so that no
 laboratory is refused for its time zone.
+
+Whether a time server keeps this computer's clock is asked of its kernel (``adjtimex``).
 """
 
 from __future__ import annotations
 
+import ctypes
+import os
 from datetime import UTC, date, datetime, timedelta
+from typing import Literal
 
 from toolkit.errors import RegistryError
+
+ClockState = Literal["synchronised", "not synchronised", "unknown"]
+
+_SIZE = 512  # bytes, more than any kernel's struct timex; its first word, modes, is 0: nothing is set
+_ERROR = 5  # TIME_ERROR, timex.h: the clock is not synchronised
+
+
+def clock_state() -> ClockState:
+    """Return whether the clock is kept; ``unknown`` where the system does not tell.
+
+    A container has the clock of its host, and some are not allowed to ask.
+    """
+    library = ctypes.CDLL(None, use_errno=True)
+    ask = getattr(library, "adjtimex", None)
+    if ask is None or os.name != "posix":
+        return "unknown"
+    answer = ask(ctypes.create_string_buffer(_SIZE))
+    if answer < 0:
+        return "unknown"
+    return "not synchronised" if answer == _ERROR else "synchronised"
+
 
 _EARLIEST_ZONE = timedelta(hours=14)  # UTC+14, Kiribati: where a day begins first
 
@@ -32,8 +58,8 @@ def moment(text: str) -> datetime:
     ValueError
         the text is no time
     """
-    found = datetime.fromisoformat(text)
-    return found if found.tzinfo is not None else found.replace(tzinfo=UTC)
+    parsed = datetime.fromisoformat(text)
+    return parsed if parsed.tzinfo is not None else parsed.replace(tzinfo=UTC)
 
 
 def day_of(time: str) -> date:
@@ -88,9 +114,9 @@ def check_after(last: str | None, time: str, where: object) -> None:
         )
 
 
-def untimely(what: str, where: object, got: str, expected: str) -> RegistryError:
+def untimely(problem: str, where: object, actual: str, expected: str) -> RegistryError:
     """Return the error of a day that cannot be."""
     return RegistryError(
-        what, where=where, got=got, expected=expected,
+        problem, where=where, got=actual, expected=expected,
         next_step="correct the date, or this computer's clock; nothing was written", rule="time",
     )  # fmt: skip

@@ -42,14 +42,14 @@ class TermDifference:
     note: str | None
 
 
-def differences(one: CalibrationRecord, other: CalibrationRecord) -> tuple[TermDifference, ...]:
+def differences(first: CalibrationRecord, second: CalibrationRecord) -> tuple[TermDifference, ...]:
     """Compare two records term by term, in the order of the first."""
-    names = dict.fromkeys(load.load for record in (one, other) for load in record.loads)
+    names = dict.fromkeys(load.load for record in (first, second) for load in record.loads)
     terms_apart: list[TermDifference] = []
     for name in names:
-        terms = (_coefficients(_load(record, name)) for record in (one, other))
+        terms = (_coefficients(_load(record, name)) for record in (first, second))
         terms_apart += [
-            _difference(one, other, name, term) for term in dict.fromkeys(t for x in terms for t in x)
+            _difference(first, second, name, term) for term in dict.fromkeys(t for x in terms for t in x)
         ]
     return tuple(terms_apart)
 
@@ -91,11 +91,11 @@ _Changed = list[tuple[str, str, str]]
 
 
 def _changed_units(
-    one: CalibrationRecord, other: CalibrationRecord, a: LoadFit | None, b: LoadFit | None, term: str
+    first: CalibrationRecord, second: CalibrationRecord, a: LoadFit | None, b: LoadFit | None, term: str
 ) -> _Changed:
     """Return the load and the term's indications whose unit differs: (name, unit in one, in other)."""
     pairs = [] if a is None or b is None else [(a.load, a.unit, b.unit)]
-    units = [{cell.name: cell.unit for cell in record.cells} for record in (one, other)]
+    units = [{cell.name: cell.unit for cell in record.cells} for record in (first, second)]
     pairs += [
         (name, units[0][name], units[1][name])
         for name in sorted(_indications(term))
@@ -105,14 +105,14 @@ def _changed_units(
 
 
 def _note(
-    one: CalibrationRecord,
-    other: CalibrationRecord,
+    first: CalibrationRecord,
+    second: CalibrationRecord,
     loads: tuple[LoadFit | None, LoadFit | None],
     term: str,
     changed: _Changed,
 ) -> str | None:
     parts = []
-    for record, load in zip((one, other), loads, strict=True):
+    for record, load in zip((first, second), loads, strict=True):
         if load is None:
             parts.append(f"{record.id} does not have the load")
         elif term not in load.terms:
@@ -123,7 +123,7 @@ def _note(
             parts[-1] += ", which is another kind of quantity: no change can be given"
     values = [
         f"{_coefficients(load)[term] * _scale(record, load, term):.6g} {_si(record, load, term)}"
-        for record, load in zip((one, other), loads, strict=True)
+        for record, load in zip((first, second), loads, strict=True)
         if load is not None and term in load.terms
     ]
     if changed and len(values) == 2 and all(same_dimension(x, y) for _, x, y in changed):
@@ -159,14 +159,14 @@ def _indications(term: str) -> set[str]:
     return {name for name, _ in parsed.powers} | set(parsed.absolutes)
 
 
-def _extent(term: str, record: CalibrationRecord, other: CalibrationRecord) -> float | None:
+def _extent(term: str, record: CalibrationRecord, second: CalibrationRecord) -> float | None:
     """Return the largest absolute value of a term over the ranges of both records, in units of ``one``."""
     ranges: dict[str, float] = {}
     units = {cell.name: cell.unit for cell in record.cells}
-    for cell in (*record.cells, *other.cells):
+    for cell in (*record.cells, *second.cells):
         if cell.minimum is not None and cell.maximum is not None and cell.name in units:
-            same = same_unit(cell.unit, units[cell.name])
-            factor = 1.0 if same else unit(cell.unit).factor / unit(units[cell.name]).factor
+            comparable = same_unit(cell.unit, units[cell.name])
+            factor = 1.0 if comparable else unit(cell.unit).factor / unit(units[cell.name]).factor
             largest = max(abs(cell.minimum), abs(cell.maximum)) * factor
             ranges[cell.name] = max(ranges.get(cell.name, 0.0), largest)
     if not _indications(term) <= ranges.keys():

@@ -96,8 +96,8 @@ def _change(new: _Place, old: _Place) -> GateResult | None:
     # A sign counts over the range in which the instrument was used so far: a session that hardly moves a
     # cell must not hide it.
     had = range_of(old[2])
-    used = None if had is None else had[1] - had[0]
-    if _negligible(now, change, (new[1], old[1]), 3 * math.hypot(now.u, before.u), used):
+    span = None if had is None else had[1] - had[0]
+    if _negligible(now, change, (new[1], old[1]), 3 * math.hypot(now.u, before.u), span):
         return None
     if flipped:
         return GateResult(rule="sign", where=where, message=f"the sign changed: {text}")

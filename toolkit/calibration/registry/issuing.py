@@ -74,7 +74,7 @@ def issue(registry: Registry, record_id: str, document: Mapping[str, str], *, de
     def build(ledger: Ledger) -> Change:
         if record_id not in ledger.entered() or ledger.decided != decided:
             raise RegistryError(
-                "something was decided while the document was made", where=record_id,
+                "a decision was entered while the document was being made", where=record_id,
                 got=f"the ledger's last decision {ledger.decided[:16]}...",
                 expected=f"{decided[:16]}..., by which the document was made",
                 next_step="issue the document again; nothing was issued", rule="ledger-moved",

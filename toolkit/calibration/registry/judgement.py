@@ -65,26 +65,28 @@ def machine_polarity(
     """Hold a record's responses against the signs that a machine definition states."""
     failed: list[GateResult] = []
     pairs: set[tuple[str, str]] = set()
-    for one in record.loads if machine is not None else ():
+    for fit in record.loads if machine is not None else ():
         for cell in record.cells:
             stated = machine.cell(cell.name) if machine is not None else None
-            sign = None if stated is None else stated.sign(one.load)
+            sign = None if stated is None else stated.sign(fit.load)
             if stated is None or sign is None or machine is None:
                 continue
-            sensitivity = response(record, one, cell)
+            sensitivity = response(record, fit, cell)
             limit = (
                 3 * sensitivity.u
                 if sensitivity.extent is None
-                else max(tolerance(one) / sensitivity.extent, 3 * sensitivity.u)
+                else max(tolerance(fit) / sensitivity.extent, 3 * sensitivity.u)
             )
-            where = f"{one.load}, {cell.name}"
+            where = f"{fit.load}, {cell.name}"
             statement = f"machine {machine.name} states a {_WORD[sign]} one ({stated.source})"
             if sensitivity.value * sign <= 0 or abs(sensitivity.value) <= limit:
-                shown = "no sign of it shows" if abs(sensitivity.value) <= limit else f"it is {sensitivity}"
-                message = f"the response has not the machine's sign: {shown}, {statement}"
+                size_text = (
+                    "no sign of it shows" if abs(sensitivity.value) <= limit else f"it is {sensitivity}"
+                )
+                message = f"the response has not the machine's sign: {size_text}, {statement}"
                 failed.append(GateResult(rule="polarity", where=where, message=message))
             else:
-                pairs.add((one.load, cell.name))
+                pairs.add((fit.load, cell.name))
     text = ", ".join(f"{load} {name}" for load, name in sorted(pairs))
     evidence = (
         (f"signs as machine {machine.name}, version {machine.version}, states them: {text}",)
@@ -129,14 +131,14 @@ def reading_polarity(
             )
         else:
             loads.add(reading.load)
-            shown = {
+            signs = {
                 name
                 for name in record.indications
                 if abs(_predicted(record, reading, turned=name) - reading.value) > limit
             }
-            indications |= shown
+            indications |= signs
             evidence.append(
-                f"polarity reading: {comparison}; it shows {', '.join(sorted(shown)) or 'no cell'}"
+                f"polarity reading: {comparison}; it shows {', '.join(sorted(signs)) or 'no cell'}"
             )
             continue
         failed.append(GateResult(rule="polarity-reading", where=reading.place, message=message))

@@ -1,20 +1,5 @@
 """A calibration of before the toolkit: coefficients that a source names, without the data behind them.
 
-    schema = 1
-    instrument = "m15"
-    date = 2021-12-31            # of the source
-    entered_by = "legacy import"
-    zero = "included"
-    indications = [{ name = "D51", unit = "lbf" }, { name = "E5", unit = "lbf" }]
-    [source]
-    title = "..."
-    place = "section, page, table"
-    text = "the equations as printed, or how they were found"
-    [[loads]]
-    load = "FY"
-    unit = "lbf"
-    coefficients = { D51 = 0.99719, E5 = 1.0228, intercept = 0.6473 }
-
 The file is kept beside the record and the record is compared with it on every load. It stays *unverified*:
 nothing shows that the coefficients follow from any data.
 """

@@ -6,19 +6,95 @@ a stricter check of a later version must not refuse what an earlier one entered.
 
 from __future__ import annotations
 
-import datetime as dt
-from typing import Any, cast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
 
-from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, Zero, canonical
+from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, canonical
 from toolkit.calibration.registry.refit import polarity
 from toolkit.calibration.session.settings import INSTRUMENT, wrong
 from toolkit.calibration.session.statement_checks import check_load_unit
 from toolkit.calibration.terms import INTERCEPT, NAME, parse_term
+from toolkit.declared import Day, Entry, Fault, Format, Keyed, Size, Text, UnitName, read_text
 from toolkit.errors import ConfigError, ToolkitError, UnitError
-from toolkit.files import check_keys, is_number, parse_toml, sha256_bytes
+from toolkit.files import sha256_bytes
 from toolkit.units import si_scale, unit
 
-_KEYS = "schema instrument date entered_by zero indications source loads".split()
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacySource:
+    """Where the coefficients come from."""
+
+    title: Annotated[str, Entry("of the document", example="Calibration sheet 17")]
+    place: Annotated[str | None, Text(empty=True, numbers="any"), Entry("section, page, table")] = None
+    text: Annotated[
+        str, Entry("the equations as printed, or how they were found", example="FY = 0.997 D51 + 0.647")
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacyIndication:
+    """An indication that the coefficients take."""
+
+    name: Annotated[str, Entry("as the coefficients name it", example="D51")]
+    unit: Annotated[str, UnitName(), Entry("in which the coefficients take it", example="lbf")]
+    serial: Annotated[str | None, Text(empty=True, numbers="any"), Entry("of the cell")] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacyLoad:
+    """The equation of one load."""
+
+    load: Annotated[str, Entry("its name", example="FY")]
+    unit: Annotated[str, UnitName(), Entry("of the load", example="lbf")]
+    coefficients: Annotated[
+        tuple[tuple[str, float], ...], Keyed(), Size(1),
+        Entry("by term; 0 where an indication has none, the intercept last", example={"D51": 0.99719}),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacyFile:
+    """Coefficients that a source names, without the data behind them."""
+
+    FORMAT: ClassVar[Format] = Format(
+        title="legacy import", schema=1, wrong="legacy", missing="legacy",
+        next_step="correct {key}; nothing was written",
+    )  # fmt: skip
+
+    instrument: Annotated[
+        str, Text(pattern=INSTRUMENT.pattern),
+        Entry("what was calibrated", example="m15", expected="letters, digits, '-', '_' and '.'"),
+    ]  # fmt: skip
+    date: Annotated[str, Day(), Entry("of the source", example="2021-12-31")]
+    entered_by: Annotated[str, Text(strip=True), Entry("who enters it", example="first person")]
+    zero: Annotated[
+        Literal["included", "tared"], Entry("whether the indications hold the zero", example="included")
+    ]
+    source: Annotated[LegacySource, Entry("where the coefficients come from")]
+    indications: Annotated[tuple[LegacyIndication, ...], Size(1), Entry("of the load cells")]
+    loads: Annotated[tuple[LegacyLoad, ...], Size(1), Entry("an equation each")]
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield terms that cannot be read or take no indication, and an intercept that is not last."""
+        cells = [cell.name for cell in self.indications]
+        for number, load in enumerate(self.loads):
+            terms = [term for term, _ in load.coefficients]
+            for term in terms:
+                key = ("loads", number, "coefficients", term)
+                try:
+                    parsed = parse_term(term)
+                except ToolkitError as error:
+                    yield Fault(
+                        key=key, got=term, expected=str(error.expected), what="the term cannot be read"
+                    )
+                    continue
+                if not {name for name, _ in parsed.powers} | set(parsed.absolutes) <= set(cells):
+                    expected = ", ".join((*sorted(cells), INTERCEPT))
+                    yield Fault(key=key, got=term, expected=expected, what="the term takes no indication")
+            if INTERCEPT in terms[:-1]:
+                place = ("loads", number, "coefficients")
+                yield Fault(key=place, got=", ".join(terms), expected="the intercept last")
 
 
 def read_legacy(data: bytes, *, where: object) -> CalibrationRecord:
@@ -26,46 +102,33 @@ def read_legacy(data: bytes, *, where: object) -> CalibrationRecord:
 
     Raises
     ------
-    ConfigError, SessionError, UnitError
-        the file: not TOML, unknown key, missing value, unknown unit, a term that cannot be read
+    ConfigError
+        ``not-toml``, ``unknown-key``, ``unknown-unit``; ``legacy``: a value that is missing or cannot be used
     """
-    table = parse_toml(data, where=where)
-    check_keys(table, _KEYS, where=where)
-    for key in _KEYS:
-        if key not in table and key != "schema":
-            raise _wrong(where, key, None, "an entry")
-    if table.get("schema", 1) != 1:
-        raise _wrong(where, "schema", table["schema"], "1")
-    instrument, by = table["instrument"], table["entered_by"]
-    if not isinstance(instrument, str) or not INSTRUMENT.match(instrument):
-        raise _wrong(where, "instrument", instrument, "letters, digits, '-', '_' and '.'")
-    if not isinstance(by, str) or not by.strip():
-        raise _wrong(where, "entered_by", by, "a name")
-    if table["zero"] not in ("included", "tared"):
-        raise _wrong(where, "zero", table["zero"], "included | tared")
-    origin = table["source"]
-    if not isinstance(origin, dict):
-        raise _wrong(where, "source", origin, "a table with title, place and text")
-    check_keys(origin, ("title", "place", "text"), where=f"{where}: source")
-    for key in ("title", "text"):
-        if not isinstance(origin.get(key), str) or not origin[key].strip():
-            raise _wrong(where, f"source.{key}", origin.get(key), "where the coefficients come from")
-    cells = tuple(_cell(entry, where) for entry in _list(table, "indications", where))
-    settings = {"source": {key: str(value) for key, value in origin.items()}}
+    file = read_text(LegacyFile, data, where=where)
+    origin = {"title": file.source.title, "place": file.source.place, "text": file.source.text}
     return CalibrationRecord(
         id="",
-        instrument=instrument,
+        instrument=file.instrument,
         kind="legacy",
-        date=_date(table["date"], where),
-        entered_by=by.strip(),
-        zero=cast("Zero", table["zero"]),
-        cells=cells,
-        loads=tuple(_load(entry, cells, where) for entry in _list(table, "loads", where)),
+        date=file.date,
+        entered_by=file.entered_by,
+        zero=file.zero,
+        cells=tuple(Indication(name=c.name, unit=c.unit, serial=c.serial) for c in file.indications),
+        loads=tuple(map(_fit, file.loads)),
         golden=Golden(),
         data=(),
-        settings=canonical(settings),
+        settings=canonical({"source": {key: text for key, text in origin.items() if text is not None}}),
         inputs_sha256=sha256_bytes(data),
     )
+
+
+def _fit(load: LegacyLoad) -> LoadFit:
+    values = tuple(value for _, value in load.coefficients)
+    return LoadFit(
+        load=load.load, unit=load.unit, terms=tuple(term for term, _ in load.coefficients),
+        coefficients=values, issued=values, polarity=polarity(values), method="legacy",
+    )  # fmt: skip
 
 
 def check_possible(record: CalibrationRecord, *, where: object) -> None:
@@ -84,8 +147,8 @@ def check_possible(record: CalibrationRecord, *, where: object) -> None:
     for key, entries in (("indications", names), ("loads", loads)):
         if any(not NAME.match(name) or name in (INTERCEPT, "abs") for name in entries):
             raise _wrong(where, key, ", ".join(entries), "names such as FY, MZ, D51")
-    for key, found in (("indications", names), ("loads", loads)):
-        twice = [name for name in dict.fromkeys(found) if found.count(name) > 1]
+    for key, names_found in (("indications", names), ("loads", loads)):
+        twice = [name for name in dict.fromkeys(names_found) if names_found.count(name) > 1]
         if twice:
             raise _wrong(where, key, f"{', '.join(twice)} more than once", f"each of the {key} once")
     if shared := set(names) & set(loads):
@@ -110,67 +173,5 @@ def check_possible(record: CalibrationRecord, *, where: object) -> None:
             )  # fmt: skip
 
 
-def _cell(entry: Any, where: object) -> Indication:
-    if not isinstance(entry, dict):
-        raise _wrong(where, "indications", entry, '{ name = "D51", unit = "lbf" }')
-    check_keys(entry, ("name", "unit", "serial"), where=f"{where}: indications")
-    name, text = entry.get("name"), entry.get("unit")
-    if not isinstance(name, str) or not isinstance(text, str):
-        raise _wrong(where, "indications", entry, '{ name = "D51", unit = "lbf" }')
-    serial = entry.get("serial")
-    return Indication(
-        name=name,
-        unit=unit(text, where=f"{where}: indications, {name}").text,
-        serial=None if serial is None else str(serial),
-    )
-
-
-def _load(entry: Any, cells: tuple[Indication, ...], where: object) -> LoadFit:
-    if not isinstance(entry, dict):
-        raise _wrong(where, "loads", entry, "tables [[loads]]")
-    check_keys(entry, ("load", "unit", "coefficients"), where=f"{where}: loads")
-    typed = entry.get("coefficients")
-    name, text = entry.get("load"), entry.get("unit")
-    if not isinstance(name, str) or not isinstance(text, str) or not isinstance(typed, dict) or not typed:
-        raise _wrong(where, "loads", entry, "load, unit and coefficients")
-    cell_names = {cell.name for cell in cells}
-    for term, value in typed.items():
-        try:
-            parsed = parse_term(term)
-        except ToolkitError as error:
-            raise _wrong(where, f"{name}.{term}", term, str(error.expected)) from error
-        used_names = {n for n, _ in parsed.powers} | set(parsed.absolutes)
-        if not used_names <= cell_names:
-            raise _wrong(where, f"{name}.{term}", term, ", ".join((*sorted(cell_names), INTERCEPT)))
-        if not is_number(value):
-            raise _wrong(where, f"{name}.{term}", value, "a number")
-    terms = tuple(typed)
-    if INTERCEPT in terms and terms[-1] != INTERCEPT:
-        raise _wrong(where, f"{name}.coefficients", ", ".join(terms), "the intercept last")
-    values = tuple(float(value) for value in typed.values())
-    return LoadFit(
-        load=name,
-        unit=unit(text, where=f"{where}: {name}.unit").text,
-        terms=terms,
-        coefficients=values,
-        issued=values,
-        polarity=polarity(values),
-        method="legacy",
-    )
-
-
-def _list(table: dict[str, Any], key: str, where: object) -> list[Any]:
-    if not isinstance(table[key], list) or not table[key]:
-        raise _wrong(where, key, table[key], "at least one entry")
-    return list(table[key])
-
-
-def _date(value: object, where: object) -> str:
-    try:
-        return dt.date.fromisoformat(str(value)).isoformat()
-    except ValueError as error:
-        raise _wrong(where, "date", value, "a date such as 2026-03-31") from error
-
-
-def _wrong(where: object, key: str, got: object, expected: str) -> ConfigError:
-    return wrong(where, key, got, expected, "legacy")
+def _wrong(where: object, key: str, actual: object, expected: str) -> ConfigError:
+    return wrong(where, key, actual, expected, "legacy")

@@ -220,10 +220,10 @@ def _offsets(
         beyond_row = abs(worst) > max(limit, _ROW_SIGMAS * scatter)
         if not (beyond_mean or beyond_row):
             continue
-        value, what = (mean, "on average") if beyond_mean else (worst, "at most")
+        value, extent = (mean, "on average") if beyond_mean else (worst, "at most")
         message = (
             f'zero = "tared" does not hold: at zero load ({len(moved)} rows) the indication is '
-            f"{value / slope:+.4g} {cell.unit} {what}, worth {value:+.4g} {load.unit} of {load.load} where "
+            f"{value / slope:+.4g} {cell.unit} {extent}, worth {value:+.4g} {load.unit} of {load.load} where "
             f"the rows scatter by {scatter:.2g} {load.unit}; the tolerance is {limit:.4g} {load.unit}"
         )
         failed.append(GateResult(rule="tared", where=cell.name, message=message))

@@ -304,26 +304,26 @@ def _covariance(
 
 
 def scatter_covariance(
-    record: CalibrationRecord, one: LoadFit, operator: NDArray[np.float64], table: Table
+    record: CalibrationRecord, fit: LoadFit, operator: NDArray[np.float64], table: Table
 ) -> NDArray[np.float64] | None:
     """Return the covariance (terms, terms) that a record's scatter makes; None where it is not its rows'.
 
     ``operator`` (terms, rows) is what made the coefficients of the loads.
     """
-    design = term_matrix(one.terms, table.columns(record.indications))
-    load = table.column(one.load)
+    design = term_matrix(fit.terms, table.columns(record.indications))
+    load = table.column(fit.load)
     factor, group = groups_of(table)
     if group.any():
-        sound = one.scatter is not None and is_lowest(
-            SessionRows.of(design, load, table, record.zero), one.scatter
+        sound = fit.scatter is not None and is_lowest(
+            SessionRows.of(design, load, table, record.zero), fit.scatter
         )
     else:
-        stated = statements_of(record).between(one.load)
-        expected = stated_scatter(factor, stated, residual_sd=one.residual_sd or 0.0, dof=one.dof or 0)
-        sound = one.scatter == expected
-    if one.scatter is None or not sound:
+        stated = statements_of(record).between(fit.load)
+        expected = stated_scatter(factor, stated, residual_sd=fit.residual_sd or 0.0, dof=fit.dof or 0)
+        sound = fit.scatter == expected
+    if fit.scatter is None or not sound:
         return None
-    return rows_of(design, load, group, operator).covariance(one.scatter)
+    return rows_of(design, load, group, operator).covariance(fit.scatter)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -419,21 +419,23 @@ def _same_unit(record: CalibrationRecord, name: str, header: str, stored: str) -
     _demand_equal(record, name, "unit", stored, header)
 
 
-def _demand_equal(record: CalibrationRecord, where: str, part: str, got: object, expected: object) -> None:
-    if got != expected:
-        _demand(record, where, part, False, str(got), str(expected))
+def _demand_equal(record: CalibrationRecord, where: str, part: str, actual: object, expected: object) -> None:
+    if actual != expected:
+        _demand(record, where, part, False, str(actual), str(expected))
 
 
-def _demand(record: CalibrationRecord, where: str, part: str, holds: bool, got: str, expected: str) -> None:
+def _demand(
+    record: CalibrationRecord, where: str, part: str, holds: bool, actual: str, expected: str
+) -> None:
     if not holds:
-        raise _refused(record, f"{where}, {part}", got, f"{expected} from its own data", "refit")
+        raise _refused(record, f"{where}, {part}", actual, f"{expected} from its own data", "refit")
 
 
-def _refused(record: CalibrationRecord, where: str, got: str, expected: str, rule: str) -> RecordError:
+def _refused(record: CalibrationRecord, where: str, actual: str, expected: str, rule: str) -> RecordError:
     return RecordError(
         f"record {record.id} does not reproduce from its own data: {where}",
         where=f"{record.id}, {where}",
-        got=got,
+        got=actual,
         expected=expected,
         next_step="restore the record from a backup; a correction is a new record, made by a new session",
         rule=rule,

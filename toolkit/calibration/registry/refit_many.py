@@ -83,7 +83,7 @@ def _shape(record: CalibrationRecord, table: Table) -> Hashable | None:
 
 def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     """Judge records of one shape: m records, n rows, p terms, q loads, g golden vectors."""
-    records, tables = [one for one, _ in pairs], [one for _, one in pairs]
+    records, tables = [part for part, _ in pairs], [part for _, part in pairs]
     first = records[0]
     names, terms = tables[0].names, first.loads[0].terms
     values = np.array([table.values.T for table in tables])

@@ -104,15 +104,15 @@ def main_indications(record: CalibrationRecord, load: LoadFit) -> tuple[str, ...
     return tuple(name for name, effect in effects.items() if (effect or 0.0) > MAIN * scale)
 
 
-def same_unit(one: str, other: str) -> bool:
+def same_unit(first: str, second: str) -> bool:
     """Tell whether two spellings are one unit."""
-    a, b = unit(one), unit(other)
+    a, b = unit(first), unit(second)
     return (a.dimension, a.factor) == (b.dimension, b.factor)
 
 
-def same_dimension(one: str, other: str) -> bool:
+def same_dimension(first: str, second: str) -> bool:
     """Tell whether two units measure the same kind of quantity."""
-    a, b = unit(one), unit(other)
+    a, b = unit(first), unit(second)
     return (a.dimension, a.si) == (b.dimension, b.si)
 
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.records.use import UNSIGNED
-from toolkit.calibration.registry.clock import check_after, day_of
-from toolkit.calibration.registry.clock_state import clock_state
+from toolkit.calibration.registry.clock import check_after, clock_state, day_of
 from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
 from toolkit.errors import TrustError
 from toolkit.publication import publication
@@ -69,8 +68,8 @@ def signed_event(
     version, time = signing.history.now, event["time"]
     check_after(version.since, time, "the log of people")
     root = Growing(map(leaf_hash, ledger.lines)).root()
-    said = {**event, **statement(event, _subject(ledger, event), root, version)}
-    message = canonical({"seq": len(ledger.entries) + 1, "prev": ledger.head, **said})
+    stated = {**event, **statement(event, _subject(ledger, event), root, version)}
+    message = canonical({"seq": len(ledger.entries) + 1, "prev": ledger.head, **stated})
     operators = operators_of(ledger, event["id"])
     path = signing.travel.request
     request = Request(message=message, people=version.text, file=file, operators=operators, path=path)
@@ -88,7 +87,7 @@ def signed_event(
     for signer in signing.signers:
         owner = version.people.owner(signer.public)
         rows += [signature_row("" if owner is None else owner.id, signer, message.encode())]
-    return {**said, "signatures": rows}
+    return {**stated, "signatures": rows}
 
 
 def unproved(
@@ -156,8 +155,8 @@ def names_of(entry: Entry, history: History) -> str:
     version = history.at(entry.time, entry.people)
     people = [None if version is None else version.people.of(person) for person in signers_of(entry)]
     return " and ".join(
-        person if known is None else known.name
-        for person, known in zip(signers_of(entry), people, strict=True)
+        person if enrolled is None else enrolled.name
+        for person, enrolled in zip(signers_of(entry), people, strict=True)
     )
 
 

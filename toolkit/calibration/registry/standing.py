@@ -258,6 +258,6 @@ def gate_words(failed: Sequence[GateResult]) -> str:
     phrases = []
     for rule in dict.fromkeys(result.rule for result in failed):
         places = [result.where for result in failed if result.rule == rule]
-        more = f" and {len(places) - _PLACES} more" if len(places) > _PLACES else ""
-        phrases.append(f"{rule} ({'; '.join(places[:_PLACES])}{more})")
+        remainder = f" and {len(places) - _PLACES} more" if len(places) > _PLACES else ""
+        phrases.append(f"{rule} ({'; '.join(places[:_PLACES])}{remainder})")
     return f"gate{'' if len(phrases) == 1 else 's'} {', '.join(phrases)}"

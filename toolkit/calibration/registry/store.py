@@ -133,13 +133,13 @@ def _locked(folder: Path, *, lock_file: bool) -> Iterator[None]:
             try:
                 with _writable(folder, but=FileNotFoundError):
                     _check_case(folder)
-                    made = _make(folder)
+                    created = _make(folder)
                     if lock_file:  # which lies in the folder, and is in the way of its removal
-                        stack.callback(_remove_empty, made)
+                        stack.callback(_remove_empty, created)
                     stack.enter_context(writing(folder, lock_file=lock_file))
                     if not lock_file:
-                        stack.callback(_remove_empty, made)
-                    for path in made:
+                        stack.callback(_remove_empty, created)
+                    for path in created:
                         sync_folder(path.parent)
             except FileNotFoundError:
                 continue
@@ -150,16 +150,16 @@ def _locked(folder: Path, *, lock_file: bool) -> Iterator[None]:
 
 def _make(folder: Path) -> list[Path]:
     """Make a folder with those above it; return the ones that were not there."""
-    made: list[Path] = []
+    created: list[Path] = []
     try:
         for path in (*reversed(folder.parents), folder):
             if not path.is_dir():
                 path.mkdir(exist_ok=True)
-                made.append(path)
+                created.append(path)
     except OSError:
-        _remove_empty(made)
+        _remove_empty(created)
         raise
-    return made
+    return created
 
 
 def _remove_empty(folders: list[Path]) -> None:

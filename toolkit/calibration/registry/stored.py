@@ -79,8 +79,8 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     except RegistryError:
         raise
     except ToolkitError as error:
-        got = f"{where.name}: {reason_of(error)}"
-        raise bad_record(record.id, where, got, "reference-load data that can be read", "data") from error
+        fault = f"{where.name}: {reason_of(error)}"
+        raise bad_record(record.id, where, fault, "reference-load data that can be read", "data") from error
 
 
 def _labels(record: CalibrationRecord) -> tuple[str, ...]:
@@ -109,12 +109,12 @@ def _bridges(record: CalibrationRecord, names: list[str]) -> dict[str, Bridge]:
     return bridges_of(json.loads(record.settings).get("cells", {}), names, where=record.id)
 
 
-def bad_record(record_id: str, where: object, got: object, expected: object, rule: str) -> RecordError:
+def bad_record(record_id: str, where: object, actual: object, expected: object, rule: str) -> RecordError:
     """Return the error of a record that may not be used."""
     return RecordError(
         f"record {record_id} may not be used",
         where=where,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="restore the registry from a backup; 'toolkit calibration verify' lists every bad file",
         rule=rule,

@@ -62,18 +62,18 @@ class Bridge:
         """
         if text == target:
             return 1.0
-        found, wanted = unit(text, where=where), unit(target)
-        if found.dimension != wanted.dimension:
-            if found.dimension == COUNT_DIMENSION and self.scale is not None:
+        stated, expected = unit(text, where=where), unit(target)
+        if stated.dimension != expected.dimension:
+            if stated.dimension == COUNT_DIMENSION and self.scale is not None:
                 # The scale first: counts x scale stays exact where the scale's unit is the target.
                 return self.scale[0] * self.factor(self.scale[1], target, where=where)
             if (
-                wanted.dimension == RATIO_DIMENSION
+                expected.dimension == RATIO_DIMENSION
                 and self.excitation_V is not None
-                and _is_voltage(found.text)
+                and _is_voltage(stated.text)
             ):
-                return found.factor / wanted.factor / self.excitation_V
-        return si_scale(text, wanted.dimension, where=where) / wanted.factor
+                return stated.factor / expected.factor / self.excitation_V
+        return si_scale(text, expected.dimension, where=where) / expected.factor
 
     def stated(self, entry: object, key: str, *, column: str, target: str) -> float:
         """Return a number in the target unit: ``{ value, unit }``, or a bare number in the column's unit.
@@ -87,10 +87,12 @@ class Bridge:
         text: str = column
         value = entry
         if isinstance(entry, dict):
-            told = entry.get("unit")
+            unit_text = entry.get("unit")
             # For its checks alone: the number must keep its last digit where no unit is changed.
-            quantity(entry, unit(told, where=place).dimension if isinstance(told, str) else "", place)
-            text, value = str(told), entry["value"]
+            quantity(
+                entry, unit(unit_text, where=place).dimension if isinstance(unit_text, str) else "", place
+            )
+            text, value = str(unit_text), entry["value"]
         if not is_number(value):
             raise wrong(self.where, key, entry, f"a finite number in {column}, or {{ value, unit }}")
         return value * self.factor(text, target, where=place)

@@ -161,17 +161,17 @@ def is_empty(cell: object) -> bool:
     return cell is None or (isinstance(cell, str) and not cell.strip())
 
 
-def _foreign(where: object, got: object, rule: str) -> SessionError:
+def _foreign(where: object, actual: object, rule: str) -> SessionError:
     return _error(
-        "the file is no table of reference loads", where, got, FILES, rule,
+        "the file is no table of reference loads", where, actual, FILES, rule,
         "save it as .xlsx or as CSV, and name that file in the session; nothing was written",
     )  # fmt: skip
 
 
 def _error(
-    what: str, where: object, got: object, expected: object, rule: str, next_step: str | None = None
+    problem: str, where: object, actual: object, expected: object, rule: str, next_step: str | None = None
 ) -> SessionError:
     step = next_step or "correct the file"
     if "nothing was written" not in step:
         step += "; nothing was written"
-    return SessionError(what, where=where, got=got, expected=expected, next_step=step, rule=rule)
+    return SessionError(problem, where=where, got=actual, expected=expected, next_step=step, rule=rule)

@@ -60,19 +60,19 @@ class Head:
     labels: tuple[str, ...]
 
 
-def is_known(text: str, wanted: Wanted) -> bool:
+def is_known(text: str, layout: Wanted) -> bool:
     """Tell whether a header's text names a column of the session."""
-    return _split(text, wanted)[0] in wanted.names
+    return _split(text, layout)[0] in layout.names
 
 
-def with_units_row(cells: Cells, wanted: Wanted) -> Cells:
+def with_units_row(cells: Cells, layout: Wanted) -> Cells:
     """Return the cells with the units of a row below the names in the header, where there is such a row.
 
     It is one where no header has a unit and every column that needs one has a text below that is no number.
     """
-    split = [_split(text, wanted) for text in cells.header]
-    labels = (name for name in wanted.labels if name not in wanted.required)
-    plain = (*(RUNS if wanted.runs else ()), *wanted.passed, *labels)
+    split = [_split(text, layout) for text in cells.header]
+    labels = (name for name in layout.labels if name not in layout.required)
+    plain = (*(RUNS if layout.runs else ()), *layout.passed, *labels)
     needing = [at for at, (name, _) in enumerate(split) if name and name not in plain]
     if not cells.lines or not needing or any(text is not None for _, text in split):
         return cells
@@ -88,7 +88,7 @@ def with_units_row(cells: Cells, wanted: Wanted) -> Cells:
     )
 
 
-def read_head(cells: Cells, wanted: Wanted) -> Head:
+def read_head(cells: Cells, layout: Wanted) -> Head:
     """Return what the columns are.
 
     Raises
@@ -98,10 +98,10 @@ def read_head(cells: Cells, wanted: Wanted) -> Head:
     UnitError
         a unit is unknown
     """
-    if not any(_split(text, wanted)[0] in wanted.names for text in cells.header):
+    if not any(_split(text, layout)[0] in layout.names for text in cells.header):
         raise header_error(
             cells.where, "the first row is no header of the session",
-            ", ".join(text for text in cells.header if text), ", ".join(wanted.needed), "columns",
+            ", ".join(text for text in cells.header if text), ", ".join(layout.needed), "columns",
             "write the names of the session and their units in the first row that is not empty, and a title "
             "elsewhere; nothing was written",
         )  # fmt: skip
@@ -113,30 +113,30 @@ def read_head(cells: Cells, wanted: Wanted) -> Head:
                 "a header above every column that has values", "columns",
             )  # fmt: skip
     try:
-        return _known_head(cells.header, wanted)
+        return _known_head(cells.header, layout)
     except ToolkitError:
         # Said again with the file's name.
-        return _read_head(cells.header, wanted, cells.where)
+        return _read_head(cells.header, layout, cells.where)
 
 
 @lru_cache(maxsize=256)
-def _known_head(header: tuple[str, ...], wanted: Wanted) -> Head:
+def _known_head(header: tuple[str, ...], layout: Wanted) -> Head:
     # The files of a history have one header.
-    return _read_head(header, wanted, "")
+    return _read_head(header, layout, "")
 
 
-def _read_head(header: tuple[str, ...], wanted: Wanted, where: str) -> Head:
-    split = [_split(text.strip(), wanted) for text in header]
-    _check_names([name for name, _ in split if name], header, wanted, where)
+def _read_head(header: tuple[str, ...], layout: Wanted, where: str) -> Head:
+    split = [_split(text.strip(), layout) for text in header]
+    _check_names([name for name, _ in split if name], header, layout, where)
     columns, numeric, units, labels = {}, [], [], []
     for at, (name, text) in enumerate(split):
-        if not name or name in wanted.passed:
+        if not name or name in layout.passed:
             continue
-        if wanted.runs and name in RUNS:
+        if layout.runs and name in RUNS:
             columns[name] = at
             continue
         if text is None:
-            if name not in wanted.labels or name in wanted.required:
+            if name not in layout.labels or name in layout.required:
                 raise header_error(
                     f"{where}, column {name}", f"column {name} has no unit", header[at],
                     f"a header such as '{name} [N]' or '{name} [mV/V]', or a row of units below the header",
@@ -151,48 +151,48 @@ def _read_head(header: tuple[str, ...], wanted: Wanted, where: str) -> Head:
 
 
 @lru_cache(maxsize=1024)
-def _split(text: str, wanted: Wanted) -> tuple[str, str | None]:
+def _split(text: str, layout: Wanted) -> tuple[str, str | None]:
     """Return a header's name, as the session writes it where it is one of its, and its unit."""
-    name, stated = split_header(" ".join(text.split()), lambda name: _named(name, wanted) in wanted.names)
-    return _named(name, wanted), stated
+    name, stated = split_header(" ".join(text.split()), lambda name: _named(name, layout) in layout.names)
+    return _named(name, layout), stated
 
 
-def _named(name: str, wanted: Wanted) -> str:
+def _named(name: str, layout: Wanted) -> str:
     name = name.strip()
-    if name in wanted.names:
+    if name in layout.names:
         return name
-    fits = [one for one in wanted.names if one.casefold() == name.casefold()]
+    fits = [candidate for candidate in layout.names if candidate.casefold() == name.casefold()]
     return fits[0] if len(fits) == 1 else name
 
 
-def _check_names(names: list[str], header: Sequence[str], wanted: Wanted, where: str) -> None:
-    told = ", ".join(text for text in header if text)
+def _check_names(names: list[str], header: Sequence[str], layout: Wanted, where: str) -> None:
+    present = ", ".join(text for text in header if text)
     for name in names:
         if names.count(name) > 1:
-            raise header_error(where, f"column {name} stands twice", told, f"one column {name}", "columns")
-    missing = [name for name in wanted.needed if name not in names]
+            raise header_error(where, f"column {name} stands twice", present, f"one column {name}", "columns")
+    missing = [name for name in layout.needed if name not in names]
     if missing:
-        what = f"column {missing[0]} is missing" if len(missing) == 1 else (
+        problem = f"column {missing[0]} is missing" if len(missing) == 1 else (
             f"columns {', '.join(missing)} are missing"
         )  # fmt: skip
-        raise header_error(where, what, told, ", ".join(wanted.needed), "columns")
+        raise header_error(where, problem, present, ", ".join(layout.needed), "columns")
     for name in names:
-        if name not in wanted.names:
-            near = difflib.get_close_matches(name, wanted.names, n=1, cutoff=0.4)
+        if name not in layout.names:
+            near = difflib.get_close_matches(name, layout.names, n=1, cutoff=0.4)
             hint = f"did you mean {near[0]!r}? " if near else ""
             raise header_error(
-                where, f"unknown column {name!r}", name, ", ".join(wanted.names), "columns",
+                where, f"unknown column {name!r}", name, ", ".join(layout.names), "columns",
                 hint + "name it in indications or loads of the session, or remove it; nothing was written",
             )  # fmt: skip
 
 
 def header_error(
     where: str,
-    what: str,
-    got: object,
+    problem: str,
+    actual: object,
     expected: object,
     rule: str,
     next_step: str = "correct the file; nothing was written",
 ) -> SessionError:
     """Return the error of a file whose header or rows cannot be used."""
-    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule=rule)
+    return SessionError(problem, where=where, got=actual, expected=expected, next_step=next_step, rule=rule)

@@ -63,8 +63,8 @@ class KnownErrors:
 
 def group_column(reference: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the data's column that a session's reference names as its group, read beside the loads."""
-    found = reference.get("shared_group")
-    name = found.get("column") if isinstance(found, dict) else found
+    group = reference.get("shared_group")
+    name = group.get("column") if isinstance(group, dict) else group
     return (name,) if isinstance(name, str) and name not in _LABELS else ()
 
 
@@ -110,9 +110,9 @@ def known_errors(method: str, statements: Statements, table: Table, load: str, w
     u = reference.u_at(load, table.column(load)) if u is None else u
     if u is not None and not (u > 0).all():
         row = int((u <= 0).argmax()) + 1
-        got = f"a share of the applied load, which is 0 in row {row}"
+        fault = f"a share of the applied load, which is 0 in row {row}"
         raise wrong(
-            where, f"reference.uncertainty.{load}", got, f"U in the unit of {load}, or a column u_{load}"
+            where, f"reference.uncertainty.{load}", fault, f"U in the unit of {load}, or a column u_{load}"
         )
     cells = np.array([_u_cell(c.u, c.resolution, c.name, where) for c in statements.cells])
     return KnownErrors(u=u, group=group, u_shared=0.0, proportional=False, u_cells=cells)
@@ -137,10 +137,10 @@ def undeclared_standard(reference: Reference, table: Table) -> str | None:
 
 def _groups(reference: Reference, table: Table, where: object) -> tuple[NDArray[np.intp], bool]:
     entry, error = reference.shared_group, _ERRORS[0]
-    named = isinstance(entry, dict)
-    if named:
+    by_name = isinstance(entry, dict)
+    if by_name:
         error, entry = entry.get("error", error), entry.get("column", "every row")
-        named = entry != "every row"
+        by_name = entry != "every row"
     if not isinstance(entry, str) or not entry.strip():
         expected = 'what the rows share: "run", a load, a column, or the name of the standard'
         raise wrong(where, "reference.shared_group", entry, expected)
@@ -148,7 +148,7 @@ def _groups(reference: Reference, table: Table, where: object) -> tuple[NDArray[
         raise wrong(where, "reference.shared_group.error", error, " | ".join(_ERRORS))
     labels = _column(entry, table)
     if labels is None:
-        if named or entry in _LABELS:
+        if by_name or entry in _LABELS:
             raise wrong(where, "reference.shared_group", entry, "a column of the data")
         columns = [*_LABELS, *table.names, *(name for name, _ in table.labels)]
         near = difflib.get_close_matches(entry, columns, n=1, cutoff=0.6)

@@ -63,8 +63,10 @@ def _reading(entry: dict[str, Any], place: str, scope: Scope) -> PolarityReading
     if not isinstance(load, str) or load not in scope.loads:
         raise wrong(scope.where, f"{place}.load", load, ", ".join(scope.loads))
     text = scope.loads[load]
-    found = unit(text)
-    value = quantity(entry.get("value", {}), found.dimension, f"{scope.where}: {place}.value") / found.factor
+    stated = unit(text)
+    value = (
+        quantity(entry.get("value", {}), stated.dimension, f"{scope.where}: {place}.value") / stated.factor
+    )
     if not is_number(value) or value == 0:
         raise wrong(scope.where, f"{place}.value", entry.get("value"), "a load that is not zero")
     indications = _indications(entry.get("indications"), f"{place}.indications", scope)
@@ -93,9 +95,9 @@ def _indications(entry: object, key: str, scope: Scope) -> tuple[tuple[str, floa
     if not isinstance(entry, dict):
         raise wrong(scope.where, key, entry, example)
     check_keys(entry, scope.indications, where=f"{scope.where}: {key}")
-    for name, one in entry.items():
-        if not isinstance(one, dict):
-            raise wrong(scope.where, f"{key}.{name}", one, f"a number with its unit: {example}")
+    for name, reading in entry.items():
+        if not isinstance(reading, dict):
+            raise wrong(scope.where, f"{key}.{name}", reading, f"a number with its unit: {example}")
     return tuple(
         (name, scope.value(name, entry[name], f"{key}.{name}")) for name in scope.indications if name in entry
     )

@@ -126,7 +126,7 @@ def creep_entries(entries: object, scope: Scope) -> tuple[CreepEntry, ...]:
         as `zero_entries`; an unknown load, seconds below zero, two readings of one moment
     """
     made: list[CreepEntry] = []
-    seen = set()
+    times = set()
     for at, entry in enumerate(_tables(entries, "creep", _CREEP, scope), start=1):
         place = f"creep {at}"
         load, unloaded = _load(entry.get("load"), f"{place}.load", scope)
@@ -137,14 +137,14 @@ def creep_entries(entries: object, scope: Scope) -> tuple[CreepEntry, ...]:
             raise wrong(scope.where, f"{place}.seconds", entry.get("seconds"), "seconds, zero or more")
         if entry.get("value") is None:
             raise wrong(scope.where, f"{place}.value", None, f"{{ {scope.indications[0]} = number }}")
-        shown = _shown(entry["value"], entry.get("load"), f"{place}.value", scope)
-        values = () if shown else _values(entry["value"], f"{place}.value", scope)
-        for name, _ in (*values, *([shown] if shown else ())):
-            if (load, name, float(seconds)) in seen:
+        applied = _shown(entry["value"], entry.get("load"), f"{place}.value", scope)
+        values = () if applied else _values(entry["value"], f"{place}.value", scope)
+        for name, _ in (*values, *([applied] if applied else ())):
+            if (load, name, float(seconds)) in times:
                 raise wrong(scope.where, f"{place}.seconds", seconds, f"one reading of {name} at a time")
-            seen.add((load, name, float(seconds)))
+            times.add((load, name, float(seconds)))
         made.append(
-            CreepEntry(load=load, unloaded=unloaded, seconds=float(seconds), values=values, shown=shown)
+            CreepEntry(load=load, unloaded=unloaded, seconds=float(seconds), values=values, shown=applied)
         )
     return tuple(made)
 
@@ -201,18 +201,18 @@ def _values(entry: object, key: str, scope: Scope) -> tuple[tuple[str, float], .
     names = scope.indications
     if isinstance(entry, dict) and not {"value", "unit"} & set(entry):
         check_keys(entry, names, where=f"{scope.where}: {key}")
-        named = {name: entry[name] for name in names if name in entry}
+        by_name = {name: entry[name] for name in names if name in entry}
     elif isinstance(entry, list):
         if len(entry) != len(names):
             raise wrong(
                 scope.where, key, f"{len(entry)} values", f"one value each of {', '.join(names)}, in order"
             )
-        named = dict(zip(names, entry, strict=True))
+        by_name = dict(zip(names, entry, strict=True))
     elif entry is None or len(names) > 1:
         return ()
     else:
-        named = {names[0]: entry}
-    return tuple((name, scope.value(name, one, f"{key}.{name}")) for name, one in named.items())
+        by_name = {names[0]: entry}
+    return tuple((name, scope.value(name, reading, f"{key}.{name}")) for name, reading in by_name.items())
 
 
 def _shown(value: object, load: object, key: str, scope: Scope) -> tuple[str, float] | None:

@@ -210,13 +210,13 @@ def date_of(value: object, key: str, where: object) -> dt.date:
         raise wrong(where, key, value, "a date such as 2026-03-31") from error
 
 
-def wrong(where: object, key: str, got: object, expected: str, rule: str = "session") -> ConfigError:
-    """Return the error of an entry that is missing (``got`` is None) or cannot be used."""
+def wrong(where: object, key: str, actual: object, expected: str, rule: str = "session") -> ConfigError:
+    """Return the error of an entry that is missing (``actual`` is None) or cannot be used."""
     return ConfigError(
-        f"{key} is missing" if got is None else f"{key} has a value that cannot be used",
+        f"{key} is missing" if actual is None else f"{key} has a value that cannot be used",
         where=f"{where}: {key}",
-        got="nothing" if got is None else got,
-        expected=number_expected(got, expected),
+        got="nothing" if actual is None else actual,
+        expected=number_expected(actual, expected),
         next_step=f"correct {key}; nothing was written",
         rule=rule,
     )

@@ -196,11 +196,11 @@ def _creep(source: CellSource, load: str, indication: str) -> tuple[float, float
     return max(pairs, key=lambda pair: abs(pair[1] - pair[0])) if pairs else None
 
 
-def _refused(where: object, what: str, got: object, expected: object) -> SessionError:
+def _refused(where: object, problem: str, actual: object, expected: object) -> SessionError:
     return SessionError(
-        what,
+        problem,
         where=where,
-        got=got,
+        got=actual,
         expected=expected,
         next_step="name one of the record's with --load and --indication",
         rule="standard",

@@ -315,5 +315,7 @@ def _checked(
     return loaded
 
 
-def _refused(what: str, got: object, expected: object, next_step: str) -> SessionError:
-    return SessionError(what, where="ASTM E74", got=got, expected=expected, next_step=next_step, rule="e74")
+def _refused(problem: str, actual: object, expected: object, next_step: str) -> SessionError:
+    return SessionError(
+        problem, where="ASTM E74", got=actual, expected=expected, next_step=next_step, rule="e74"
+    )

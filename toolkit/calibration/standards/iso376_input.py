@@ -103,8 +103,10 @@ def check(
         raise _refused("the creep is no number", creep, "two indications", "leave it out")
 
 
-def _refused(what: str, got: object, expected: object, next_step: str) -> SessionError:
-    return SessionError(what, where="ISO 376", got=got, expected=expected, next_step=next_step, rule="iso376")
+def _refused(problem: str, actual: object, expected: object, next_step: str) -> SessionError:
+    return SessionError(
+        problem, where="ISO 376", got=actual, expected=expected, next_step=next_step, rule="iso376"
+    )
 
 
 # From a session's rows to the runs of ISO 376: the same forces in every run, up and down.

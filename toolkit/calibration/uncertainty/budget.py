@@ -215,5 +215,7 @@ def _fitted(record: CalibrationRecord, load: str) -> LoadFit:
     return fitted
 
 
-def _refused(where: str, what: str, got: object, expected: object, next_step: str) -> SessionError:
-    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule="budget")
+def _refused(where: str, problem: str, actual: object, expected: object, next_step: str) -> SessionError:
+    return SessionError(
+        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="budget"
+    )

@@ -109,7 +109,7 @@ def monte_carlo(
         ``budget``: under 10 000 or too many trials; nothing in the budget is uncertain
     """
     if trials is not None and not 10_000 <= trials <= MOST_TRIALS:
-        raise _refused("so many trials tell nothing, or take for ever", trials, f"10000 to {MOST_TRIALS}")
+        raise _refused("the number of trials cannot be used", trials, f"10000 to {MOST_TRIALS}")
     if not (math.isfinite(budget.U) and budget.u > 0):
         raise _refused("the budget has no interval to check", f"u = {budget.u:g}, k = {budget.k:g}", "u > 0")
     fitted = record.load(budget.load)
@@ -250,8 +250,9 @@ def _until_settled(
     return np.concatenate(batches), False
 
 
-def _refused(what: str, got: object, expected: object) -> SessionError:
+def _refused(problem: str, actual: object, expected: object) -> SessionError:
     return SessionError(
-        what, where="Monte Carlo", got=got, expected=expected, next_step="choose another number of trials",
+        problem, where="Monte Carlo", got=actual, expected=expected,
+        next_step="choose another number of trials",
         rule="budget",
     )  # fmt: skip

@@ -31,12 +31,12 @@ def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Val
     reach = max(values["presliding"], 0.0)
     if len(t) < 2:
         return values["coulomb"] * np.sign(velocity)
-    knots, travelled, ways = _path(t, velocity)
+    knots, travelled, strokes = _path(t, velocity)
     sizes = np.diff(travelled)
-    z, bent = _bristle(sizes, ways, reach, start=float(np.sign(velocity[0])))
+    z, bent = _bristle(sizes, strokes, reach, start=float(np.sign(velocity[0])))
     # The bristle's mean over a piece, at an even speed along it.
     slow = sizes > 1e-9 * reach if reach > 0 else sizes > 0
-    settled = np.where(slow, (z - bent) * reach / np.where(slow, sizes, 1.0) + ways, z)
+    settled = np.where(slow, (z - bent) * reach / np.where(slow, sizes, 1.0) + strokes, z)
     area = np.concatenate([[0.0], np.cumsum(settled * np.diff(knots))])
     half = 0.5 * float(np.median(np.diff(t)))
     low, high = np.maximum(t - half, t[0]), np.minimum(t + half, t[-1])
@@ -65,15 +65,15 @@ def _path(
 
 
 def _bristle(
-    sizes: NDArray[np.float64], ways: NDArray[np.float64], reach: float, *, start: float
+    sizes: NDArray[np.float64], strokes: NDArray[np.float64], reach: float, *, start: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the bristle at the beginning and at the end of each piece."""
     shares = np.exp(-sizes / reach) if reach > 0 else (sizes <= 0).astype(float)
     before, after = np.empty_like(sizes), np.empty_like(sizes)
     last = start
-    for i, (share, way) in enumerate(zip(shares.tolist(), ways.tolist(), strict=True)):
+    for i, (share, stroke) in enumerate(zip(shares.tolist(), strokes.tolist(), strict=True)):
         before[i] = last
-        last = after[i] = way + (last - way) * share
+        last = after[i] = stroke + (last - stroke) * share
     return before, after
 
 
@@ -101,8 +101,8 @@ def _longest(case: Surroundings) -> float | None:
     if not case.integrates:
         return None
     motion = case.motion
-    way = motion.place if motion.has_position else motion.speed * case.longest_run
-    return max(_SHORT * way, motion.speed * case.row_time)
+    travel = motion.place if motion.has_position else motion.speed * case.longest_run
+    return max(_SHORT * travel, motion.speed * case.row_time)
 
 
 EFFECT = Effect(

@@ -41,13 +41,13 @@ def _longest(case: Surroundings) -> float:
 
 def _periods(case: Surroundings) -> tuple[float, ...]:
     """Return the periods to try, the longest first; none where nothing moves."""
-    way, step = case.way
-    if not way > 0:
+    travel, step = case.way
+    if not travel > 0:
         return ()
     # Two rows to a period at the usual speed; where the motion is slower, shorter ones would still be seen.
-    most = min(_MOST, way / (2 * step) if step > 0 else _MOST)
-    count = min(int((most - _FEWEST) / _CLOSE), max(_LEAST, _WORK // case.rows))
-    return tuple(float(way / cycles) for cycles in _FEWEST + _CLOSE * np.arange(max(count, 1)))
+    finest = min(_MOST, travel / (2 * step) if step > 0 else _MOST)
+    count = min(int((finest - _FEWEST) / _CLOSE), max(_LEAST, _WORK // case.rows))
+    return tuple(float(travel / cycles) for cycles in _FEWEST + _CLOSE * np.arange(max(count, 1)))
 
 
 EFFECT = Effect(

@@ -49,9 +49,9 @@ def _over(slope: NDArray[np.float64], nominal: NDArray[np.float64]) -> NDArray[n
 
 def _slope(tire: Tire, drive: Drive) -> NDArray[np.float64]:
     """Return dFY/dSA [N/rad] at the drive's slip angles, shape (n,)."""
-    more = tire(dataclasses.replace(drive, SA=drive.SA + _STEP)).FY
+    turned = tire(dataclasses.replace(drive, SA=drive.SA + _STEP)).FY
     less = tire(dataclasses.replace(drive, SA=drive.SA - _STEP)).FY
-    return np.asarray((more - less) / (2 * _STEP))
+    return np.asarray((turned - less) / (2 * _STEP))
 
 
 def _one_load(case: Surroundings) -> bool:

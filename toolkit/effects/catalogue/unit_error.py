@@ -34,9 +34,9 @@ def _all() -> dict[str, tuple[str | None, float]]:
         name: (None, value) for name, value in _PREFIXES.items()
     }
     for pair in _MIXED:
-        for true, taken in (pair, pair[::-1]):
-            right, wrong = unit(true), unit(taken)
-            confusions[f"{true} read as {taken}"] = (right.dimension, wrong.factor / right.factor)
+        for true, assumed in (pair, pair[::-1]):
+            right, wrong = unit(true), unit(assumed)
+            confusions[f"{true} read as {assumed}"] = (right.dimension, wrong.factor / right.factor)
     return confusions
 
 

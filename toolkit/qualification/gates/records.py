@@ -93,8 +93,8 @@ def _replaced(file: str, old: bytes, new: bytes) -> Callable[[Path], object]:
 
 def _first_load(change: Callable[[LoadFit], LoadFit]) -> Change:
     def alter(record: CalibrationRecord) -> CalibrationRecord:
-        first, *others = record.loads
-        return dataclasses.replace(record, loads=(change(first), *others))
+        first, *following = record.loads
+        return dataclasses.replace(record, loads=(change(first), *following))
 
     return alter
 

@@ -64,13 +64,13 @@ def _shown(name: str, rules: str, values: Callable[[], tuple[Departure, ...]]) -
 
 def _figure(folder: Path, *, stored: bool) -> tuple[Departure, ...]:
     path = folder / FIGURE
-    found = read_toml(path)
+    document = read_toml(path)
     try:
-        data = {name: numbers(values, path) for name, values in found["data"].items()}
+        data = {name: numbers(values, path) for name, values in document["data"].items()}
         if not stored:
-            terms = [data.get(name, np.ones(1)) for name in found["corrected"]["terms"]]
+            terms = [data.get(name, np.ones(1)) for name in document["corrected"]["terms"]]
             for load in ("FY", "MZ"):
-                pairs = zip(numbers(found["corrected"][load], path), terms, strict=True)
+                pairs = zip(numbers(document["corrected"][load], path), terms, strict=True)
                 data[load] = sum((c * term for c, term in pairs), start=np.zeros(1))
         readings = of_sizes(
             [f"row {number}" for number in range(1, len(data["FZ"]) + 1)],
@@ -113,10 +113,10 @@ def _cells(order: tuple[int, int, int]) -> tuple[Departure, ...]:
     readings = _sweep()
     wheel = np.vstack([readings.FY, readings.MZ, _RADIUS * readings.FY])
     indications = np.asarray(np.linalg.solve(PER_INDICATION, wheel).T, dtype=np.float64)
-    ones = np.ones(len(readings.FZ))
+    ones_column = np.ones(len(readings.FZ))
     cells = Cells(
         names=CELLS, indications=indications[:, order], per_FY=PER_INDICATION[0], per_MZ=PER_INDICATION[1],
-        per_MX=PER_INDICATION[2], radius_m=None, tares=np.zeros_like(indications), FY_sign=ones,
-        MZ_sign=ones,
+        per_MX=PER_INDICATION[2], radius_m=None, tares=np.zeros_like(indications), FY_sign=ones_column,
+        MZ_sign=ones_column,
     )  # fmt: skip
     return pattern(readings, cells)

@@ -179,15 +179,17 @@ def _skip(lines: list[str], place: int, separator: str, gated: Gated) -> int:
 
 def _check_rows(segment: _Segment, *, exact: bool, gated: Gated) -> None:
     claims = [text.strip() for text in segment.tags.get("Samples", [])]
-    most = max((int(text) for text in claims if re.fullmatch("[0-9]{1,9}", text)), default=None)
-    if most is None:
+    longest = max((int(text) for text in claims if re.fullmatch("[0-9]{1,9}", text)), default=None)
+    if longest is None:
         return
-    if len(segment.rows) < most:
+    if len(segment.rows) < longest:
         truncated(
-            gated.path, "the LVM file has fewer rows than it says", len(segment.rows), f"{most} samples"
+            gated.path, "the LVM file has fewer rows than it says", len(segment.rows), f"{longest} samples"
         )
-    if exact and len(segment.rows) > most:
-        damaged(gated.path, "the LVM file has more rows than it says", len(segment.rows), f"{most} samples")
+    if exact and len(segment.rows) > longest:
+        damaged(
+            gated.path, "the LVM file has more rows than it says", len(segment.rows), f"{longest} samples"
+        )
 
 
 def _columns(segment: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
@@ -222,9 +224,9 @@ def _values(
     for line, fields in rows:
         text = fields[place] if place < len(fields) else ""
         value = number_or_text(text, decimal)
-        rule, got = judge(value)
+        rule, reading = judge(value)
         if rule is not None:
-            refuse_cell(rule, got, str(gated.path), line, place + 1, name)
+            refuse_cell(rule, reading, str(gated.path), line, place + 1, name)
         values.append(value)
     return np.array(values, dtype=np.float64)
 

@@ -143,10 +143,10 @@ def _header(vector: Vector, where: str) -> str:
     if printed is None:
         return f"{name} [{stated}]"
     try:
-        same = unit(printed, where=where).text == unit(stated, where=where).text
+        agree = unit(printed, where=where).text == unit(stated, where=where).text
     except UnitError:
-        same = printed.strip() == stated
-    if not same:
+        agree = printed.strip() == stated
+    if not agree:
         raise ColumnError(
             f"channel {vector.name!r} has two units",
             where=where,
@@ -181,11 +181,11 @@ def _numbers(vector: Vector, header: str, rows: int, where: str) -> NDArray[np.f
     return numbers
 
 
-def _bad_cell(rule: str, got: str, header: str, row: int, where: str) -> None:
+def _bad_cell(rule: str, actual: str, header: str, row: int, where: str) -> None:
     raise CellError(
         f"data row {row}, channel {header!r}: no number",
         where=f"{where}, data row {row}, channel {header!r}",
-        got=got,
+        got=actual,
         expected="a finite number",
         next_step="look at that value in the file; repeat the recording or mend a copy of the file",
         rule=rule,

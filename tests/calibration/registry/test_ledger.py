@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toolkit.calibration.records.record import canonical
-from toolkit.calibration.registry.ledger_text import LineForm, LineForms
+from toolkit.calibration.registry.ledger import LineForm, LineForms
 
 BODY: dict[str, Any] = {
     "by": "A. Person", "document": {"content": "c" * 64, "name": "report 1"}, "event": "issued",
