@@ -57,7 +57,7 @@ def run_command(words: list[str]) -> tuple[float, float]:
     child = subprocess.Popen([program, *words], stdout=subprocess.DEVNULL)
     peak = 0.0
     while child.poll() is None:
-        peak = max(peak, *(_high_water_MB(pid) for pid in (child.pid, *_children(child.pid))))
+        peak = max(peak, *(high_water_MB(pid) for pid in (child.pid, *_children(child.pid))))
         time.sleep(0.02)
     if child.returncode not in (0, 1):
         raise RuntimeError(f"toolkit {' '.join(words)}: exit code {child.returncode}")
@@ -71,7 +71,8 @@ def _children(pid: int) -> list[int]:
         return []
 
 
-def _high_water_MB(pid: int) -> float:
+def high_water_MB(pid: int) -> float:
+    """Return the most memory [MB] that a process has had, 0 where it is no more."""
     # Of this program alone: what wait4 tells includes the process that started it.
     try:
         lines = Path(f"/proc/{pid}/status").read_text().splitlines()

@@ -1,13 +1,17 @@
 """The workbench's first page in a home of 1 000 records and 10 000 tests; the peer is that of an empty home.
 
 ``ready``: from the request to the page in hand. ``first paint``: what the browser itself measures. The
-questions of the agenda are asked after that; the last row is how long all of them take when nothing is
-remembered.
+questions of the agenda are asked after that; a row is how long all of them take when nothing is remembered.
+The last rows are of a server in a process of its own, as `toolkit open` begins it: the slowest of all pages,
+and the most memory that it had once every page and every part of a record was asked for.
 """
 
 from __future__ import annotations
 
+import re
 import socket
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -16,10 +20,19 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.benchmarks.registry_growth import filled
-from tests.benchmarks.timing import pairs, row
+from tests.benchmarks.timing import high_water_MB, pairs, row
 from toolkit.calibration.registry.registry import Registry
 
 RECORDS, TESTS = 1000, 10_000
+LISTS = {"record": "/records", "test": "/tests/window/0"}
+PAGES = ("/", "/session", "/records", "/record/{record}", "/tests", "/test/{test}", "/audits", "/diagnoses",
+         "/templates", "/jobs")  # fmt: skip
+PARTS = (
+    *(f"/agenda/{question}" for question in ("instruments", "candidates", "due", "drift", "work")),
+    *(f"/record/{{record}}/part/{part}" for part in ("gates", "responses", "fit", "budget", "as_found")),
+    "/tests/windows", "/tests/window/0", "/audits/list", "/diagnoses/list",
+)  # fmt: skip
+"""What is asked for once its page stands."""
 CHROMIUM = "/usr/bin/chromium"
 _WORDS = (
     "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
@@ -46,7 +59,40 @@ def run(folder: Path, count: int) -> list[dict[str, object]]:
     for question in ("instruments", "candidates", "due", "drift", "work"):
         ask[large](f"/agenda/{question}")
     rows.append(row("its agenda, nothing remembered", [time.perf_counter() - started], "", None, ""))
+    seconds, peak = _every_page(large)
+    slowest = max(seconds, key=lambda page: seconds[page])
+    rows.append(row(f"the slowest of all pages, {slowest}: ready", [seconds[slowest]], "", None, "0.5 s"))
+    rows.append(row("memory once all was asked for", [peak], "", None, "300", unit="MB"))
     return rows
+
+
+def _every_page(home: Path) -> tuple[dict[str, float], float]:
+    """Return the seconds of each page of a server of its own, asked first, and its most memory [MB]."""
+    program = str(Path(sys.executable).with_name("toolkit"))
+    server = subprocess.Popen(
+        [program, "open", str(home), "--no-browser"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        text=True,
+    )  # fmt: skip
+    try:
+        assert server.stdout is not None
+        address = next(word for line in server.stdout for word in line.split() if "/open?key=" in word)
+        with urllib.request.urlopen(address, timeout=120) as answer:  # noqa: S310  our own address
+            cookie = str(answer.headers["set-cookie"]).partition(";")[0]
+        ask = _asking(address, address.partition("/open?")[0], cookie)
+        ids = {
+            kind: re.findall(rf'/{kind}/([^/"?#]+)"', ask(path).decode())[0] for kind, path in LISTS.items()
+        }
+        seconds = {}
+        for page in PAGES:
+            started = time.perf_counter()
+            ask(page.format(**ids))
+            seconds[page] = time.perf_counter() - started
+        for part in PARTS:
+            ask(part.format(**ids))
+        return seconds, high_water_MB(server.pid)
+    finally:
+        server.terminate()
+        server.wait(30)
 
 
 def _served(home: Path) -> tuple[str, str, str]:
