@@ -82,6 +82,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) 
     expected = {f"toolkit/{name}" for name in files_below(ROOT / "toolkit")}
     for home in ("calibrations", "report_templates"):
         expected |= {f"toolkit/_home/{home}/{name}" for name in files_below(ROOT / home)}
+    expected |= {f"toolkit/_site/{name}" for name in files_below(ROOT / "build" / "docs")}
     assert inside == expected
     assert f"Name: {DISTRIBUTION}\n" in metadata
     assert {f"Provides-Extra: {extra}" for extra in ("tdms", "mdf", "parquet", "cluster")} <= set(
@@ -118,6 +119,9 @@ def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path) -
     assert Path(place.stdout.strip()).is_relative_to(environment)
     assert run("--version").strip() == f"toolkit {__version__}"
     assert "--no-browser" in run("open", "--help")
+    page = Path(run("docs", "--no-browser").strip())
+    assert page.is_relative_to(environment)
+    assert "Tutorials" in page.read_text()
     examples = Path(place.stdout.strip()).parent / "examples" / "virtual"
     run("init", "lab")
     run("simulate", examples / "session_plan.toml", "--out", "session", "--home", "lab")
