@@ -12,7 +12,18 @@ import toolkit
 
 ROOT = Path(toolkit.__file__).parent
 TESTS = Path(__file__).parent
-APART = {"golden", "benchmarks", "crash", "campaigns", "coverage", "fuzz", "house", "proof", "public_sets"}
+APART = {
+    "golden",
+    "benchmarks",
+    "crash",
+    "campaigns",
+    "coverage",
+    "fuzz",
+    "house",
+    "proof",
+    "public_sets",
+    "released",
+}
 """Folders that test more than the package, or measure it."""
 OF_THE_CHECKOUT = {
     "test_docs",
