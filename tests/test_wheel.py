@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tarfile
@@ -71,6 +72,16 @@ def test_the_name_is_stated_everywhere() -> None:
     assert PROJECT["name"] == DISTRIBUTION
     assert f'pip install "{DISTRIBUTION}[' in (ROOT / "README.md").read_text()
     assert f"{DISTRIBUTION}[tdms]" in (ROOT / "toolkit" / "lab" / "rules.toml").read_text()
+
+
+def test_the_version_is_stated_everywhere() -> None:
+    citation = (ROOT / "CITATION.cff").read_text()
+    assert f"\nversion: {__version__}\n" in citation
+    released = re.search(r"(?m)^date-released: (.*)$", citation)
+    assert released is not None
+    assert f"\n## [{__version__}] - {released[1]}\n" in (ROOT / "CHANGELOG.md").read_text()
+    for page in ("README.md", "docs/install.md"):
+        assert f"tire_lab_toolkit-{__version__}-py3-none-any.whl" in (ROOT / page).read_text()
 
 
 def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) -> None:
