@@ -101,6 +101,20 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) 
     )
 
 
+def test_the_site_asks_no_other_host(built: Path) -> None:
+    (wheel,) = built.glob("*.whl")
+    asked = re.compile(
+        r"""(?:<(?:script|link|img|iframe)[^>]*(?:src|href)=["']|url\(["']?|@import ["'])https?:"""
+    )
+    with zipfile.ZipFile(wheel) as archive:
+        pages = [name for name in archive.namelist() if name.startswith("toolkit/_site/")]
+        texts = {name: archive.read(name).decode() for name in pages if name.endswith((".html", ".css"))}
+        size = sum(archive.getinfo(name).compress_size for name in pages)
+    assert len(texts) > 50
+    assert not [name for name, text in texts.items() if asked.search(text)]
+    assert size < 2_000_000
+
+
 def test_the_source_distribution_holds_what_builds_and_tests_it(built: Path) -> None:
     (source,) = built.glob("*.tar.gz")
     with tarfile.open(source) as archive:
