@@ -11,7 +11,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden house pages bench benchmarks recordings crash coverage fuzz proof setup lock clean
+.PHONY: demo test check golden house pages docs bench benchmarks recordings crash coverage fuzz proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -38,6 +38,10 @@ house: $(STAMP)
 # The pages of docs/ that are printed from declarations: formats, effects, characteristics, rules, tags.
 pages: $(STAMP)
 	$(BIN)/python -m tests.house.pages
+
+# The site of all pages, offline: `toolkit docs` opens it; a wheel carries it.
+docs: $(STAMP)
+	$(BIN)/python docs/build_site.py
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks

@@ -35,18 +35,24 @@ class Block:
 def recipes() -> dict[str, tuple[Block, ...]]:
     """Return the blocks of every recipe by its title."""
     sections = PAGE.read_text(encoding="utf-8").partition("\n# Recipes\n")[2].split("\n## ")[1:]
-    return {
-        section.partition("\n")[0]: tuple(
-            Block(match["above"], match["language"], match["text"]) for match in _FENCE.finditer(section)
-        )
-        for section in sections
-    }
+    return {section.partition("\n")[0]: blocks_of(section) for section in sections}
+
+
+def blocks_of(text: str) -> tuple[Block, ...]:
+    """Return the fenced blocks of a page or a section."""
+    return tuple(Block(match["above"], match["language"], match["text"]) for match in _FENCE.finditer(text))
+
+
+def file_named(block: Block) -> str | None:
+    """Return the path of the new file that a block holds, None where it holds none."""
+    path = _NEW.search(block.above)
+    return path[1] if path else None
 
 
 def new_files() -> dict[str, dict[str, str]]:
     """Return the files that each recipe writes: recipe, path, text."""
     return {
-        title: {path[1]: block.text for block in blocks if (path := _NEW.search(block.above))}
+        title: {path: block.text for block in blocks if (path := file_named(block))}
         for title, blocks in recipes().items()
     }
 
@@ -65,7 +71,7 @@ def follow(title: str, folder: Path) -> list[tuple[str, str, str]]:
     for block in recipes()[title]:
         if block.language == "console":
             printed += [
-                (command, expected, _print_of(command, folder)) for command, expected in _commands(block)
+                (command, expected, _print_of(command, folder)) for command, expected in commands_of(block)
             ]
         elif path := _NEW.search(block.above):
             assert not (folder / path[1]).exists(), f"{path[1]} is no new file"
@@ -83,7 +89,8 @@ def follow(title: str, folder: Path) -> list[tuple[str, str, str]]:
     return printed
 
 
-def _commands(block: Block) -> list[tuple[str, str]]:
+def commands_of(block: Block) -> list[tuple[str, str]]:
+    """Return each command of a block with what it should print."""
     parts = re.split(r"(?m)^\$ ", block.text)[1:]
     return [(part.partition("\n")[0], part.partition("\n")[2]) for part in parts]
 

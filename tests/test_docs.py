@@ -45,7 +45,7 @@ def spans(page: Path) -> list[str]:
 def names(page: Path) -> list[str]:
     """Return the dotted names of modules, classes and functions of the package."""
     dotted = re.compile(rf"(?:toolkit\.)?(?:{'|'.join(layers())})(?:\.[A-Za-z_]\w*)+(?:\(\))?")
-    files = tuple(".py .md .toml .docx .pdf".split())
+    files = tuple(".py .md .toml .docx .pdf .html .jsonl".split())
     return [span for span in spans(page) if dotted.fullmatch(span) and not span.endswith(files)]
 
 

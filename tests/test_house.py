@@ -12,9 +12,28 @@ import toolkit
 
 ROOT = Path(toolkit.__file__).parent
 TESTS = Path(__file__).parent
-APART = {"golden", "benchmarks", "crash", "campaigns", "coverage", "fuzz", "house", "proof", "public_sets"}
+APART = {
+    "golden",
+    "benchmarks",
+    "crash",
+    "campaigns",
+    "coverage",
+    "fuzz",
+    "house",
+    "proof",
+    "public_sets",
+    "released",
+}
 """Folders that test more than the package, or measure it."""
-OF_THE_CHECKOUT = {"test_docs", "test_front_door", "test_house", "test_readme", "test_recipes", "test_wheel"}
+OF_THE_CHECKOUT = {
+    "test_docs",
+    "test_front_door",
+    "test_house",
+    "test_readme",
+    "test_recipes",
+    "test_tutorials",
+}
+OF_THE_CHECKOUT |= {"test_wheel"}
 """Tests of the checkout's pages and of the package as a whole; no others stand beside the mirror."""
 
 

@@ -1,4 +1,4 @@
-"""The README's own examples: every settings file is read, every command and option exists."""
+"""The examples of README and handbook: every settings file is read, every command and option exists."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from toolkit.cli.main import run
 from toolkit.examples.fig4_4 import packaged_fig4_4
 from toolkit.recording.folder import read_test_folder
 
-README = Path(__file__).resolve().parents[1] / "README.md"
+ROOT = Path(__file__).resolve().parents[1]
+HANDBOOK = (ROOT / "docs" / "handbook.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = [
     "\n".join(line[4:] for line in block.splitlines())
-    for block in re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", README.read_text(), flags=re.MULTILINE)
+    for block in re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", README + HANDBOOK, flags=re.MULTILINE)
 ]
 GROUPS = ("calibration", "template", "session", "machine", "test", "case", "plan")
 COMMANDS = [
@@ -44,13 +46,20 @@ def test_every_command_and_option_exists(line: str, capsys: pytest.CaptureFixtur
         assert option in helped
 
 
+def test_the_readme_is_one_screen_with_two_pictures() -> None:
+    assert len(README.splitlines()) <= 60
+    assert README.count("![") == 2
+    first_use = next(block for block in BLOCKS if block.startswith("toolkit init"))
+    assert len(first_use.splitlines()) == 6
+
+
 def test_the_commands_are_there() -> None:
     assert len(COMMANDS) >= 9
 
 
 def test_the_session_is_one(tmp_path: Path) -> None:
     session = next(block for block in BLOCKS if "indications" in block)
-    heads = re.search(r"`(run,direction,[^`]*)`", README.read_text())
+    heads = re.search(r"`(run,direction,[^`]*)`", HANDBOOK)
     assert heads is not None
     columns = heads[1].split(",")
     (tmp_path / "SESSION.toml").write_text(session)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tarfile
@@ -73,6 +74,16 @@ def test_the_name_is_stated_everywhere() -> None:
     assert f"{DISTRIBUTION}[tdms]" in (ROOT / "toolkit" / "lab" / "rules.toml").read_text()
 
 
+def test_the_version_is_stated_everywhere() -> None:
+    citation = (ROOT / "CITATION.cff").read_text()
+    assert f"\nversion: {__version__}\n" in citation
+    released = re.search(r"(?m)^date-released: (.*)$", citation)
+    assert released is not None
+    assert f"\n## [{__version__}] - {released[1]}\n" in (ROOT / "CHANGELOG.md").read_text()
+    for page in ("README.md", "docs/install.md"):
+        assert f"tire_lab_toolkit-{__version__}-py3-none-any.whl" in (ROOT / page).read_text()
+
+
 def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) -> None:
     (wheel,) = built.glob("*.whl")
     assert wheel.name == f"{DISTRIBUTION.replace('-', '_')}-{__version__}-py3-none-any.whl"
@@ -82,11 +93,26 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) 
     expected = {f"toolkit/{name}" for name in files_below(ROOT / "toolkit")}
     for home in ("calibrations", "report_templates"):
         expected |= {f"toolkit/_home/{home}/{name}" for name in files_below(ROOT / home)}
+    expected |= {f"toolkit/_site/{name}" for name in files_below(ROOT / "build" / "docs")}
     assert inside == expected
     assert f"Name: {DISTRIBUTION}\n" in metadata
     assert {f"Provides-Extra: {extra}" for extra in ("tdms", "mdf", "parquet", "cluster")} <= set(
         metadata.splitlines()
     )
+
+
+def test_the_site_asks_no_other_host(built: Path) -> None:
+    (wheel,) = built.glob("*.whl")
+    asked = re.compile(
+        r"""(?:<(?:script|link|img|iframe)[^>]*(?:src|href)=["']|url\(["']?|@import ["'])https?:"""
+    )
+    with zipfile.ZipFile(wheel) as archive:
+        pages = [name for name in archive.namelist() if name.startswith("toolkit/_site/")]
+        texts = {name: archive.read(name).decode() for name in pages if name.endswith((".html", ".css"))}
+        size = sum(archive.getinfo(name).compress_size for name in pages)
+    assert len(texts) > 50
+    assert not [name for name, text in texts.items() if asked.search(text)]
+    assert size < 2_000_000
 
 
 def test_the_source_distribution_holds_what_builds_and_tests_it(built: Path) -> None:
@@ -118,6 +144,9 @@ def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path) -
     assert Path(place.stdout.strip()).is_relative_to(environment)
     assert run("--version").strip() == f"toolkit {__version__}"
     assert "--no-browser" in run("open", "--help")
+    page = Path(run("docs", "--no-browser").strip())
+    assert page.is_relative_to(environment)
+    assert "Tutorials" in page.read_text()
     examples = Path(place.stdout.strip()).parent / "examples" / "virtual"
     run("init", "lab")
     run("simulate", examples / "session_plan.toml", "--out", "session", "--home", "lab")

@@ -30,6 +30,7 @@ LINES = {
     "demo": "--out out",
     "init": "out",
     "doctor": "",
+    "docs": "--no-browser",
     "inspect": "test --machine m15.toml",
     "calibrate": "session/SESSION.toml --machine m15.toml",
     "process": "test --out out.xlsx --protocol protocol.toml",

@@ -1,7 +1,8 @@
 """The pages of ``docs/`` that are printed from the code: ``python -m tests.house.pages`` writes them.
 
 A page is prose, written by hand, above a line that says so, and below it what the declarations say: one page
-for each file format, one each for the effects, the characteristics and the rules. A page that does not exist
+for each file format, one each for the effects, the characteristics, the rules, the commands, the library and
+licences. A page that does not exist
 yet is begun with its title; its prose is then to be written. The page of tags is the report's own
 (`toolkit.report.kinds`) and is written with them.
 """
@@ -15,6 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
+from tests.house import manual
 from tests.house.source import ROOT, read_package
 from toolkit.characteristics.catalogue import characteristics
 from toolkit.cli.groups import declared_answers
@@ -78,6 +80,9 @@ def generated(root: Path = ROOT) -> dict[str, tuple[str, str]]:
         "characteristics.md": ("Characteristics of a test", _characteristics_text()),
         "rules.md": ("Rules of findings and errors", _rules_text()),
         "answers.md": ("Answers of the commands", _answers_text()),
+        "commands.md": ("The commands", manual.commands_text()),
+        "api.md": ("Public names of the library", manual.library_text()),
+        "licences.md": ("Licences of what others wrote", manual.licences_text()),
     }
     for cls in formats(root):
         title = _title(cls)

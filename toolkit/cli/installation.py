@@ -1,4 +1,4 @@
-"""`toolkit init, doctor, qualify, explain`: the home, what the machine lacks, what the software reaches."""
+"""`toolkit init, doctor, docs, qualify, explain`: the home, the computer, the manual, the digits."""
 
 from __future__ import annotations
 
@@ -59,6 +59,28 @@ def doctor(json: Json = False, quiet: Quiet = False) -> int:
     }
     answer(payload, text, as_json=json, quiet=quiet)
     return 1 if mend else 0
+
+
+@answers("toolkit.lab.installation_answer_types:DocsAnswer")
+def docs(
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Print the place of its first page and open nothing.")
+    ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Open the documentation, which needs no network: tutorials, how-tos, reference, explanations.
+
+    Example: toolkit docs --no-browser
+    """
+    import webbrowser
+
+    from toolkit.lab.home import documentation
+
+    page = documentation()
+    opened = not no_browser and webbrowser.open(page.as_uri())
+    answer({"page": page, "opened": opened}, str(page), as_json=json, quiet=quiet)
+    return 0
 
 
 @answers("toolkit.lab.installation_answer_types:QualifyAnswer")

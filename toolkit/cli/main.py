@@ -77,6 +77,7 @@ def _register() -> None:
     app.command(demo.NAME)(demo.command)
     app.command("init")(installation.init)
     app.command("doctor")(installation.doctor)
+    app.command("docs")(installation.docs)
     for module in (inspect, calibrate):
         app.command(module.NAME)(module.command)
     app.add_typer(calibration.app, name="calibration")

@@ -27,6 +27,28 @@ def packaged_home() -> Path:
     return inside if inside.is_dir() else _PACKAGE.parent
 
 
+def documentation() -> Path:
+    """Return the first page of the documentation: a wheel's own, in a checkout the one of ``make docs``.
+
+    Raises
+    ------
+    ConfigError
+        a checkout in which nobody made it
+    """
+    folders = (_PACKAGE / "_site", _PACKAGE.parent / "build" / "docs")
+    pages = [folder / "docs" / "README.html" for folder in folders]
+    if page := next((page for page in pages if page.is_file()), None):
+        return page
+    raise ConfigError(
+        "the documentation was not built",
+        where=pages[-1],
+        got="no file",
+        expected="the site, which a wheel carries and a checkout makes",
+        next_step="run 'make docs' in the checkout",
+        rule="no-docs",
+    )
+
+
 def find_home(home: Path | None = None) -> Path:
     """Return the laboratory's home: ``--home``, ``TOOLKIT_HOME``, or the nearest folder upward.
 

@@ -34,6 +34,13 @@ class DoctorAnswer(TypedDict):
     mend: Annotated[str | None, "command that mends it; null where nothing is missing"]
 
 
+class DocsAnswer(TypedDict):
+    """Where the documentation is."""
+
+    page: Annotated[Path, "its first page"]
+    opened: Annotated[bool, "in a browser"]
+
+
 class OpenAnswer(TypedDict):
     """Where the workbench is served."""
 

@@ -138,7 +138,13 @@ def test_toml(test: VirtualTest) -> str:
     """Return test.toml: what an operator would have written down, and the tare."""
     plan = test.plan
     first = plan.recordings[0].rotation
-    label = {"size": "205/55R16", "company": "simulated", "DOT": "SIMULATED", **dict(plan.label)}
+    label = {
+        "size": "205/55R16",
+        "company": "simulated",
+        "DOT": "SIMULATED",
+        "series": "simulated",
+        **dict(plan.label),
+    }
     speed = float(from_si(plan.machine.drum.speed_m_s, "km/h"))
     lines = [
         "schema = 1",

@@ -51,6 +51,20 @@ def test_what_is_no_record_is_unreadable(data: bytes) -> None:
     assert caught.value.rule == "unreadable"
 
 
+def test_a_record_of_a_newer_schema_asks_for_a_newer_version(registry: Registry) -> None:
+    document = json.loads((registry.folder / "hub" / "hub-r1.json").read_bytes())
+    newer = document | {
+        "schema": 2,
+        "content": {"of": "a form that nobody knows yet"},
+        "software": {"toolkit": "9.1.0"},
+    }
+    with pytest.raises(RecordError) as caught:
+        from_bytes(json.dumps(newer).encode(), where="m15-r3.json")
+    assert caught.value.rule == "newer-schema"
+    assert caught.value.got == "schema 2, written by toolkit 9.1.0"
+    assert caught.value.expected == "schema 1"
+
+
 def test_one_byte_changed_anywhere_is_found_and_named(registry: Registry) -> None:
     folder = registry.folder / "hub"
     assert all(row.ok for row in verify_registry(registry))

@@ -274,17 +274,33 @@ def sealed(record: CalibrationRecord) -> CalibrationRecord:
     return dataclasses.replace(record, sha256=content_hash(content_of(record)))
 
 
+def _check_schema(document: dict[str, Any], where: object) -> None:
+    """Refuse a record of a later release by its schema, before anything else of it is read."""
+    schema = document["schema"]
+    if isinstance(schema, int) and schema > SCHEMA:
+        raise RecordError(
+            "a calibration record is of a later version of the toolkit",
+            where=where,
+            got=f"schema {schema}, written by toolkit {document['software']['toolkit']}",
+            expected=f"schema {SCHEMA}",
+            next_step="update the toolkit; the record is not damaged, and is never converted back",
+            rule="newer-schema",
+        )
+
+
 def from_bytes(data: bytes, *, where: object) -> CalibrationRecord:
     """Read a record's file and check its hash.
 
     Raises
     ------
     RecordError
-        ``unreadable``: not a record; ``hash``: its content is not what the hash was taken of
+        ``unreadable``: not a record; ``hash``: its content is not what the hash was taken of;
+        ``newer-schema``: a later version of the toolkit wrote it
     """
     try:
         text = data.decode("utf-8")
         document = json.loads(text)
+        _check_schema(document, where)
         content = document["content"]
         stated = {SCHEMA: document["sha256"]}[document["schema"]]
         actual = _hash_as_written(text)

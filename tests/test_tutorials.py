@@ -1,0 +1,102 @@
+"""The tutorials are walked as a new user walks them: from an empty folder, one after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import io
+import json
+import os
+import re
+import runpy
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.house.source import ROOT
+from tests.recipes import blocks_of, commands_of, file_named
+from toolkit.cli.main import run
+
+TUTORIALS = ROOT / "docs" / "tutorials"
+INDEX = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
+PAGES = [TUTORIALS / name for name in re.findall(r"\]\(tutorials/(\w+\.md)\)", INDEX)]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+SAME = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+@contextlib.contextmanager
+def terminal() -> Iterator[io.StringIO]:
+    """What a terminal shows: output and errors in one stream."""
+    screen = io.StringIO()
+    with contextlib.redirect_stdout(screen), contextlib.redirect_stderr(screen):
+        yield screen
+
+
+def typed(command: str) -> tuple[str, int]:
+    """Return what a command prints, and its exit code; ``cd`` stays in effect for the next one."""
+    program, *words = shlex.split(command)
+    with terminal() as screen:
+        if program == "cd":
+            os.chdir(words[0])
+        elif program == "python":
+            runpy.run_path(words[0], run_name="__main__")
+        else:
+            assert program == "toolkit", command
+            with pytest.raises(SystemExit) as ended:
+                run(words)
+            return screen.getvalue(), int(ended.value.code or 0)
+    return screen.getvalue(), 0
+
+
+def test_every_tutorial_stands_in_the_index() -> None:
+    assert sorted(PAGES) == sorted(TUTORIALS.glob("*.md"))
+    assert len(PAGES) == 7
+
+
+def test_tutorials_do_what_they_promise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.delenv("TOOLKIT_HOME", raising=False)
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        # A page begins in an empty folder, or where the page is that it continues.
+        continued = re.search(r"continues in `lab/` of\s+\[[^]]+\]\((\w+)\.md\)", text)
+        folder = tmp_path / (continued[1] if continued else page.stem)
+        folder.mkdir(exist_ok=continued is not None)
+        monkeypatch.chdir(folder)
+        for block in blocks_of(text):
+            if (name := file_named(block)) is not None:
+                assert not Path(name).exists(), f"{page.name}: {name} is no new file"
+                Path(name).write_text(block.text, encoding="utf-8")
+            elif block.language == "console":
+                for command, expected in commands_of(block):
+                    printed, code = typed(command)
+                    assert code in {0, 1}, f"{page.name}: $ {command}\n{printed}"
+                    assert same(expected, printed), f"{page.name}: $ {command}\n{printed}"
+
+
+def same(expected: str, printed: str) -> bool:
+    """Tell whether a command printed what its page shows; a narrow space between thousands is a space."""
+    return doctest.OutputChecker().check_output(
+        expected, printed.replace("\N{NARROW NO-BREAK SPACE}", " "), SAME
+    )
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_from_its_first_cell_to_its_last(
+    notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    names: dict[str, object] = {}
+    for number, cell in enumerate(cells):
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            exec(compile("".join(cell["source"]), f"{notebook.name}[{number}]", "exec"), names)  # noqa: S102
+
+
+def test_there_are_three_notebooks() -> None:
+    page = (TUTORIALS / "notebook.md").read_text(encoding="utf-8")
+    assert {path.name for path in NOTEBOOKS} == set(re.findall(r"notebooks/(\w+\.ipynb)>", page))
+    assert len(NOTEBOOKS) == 3
