@@ -14,6 +14,7 @@ from toolkit.effects.effect import STAGES, Effect, EffectParameter, Stage
 
 if TYPE_CHECKING:
     from toolkit.channels import Axes
+    from toolkit.effects.surroundings import Surroundings
 
 Condition = tuple[str, tuple[str, ...]]
 """A condition's key, and its values in the runs in which an effect acts."""
@@ -89,6 +90,21 @@ class AppliedEffect:
     def searched(self) -> tuple[EffectParameter, ...]:
         """Parameters that a fit moves: none of an effect that is there or not."""
         return () if self.effect.discrete else self.effect.parameters
+
+    def log_prior(self, case: Surroundings) -> float:
+        """Return how likely its size is before the recording speaks; 0 of an effect that is there or not.
+
+        Of several sizes the largest against its usual range counts: the others may be absent.
+        """
+        densities = []
+        for parameter in self.searched:
+            if parameter.off is None:
+                continue
+            scale = 1.0 if parameter.scale is None else parameter.scale(case)
+            ratio = self.values[parameter.name] / scale
+            usual = max(map(abs, parameter.typical))
+            densities.append((abs(ratio) / usual, parameter.log_density(ratio)))
+        return max(densities, default=(0.0, 0.0))[1]
 
     @property
     def numerics(self) -> dict[str, float]:
