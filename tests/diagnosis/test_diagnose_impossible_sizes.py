@@ -74,6 +74,43 @@ def test_a_mug_that_takes_up_heat_does_not_creep(tmp_path):
     assert not answer.effects
 
 
+ABSORPTION = """
+import numpy as np
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"y": p["source"] * np.exp(-p["absorption"] * inputs["x"])})
+"""
+BLOCKS = """schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.source]
+value = 100.0
+unit = "1"
+sd = 50.0
+[simulation.parameters.absorption]
+value = 0.5
+unit = "1"
+sd = 0.3
+[recording.channels]
+x = { unit = "1", role = "input" }
+y = { unit = "1", role = "output" }
+[[recording.run]]
+file = "r0.csv"
+"""
+
+
+def test_a_beam_that_spreads_is_no_channel_that_bends_by_three_times_its_range(tmp_path):
+    """Ultrasound through blocks, exp(-a x)/(b + c x), where exp(-a x) alone is simulated."""
+    x = np.tile(np.linspace(0.5, 6.0, 22), 10)
+    response = np.exp(-0.19 * x) / (0.0061 + 0.0105 * x)
+    shown = response + np.random.default_rng(1).normal(0, 3.3, x.size)
+    case = write_case(tmp_path, BLOCKS, simulator=ABSORPTION, r0__csv=pd.DataFrame({"x": x, "y": shown}))
+    answer = diagnose(read_case(case), None).diagnosis
+    assert answer.verdict == "unknown"
+    assert not answer.effects
+
+
 def test_a_wrong_sign_is_found_although_a_bound_forbids_it(tmp_path):
     """Refitted with c >= 0 the simulation stands still, and from there a sign changes nothing."""
     frames = {}

@@ -6,6 +6,7 @@ carry them; all of them mean the same by one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -14,6 +15,7 @@ from toolkit.effects.effect import STAGES, Effect, EffectParameter, Stage
 
 if TYPE_CHECKING:
     from toolkit.channels import Axes
+    from toolkit.effects.surroundings import Surroundings
 
 Condition = tuple[str, tuple[str, ...]]
 """A condition's key, and its values in the runs in which an effect acts."""
@@ -89,6 +91,36 @@ class AppliedEffect:
     def searched(self) -> tuple[EffectParameter, ...]:
         """Parameters that a fit moves: none of an effect that is there or not."""
         return () if self.effect.discrete else self.effect.parameters
+
+    def log_prior(self, case: Surroundings) -> float:
+        """Return how likely its size is before the recording speaks; 0 of an effect that is there or not."""
+        return max(self._sizes(case), default=(0.0, 0.0))[1]
+
+    def is_unusual(self, case: Surroundings, *, log_density: float) -> bool:
+        """Tell whether it is larger than usual, and its density so far below that of its usual size."""
+        largest = max(self._sizes(case), default=(0.0, 0.0, 0.0))
+        return largest[0] > 1 and largest[1] < largest[2] - log_density
+
+    def _sizes(self, case: Surroundings) -> list[tuple[float, float, float]]:
+        """Return its sizes over the end of their usual range, their densities, and those of usual sizes.
+
+        Of several the largest counts: the others may be absent.
+        """
+        sizes = []
+        for parameter in self.searched:
+            if parameter.off is None:
+                continue
+            low, high = parameter.typical
+            ratio = self.values[parameter.name] / (1.0 if parameter.scale is None else parameter.scale(case))
+            usual = math.sqrt(low * high) if low * high > 0 else high
+            sizes.append(
+                (
+                    abs(ratio) / max(abs(low), abs(high)),
+                    parameter.log_density(ratio),
+                    parameter.log_density(usual),
+                )
+            )
+        return sizes
 
     @property
     def numerics(self) -> dict[str, float]:

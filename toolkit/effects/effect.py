@@ -13,6 +13,7 @@ or a small function of its `Surroundings`: none of them knows an effect by its n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
@@ -42,8 +43,9 @@ class EffectParameter:
     ``unit`` may name the affected channel: ``{channel}`` and ``{from}`` are put in by the user of the
     effect, ``{force}``, ``{velocity}`` and ``{position}`` for a dynamic term. ``off`` is the value at which
     the effect is not there (None: it has no such value, another parameter switches it off); ``typical`` the
-    range in ``unit``, in which a search starts; with a ``scale`` it is in units of what that returns.
-    ``absent`` is what a file means that does not have the parameter, None where every file must have it.
+    range in ``unit`` in which a search starts, taken to hold 95 % of the sizes met; with a ``scale`` it is in
+    units of what that returns. ``absent`` is what a file means that does not have the parameter, None where
+    every file must have it.
     ``ends_count`` says that the bounds are values like any other; elsewhere an estimate at a bound shows
     that the effect only imitates another. ``phase_of`` names the amplitude whose phase this is [deg]: the
     effect is then f(phase) = cos(phase) f(0) + sin(phase) f(90 deg).
@@ -76,6 +78,33 @@ class EffectParameter:
     def relative(self) -> bool:
         """Typical values and starts are in units of the scale."""
         return self.scale is not None
+
+    def log_density(self, ratio: float) -> float:
+        """Return the logarithm of the density with which sizes are met, over the logarithm of the size.
+
+        Parameters
+        ----------
+        ratio : the value in units of the scale, as ``typical`` has it
+
+        Of a range on one side of ``off`` the logarithm of the size is normal, and of one around it the
+        departure from ``off``; the range is two standard deviations to either side. Over a logarithm, sizes
+        of any unit can be held against each other.
+
+        >>> gap = EffectParameter(name="gap", unit="deg", text="play", typical=(0.05, 0.5))
+        >>> round(gap.log_density(0.5) - gap.log_density(0.05 * 10**0.5), 9)
+        -2.0
+        """
+        low, high = self.typical
+        around = self.off is not None and low < self.off < high
+        size = abs(ratio - (self.off or 0.0)) if around else abs(ratio)
+        if size == 0 or not math.isfinite(size):
+            return -math.inf
+        if around:
+            sds = 4 * size / (high - low)
+            return math.log(2 * sds) - 0.5 * (sds**2 + math.log(2 * math.pi))
+        sd = abs(math.log(high / low)) / 4
+        sds = math.log(size / math.sqrt(low * high)) / sd
+        return -0.5 * (sds**2 + math.log(2 * math.pi)) - math.log(sd)
 
     def sign_in(self, axes: Axes) -> int:
         """Return the factor, +1 or -1, between the parameter in some axes and in those of its equation.

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
-from tests.diagnosis.cases import write_case
+from tests.diagnosis.cases import HEAD, TWO, write_case
+from tests.diagnosis.tire_case import python_tire
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.fit import fit
@@ -50,7 +52,33 @@ def coasts(folder, *, force):
     return read_case(write_case(folder, text, simulator=COASTING, **frames))
 
 
-def test_of_equals_the_physics_is_named_before_the_instrument(tmp_path):
+def carriage(folder, *, zero):
+    """Return runs of a carriage of 94 kg whose force, up to 300 N, shows so much too much [N]."""
+    frames = {}
+    for k in range(2):
+        rng, t = np.random.default_rng([1, k]), np.arange(300) * 0.02
+        v, a = 0.5 * np.sin(2 * t + k) + 0.2 * np.sin(5 * t), np.cos(2 * t + k) + np.cos(5 * t)
+        force = 94 * a + 210 * v + zero + rng.normal(0, 1, 300)
+        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "v": v, "a": a, "F": force})
+    return read_case(write_case(folder, HEAD + TWO, **frames))
+
+
+@pytest.mark.parametrize(
+    ("zero", "names"),
+    [(3.0, ("zero_offset", "constant_force")), (60.0, ("constant_force", "zero_offset"))],
+)
+def test_a_hundredth_of_the_range_is_a_sensors_zero_and_a_fifth_of_it_a_force(tmp_path, zero, names):
+    (effect,) = diagnose(carriage(tmp_path, zero=zero), None).diagnosis.effects
+    assert (effect.name, *effect.equivalent_to) == names
+
+
+def test_a_degree_is_a_zero_of_the_steering_and_no_plies_pull_as_far(tmp_path):
+    case = read_case(python_tire(tmp_path, offset=1.0))
+    (effect,) = diagnose(case, None).diagnosis.effects
+    assert (effect.name, effect.equivalent_to) == ("steer_offset", ("plysteer",))
+
+
+def test_a_drift_that_takes_half_of_the_range_is_a_force(tmp_path):
     (effect,) = diagnose(coasts(tmp_path, force=0.12), None).diagnosis.effects
     assert (effect.name, effect.equivalent_to) == ("constant_force", ("zero_drift",))
 

@@ -18,7 +18,12 @@ from toolkit.diagnosis.answer.answer import (
     recorded,
 )
 from toolkit.diagnosis.answer.locate import places
-from toolkit.diagnosis.answer.next_measurements import equivalent_to, implausible, next_measurements
+from toolkit.diagnosis.answer.next_measurements import (
+    equivalent_to,
+    implausible,
+    next_measurements,
+    outsized,
+)
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.answer.refit_findings import refit_findings
 from toolkit.diagnosis.case.case import Case
@@ -83,7 +88,7 @@ def mostly_unknown(search: Search) -> bool:
 
     By the log-likelihood, by what they take of the held-out mean square that is above the noise, and by the
     parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
-    what was left out.
+    what was left out. Nor is a cell's law beside an unexplained rest, with a size that no cell has.
     """
     if search.steps and implausible(search):
         return True
@@ -92,6 +97,8 @@ def mostly_unknown(search: Search) -> bool:
         return True
     if not search.structure:
         return False
+    if outsized(search):
+        return True
     if any(removed > VERDICT.nearly * above for removed, above in shown):
         return False
     unexplained = max(

@@ -74,6 +74,22 @@ def implausible(search: Search) -> tuple[str, ...]:
     )
 
 
+def outsized(search: Search) -> bool:
+    """Tell whether a law of a cell stands with a size that no cell has: something else bends the answer.
+
+    Asked of what acts by the value that a cell carries. A zero may be any, where nobody tared.
+    """
+    return any(
+        active.effect.stage == "load_cells"
+        and active.effect.on_channel is not None
+        and active.effect.on_channel.by_value
+        and active.is_unusual(
+            CaseView(search.problem, active.channel, active.source), log_density=PRIORS.within**2 / 2
+        )
+        for active in (step.active for step in search.steps)
+    )
+
+
 def next_measurements(search: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:
     """Return a sentence for each measurement that would say more than this case does."""
     sentences = [text for effect in effects if (text := parted(effect))]

@@ -12,13 +12,10 @@ from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
+from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.effects.applied import AppliedEffect, EffectKey
-from toolkit.effects.effect import STAGES, Stage
 from toolkit.errors import FitError
-
-# What a simulation leaves out, then what surrounds it, then what only shows it.
-_LIKELIEST: tuple[Stage, ...] = ("dynamics", "tire", "road", "carriage", "load_cells", "acquisition")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,8 +75,9 @@ def step_groups(
 def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tuple[Joint, ...]:
     """Return candidates fitted jointly with what is there, the best first; of equals the likeliest.
 
-    The data do not prefer one of two that are nearly as good: then what the simulation leaves out of the
-    physics is likelier than an instrument that imitates it.
+    The data do not prefer one of two that are nearly as good: then the likelier is the one that has a size as
+    it is usually met, by likelihood times prior. A sensor's zero is a small share of its range, a drift that
+    takes half of it is none.
     """
     weight = _weight(problem)
     joints = []
@@ -90,9 +88,11 @@ def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tupl
             joints.append(Joint(scored=scored, fit=fitted, score=fitted.log_posterior - penalty))
     best = max((joint.score for joint in joints), default=0.0)
 
-    def order(joint: Joint) -> tuple[int, float]:
-        equal = joint.score > best - VERDICT.close
-        return _LIKELIEST.index(joint.scored.active.effect.stage) if equal else len(STAGES), -joint.score
+    def order(joint: Joint) -> tuple[bool, float]:
+        behind = joint.score <= best - VERDICT.close
+        active = joint.fit.active[-1]
+        prior = 0.0 if behind else active.log_prior(CaseView(problem, active.channel, active.source))
+        return behind, -joint.score - prior
 
     return tuple(sorted(joints, key=order))
 
