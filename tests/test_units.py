@@ -76,6 +76,32 @@ def test_spellings_of_the_moment(text: str) -> None:
     assert unit(text).text == "lbf*ft"
 
 
+LBF = 0.45359237 * 9.80665  # the international pound-force [N]
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "factor", "written"),
+    [
+        ("lb/deg", "force", LBF * 180 / math.pi, "lbf/deg"),
+        ("lb-ft/deg", "moment", LBF * 0.3048 * 180 / math.pi, "lbf*ft/deg"),
+        ("in-lb", "moment", LBF * 0.0254, "in*lbf"),
+        ("lbf-in", "moment", LBF * 0.0254, "lbf*in"),
+        ("kgf-m", "moment", 9.80665, "kgf*m"),
+        ("kp", "force", 9.80665, "kgf"),
+        ("gf", "force", 9.80665e-3, "gf"),
+        ("Nm/deg", "moment", 180 / math.pi, "N*m/deg"),
+        ("Ncm", "moment", 0.01, "N*cm"),
+        ("Nmm", "moment", 1e-3, "N*mm"),
+    ],
+)
+def test_a_word_means_in_a_compound_what_it_means_alone(
+    text: str, dimension: str, factor: float, written: str
+) -> None:
+    read = unit(text)
+    assert (read.dimension, read.text) == (dimension, written)
+    assert read.factor == pytest.approx(factor, rel=1e-12)
+
+
 def test_bridge_output_is_no_plain_number_and_no_count() -> None:
     assert {unit(t).dimension for t in ("mV/V", "count", "1")} == {"bridge_ratio", "count", "ratio"}
     with pytest.raises(UnitError, match="not one of ratio"):
@@ -92,7 +118,18 @@ def test_units_that_only_pint_knows() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["furlongs per lunch", "N;drop", "??", "import os", "__class__", "N**", "9**9**9**9", "(9)**9", "m" * 60],
+    [
+        "furlongs per lunch",
+        "N;drop",
+        "??",
+        "import os",
+        "__class__",
+        "N**",
+        "9**9**9**9",
+        "(9)**9",
+        "m" * 60,
+        "deg-C",
+    ],
 )
 def test_unknown_unit_is_an_error_that_says_where(text: str) -> None:
     with pytest.raises(UnitError) as caught:

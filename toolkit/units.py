@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -76,6 +77,18 @@ _SPELLINGS = {
     "%": "0.01*dimensionless",
     "rev": "turn",
 }
+
+# What a word means inside a compound as well: pint's pound is a mass, its Nm no moment.
+_WORDS = {
+    **dict.fromkeys(("lb", "lbs", "lbf"), "force_pound"), "klbf": "(1000*force_pound)",
+    "kip": "(1000*force_pound)", "kp": "kilogram_force", "kips": "(1000*force_pound)",
+    "Nm": "(newton*meter)", "Ncm": "(newton*centimeter)", "Nmm": "(newton*millimeter)",
+    "kNm": "(kilonewton*meter)", "kph": "(kilometer/hour)", "kmh": "(kilometer/hour)",
+    "mph": "(mile/hour)", "rev": "turn", "counts": "digitiser_count", "count": "digitiser_count",
+}  # fmt: skip
+_WRITTEN = {"lb": "lbf", "lbs": "lbf", "kp": "kgf", "Nm": "N*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m"}
+_WORD = re.compile(r"[^\W\d_]+")
+_HYPHEN = re.compile(r"(?<=[^\W\d_])\s*-\s*(?![CF]\b)(?=[^\W\d_])")  # lbf-in, N-m/deg: a product
 
 # How the toolkit writes a unit, whatever the spelling that was read.
 _CANONICAL = {
@@ -212,7 +225,7 @@ def _parse(text: str) -> Unit:
     if _NEVER_GUESSED.search(text):
         raise _UnknownUnitError(text)
     ureg = registry()
-    expression = _SPELLINGS.get(text, text)
+    expression = _SPELLINGS.get(text) or _in_words(_HYPHEN.sub("*", text), _WORDS)
     if not _SCALE.fullmatch(expression.strip("() ")):
         # With a space between them pint would multiply an angle by a charge.
         if _SPACED_SCALE.search(expression):
@@ -257,7 +270,11 @@ def _canonical(text: str) -> str:
         return "lbf*ft"
     if spelled == "newton*meter":
         return "N*m"
-    return text
+    return text if spelled is not None else _in_words(_HYPHEN.sub("*", text), _WRITTEN)
+
+
+def _in_words(text: str, meanings: Mapping[str, str]) -> str:
+    return _WORD.sub(lambda match: meanings.get(match[0], match[0]), text)
 
 
 def to_si(values: ArrayLike, text: str, *, where: object = None) -> NDArray[np.float64]:

@@ -110,6 +110,11 @@ def test_what_no_header_tells_is_said_and_left_out(folder: Path, capsys: pytest.
     _, told = answered(capsys, "session", "new", "t.toml", "--from", "lbf.csv")
     assert set(told["guessed"]) == {"data"}
     assert {"indications", "loads"} <= set(told["open"])
+    assert told["lacking"] == {}
+    (folder / "bare.csv").write_text("A [mV/V],FY [N]\n0,0\n")
+    _, told = answered(capsys, "session", "new", "u.toml", "--from", "bare.csv")
+    assert told["open"] == ["instrument", "date", "operator"]
+    assert told["lacking"] == {"data": "bare.csv needs the column run and the column direction"}
 
 
 @pytest.mark.parametrize("word", ["session", "machine"])

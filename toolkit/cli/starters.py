@@ -119,7 +119,7 @@ def _begin(
         starter = start(word, entries | _asked(starter.open, starter.helps), recording, file=file)
     write_result(file, starter.text)
     payload = {"path": file, "guessed": starter.guess.values, "not_guessed": list(starter.guess.silent)}
-    payload |= {"open": list(starter.open)}
+    payload |= {"open": list(starter.open), "lacking": starter.guess.lacking}
     answer(payload, starter_text(word, file, starter), as_json=json, quiet=quiet)
     return 0
 

@@ -56,6 +56,7 @@ class StarterAnswer(TypedDict):
     guessed: Annotated[Mapping[str, Any], "entries that a recording told"]
     not_guessed: Annotated[list[str], "columns that it did not"]
     open: Annotated[list[str], "required entries that a person fills in"]
+    lacking: Annotated[Mapping[str, str], "by entry, what the file that it names must still be given"]
 
 
 class QualifyAnswer(TypedDict):

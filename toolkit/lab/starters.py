@@ -39,11 +39,15 @@ _BOOKKEEPING = ("run", "direction", "rotation", "comment")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Guess:
-    """What headers say: ``values`` as a file holds them, ``notes`` by entry, texts on what is ``silent``."""
+    """What headers say: ``values`` as a file holds them, ``notes`` by entry, texts on what is ``silent``.
+
+    ``lacking`` says by entry what the file itself must still be given.
+    """
 
     values: dict[str, Any] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     silent: tuple[str, ...] = ()
+    lacking: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +134,8 @@ def starter_text(word: str, file: Path, starter: Starter) -> str:
     lines += [f"  guessed      {key} = {value_text(value)}" for key, value in guess.values.items()]
     lines += [f"  not guessed  {text}" for text in guess.silent]
     lines += [f"  to fill in   {name}: {text}" for name, text in starter.helps.items()]
-    return "\n".join(lines if starter.open else [*lines, "  nothing must be filled in"])
+    lines += [f"  to add       {text}" for text in guess.lacking.values()]
+    return "\n".join(lines if starter.open or guess.lacking else [*lines, "  nothing must be filled in"])
 
 
 def refuse_existing(path: Path) -> None:
@@ -213,7 +218,8 @@ def _session(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
     indications = [plain for plain, dimension in stated if dimension not in (None, "force", "moment", "time")]
     silent = [f"{plain}: no unit that is known; write 'NAME [unit]'" for plain, kind in stated if not kind]
     headers = {plain.lower() for _, plain, _ in columns}
-    silent += [f"the file has no column {key}" for key in ("run", "direction") if key not in headers]
+    absent = [key for key in ("run", "direction") if key not in headers]
+    lacking = {"data": f"{name} needs the column {' and the column '.join(absent)}"} if absent else {}
     if loads and not indications:  # cells that are read in units of force: which is which, no unit tells
         silent.append("every column is a force or a moment: which are indications, the file does not tell")
         loads = []
@@ -221,7 +227,8 @@ def _session(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
     values |= {key: names for key, names in (("indications", indications), ("loads", loads)) if names}
     basis = f"guessed from {name}: columns with a unit of "
     notes = {"loads": f"{basis}force or moment", "indications": f"{basis}another kind"}
-    return Guess(values=values, notes={k: n for k, n in notes.items() if k in values}, silent=tuple(silent))
+    notes = {key: note for key, note in notes.items() if key in values}
+    return Guess(values=values, notes=notes, silent=tuple(silent), lacking=lacking)
 
 
 def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess:

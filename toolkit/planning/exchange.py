@@ -2,8 +2,7 @@
 
 The modified exchange of Cook and Nachtsheim (Technometrics 22 (1980) 315) over a finite list of candidates:
 points are dropped or added until the size is right, then each in turn is replaced by the candidate that does
-best. The criterion is any function of a design. That is why no library does it here: those for Python
-(pyDOE, PyOptEx) hold D, A or I criteria of polynomials, not the budget of a curve's reading.
+best. The criterion is any function of a design, here the budget of a curve's reading.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ zero is known beforehand to that precision (0 a priori, as a run's zero or a pos
 are the first ``wanted`` of b. Their covariance is a block of the inverse of the information: linear Bayes, as
 DuMouchel and Jones (Technometrics 36 (1994) 37) have it for terms that may be missing, and generalised least
 squares for random run effects (Goos and Vandebroek, Technometrics 43 (2001) 436). Rows are exchanged by
-themselves (Fedorov 1972) until no exchange is better, from several starts. Libraries of designs take factors
-that can be set freely and D alone over runs; here the rows are a list of loads that fixtures can make.
+themselves (Fedorov 1972) until no exchange is better, from several starts; they are a list of loads that
+fixtures can make, not factors that can be set freely.
 """
 
 from __future__ import annotations

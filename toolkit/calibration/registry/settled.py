@@ -11,6 +11,7 @@ import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 from toolkit.calibration.registry.ledger import BRINGING, HEAD, LEDGER, Ledger, head_bytes, parse_ledger
@@ -20,6 +21,7 @@ from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
 
 JOURNAL = ".pending.json"
+_REMEMBERED = 16 << 20  # bytes of a ledger whose entries are kept for the next question
 _PATIENCE_S = 1.0
 _PAUSE_S = 0.02
 
@@ -109,8 +111,16 @@ def state_of(folder: Path) -> State:
         missing = None if head is None else "ledger.jsonl is missing while head.json exists"
         ledger = Ledger(entries=(), damage=missing, hidden=hidden)
     else:
-        ledger = replace(parse_ledger(lines, head), hidden=hidden)
+        parse = _parsed if len(lines) <= _REMEMBERED else parse_ledger
+        ledger = parse(lines, head)
+        ledger = replace(ledger, hidden=hidden) if hidden else ledger
     return State(ledger=ledger, lines=lines, head=head, steady=steady)
+
+
+@lru_cache(maxsize=16)
+def _parsed(lines: bytes, head: bytes | None) -> Ledger:
+    """Return the ledger of these very bytes: one command, or one page, asks for it many times."""
+    return parse_ledger(lines, head)
 
 
 def before(
