@@ -55,6 +55,16 @@ def test_optional_columns_and_semicolons(tmp_path):
     assert table.get("MZ") is None
 
 
+def test_columns_are_known_by_their_names_as_those_of_recordings_are(tmp_path):
+    header = "Time [ms],Fz load [kN],Slip angle [deg],Lateral force (kN),inflation pressure in bar"
+    table = read_table(write(tmp_path, ["20,-4,2,-1.5,2.4"], header))
+    assert table["t"].tolist() == [0.02]
+    assert table["FZ"].tolist() == [4000.0]
+    assert table["SA"] == pytest.approx(np.radians([2.0]))
+    assert table["FY"].tolist() == [-1500.0]
+    assert table["P"] == pytest.approx([2.4e5])
+
+
 @pytest.mark.parametrize(
     ("header", "lines", "error", "rule"),
     [
