@@ -93,6 +93,16 @@ def test_bad_tables_are_refused_with_place_and_next_step(tmp_path, header, lines
     assert caught.value.next_step
 
 
+def test_decimal_commas_are_told_to_be_saved_as_points(tmp_path):
+    with pytest.raises(CellError) as caught:
+        read_table(write(tmp_path, ["-1,5;2,0;3,0"], "SA [deg];FZ [N];FY [N]"))
+    assert caught.value.got == "'-1,5'"
+    assert caught.value.next_step == "save the table again with points for decimal commas"
+    with pytest.raises(CellError) as caught:
+        read_table(write(tmp_path, ["1e999,2,3"], "SA [deg],FZ [N],FY [N]"))
+    assert caught.value.next_step == "remove or mend that row"
+
+
 def test_missing_and_binary_files_and_unknown_axes(tmp_path):
     with pytest.raises(UnreadableError):
         read_table(tmp_path / "none.csv")

@@ -239,7 +239,9 @@ def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[
                 where=f"{path}, row {row}, column {name.strip()!r}",
                 got=repr(text) if text else "an empty cell",
                 expected="a finite number with a decimal point",
-                next_step="remove or mend that row",
+                next_step="save the table again with points for decimal commas"
+                if "," in text and _NUMBER.fullmatch(text.replace(",", ".", 1))
+                else "remove or mend that row",
                 rule="text-cell" if text else "empty-cell",
             )
         numbers.append(number)
