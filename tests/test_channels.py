@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from toolkit.channels import AXES, CHANNELS, ROTATIONS, signs
+from toolkit.channels import AXES, CHANNELS, ROTATIONS, channel_of, signs
 from toolkit.units import unit
 
 
@@ -42,3 +42,32 @@ def test_each_channel_names_an_si_unit_of_its_dimension() -> None:
     for channel in CHANNELS.values():
         assert unit(channel.si).factor == 1.0
         assert unit(channel.si).dimension == channel.dimension
+
+
+@pytest.mark.parametrize(
+    ("text", "symbol"),
+    [
+        ("t", "t"),
+        ("T", "T"),
+        (" T ", "T"),
+        ("Time", "t"),
+        ("TEMPERATURE", "T"),
+        ("sa", "SA"),
+        ("Slip  angle", "SA"),
+        ("Fz load", "FZ"),
+        ("p", "P"),
+    ],
+)
+def test_a_channel_is_known_by_symbol_name_and_alias(text, symbol):
+    assert channel_of(text) is CHANNELS[symbol]
+
+
+@pytest.mark.parametrize("text", ["", "load", "angle", "SA2"])
+def test_what_no_channel_is_called_is_none(text):
+    assert channel_of(text) is None
+
+
+def test_no_two_channels_share_a_name():
+    for channel in CHANNELS.values():
+        for text in (channel.symbol, channel.name, *channel.aliases):
+            assert channel_of(text) is channel

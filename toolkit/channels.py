@@ -79,6 +79,25 @@ _ALL = (
 CHANNELS: dict[str, Channel] = {channel.symbol: channel for channel in _ALL}
 
 
+def channel_of(text: str) -> Channel | None:
+    """Return the channel that is called so, by its symbol, name or an alias; None where none is.
+
+    `t` is time and `T` temperature: the exact symbol goes first, then the spelling in any case.
+
+    >>> [channel_of(text).symbol for text in ("T", "Time", "slip angle")]
+    ['T', 't', 'SA']
+    """
+    name = " ".join(text.split())
+    return CHANNELS.get(name) or _BY_NAME.get(name.casefold())
+
+
+_BY_NAME = {
+    text.casefold(): channel
+    for channel in reversed(_ALL)  # the first of two keeps a name that both have
+    for text in (channel.symbol, channel.name, *channel.aliases)
+}
+
+
 def signs(source: Axes, target: Axes, rotation: Rotation = "forward") -> dict[str, int]:
     """Return the factor (+1 or -1) of each signed channel from one axis system to another.
 

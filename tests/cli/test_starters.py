@@ -138,6 +138,17 @@ def test_the_machine_of_a_recording_reads_it_whatever_form_its_units_have(
     assert channels == {"SA": "deg", "FZ": "N", "FY": "N", "MZ": "N*m", "TT": "degC"}
 
 
+def test_a_temperature_is_no_time(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "run_01.csv").write_text("Time [ms],Fz [kN],SA [deg],gx [mV/V],T [degC]\n0,1,0,0,21\n")
+    code, _ = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
+    assert code == 0
+    columns = load_machine("belt.toml").columns
+    assert [(column.symbol, column.role) for column in columns if column.header in ("Time", "T")] == [
+        ("t", "time"),
+        ("T", "covariate"),
+    ]
+
+
 def test_a_belt_by_a_recording_of_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "run_01.csv").write_text("Fz [kN],SA [deg],gx [mV/V],gy [mV/V],FY [N]\n1,0,0,0,0\n")
     code, told = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))

@@ -296,3 +296,12 @@ def test_plain_numbers_take_no_object_for_each_cell(tmp_path, separator, decimal
 
     more = 20_000
     assert peak(20_000 + more) - peak(20_000) < 16 * more * len(HEADERS)
+
+
+@pytest.mark.parametrize(("titles", "words"), [(1, "1 line stands"), (3, "3 lines stand")])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_lines_above_the_header_are_told_as_such(read, titles, words, separator):
+    with pytest.raises(UnreadableError, match=f"^{words} above the header row") as caught:
+        read("Rig 7\n\n" + "Run of 3 March 2026\n" * (titles - 1) + text(separator=separator))
+    assert caught.value.rule == "not-a-workbook"
+    assert "remove what stands above the header row" in caught.value.next_step

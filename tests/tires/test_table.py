@@ -55,6 +55,16 @@ def test_optional_columns_and_semicolons(tmp_path):
     assert table.get("MZ") is None
 
 
+def test_columns_are_known_by_their_names_as_those_of_recordings_are(tmp_path):
+    header = "Time [ms],Fz load [kN],Slip angle [deg],Lateral force (kN),inflation pressure in bar"
+    table = read_table(write(tmp_path, ["20,-4,2,-1.5,2.4"], header))
+    assert table["t"].tolist() == [0.02]
+    assert table["FZ"].tolist() == [4000.0]
+    assert table["SA"] == pytest.approx(np.radians([2.0]))
+    assert table["FY"].tolist() == [-1500.0]
+    assert table["P"] == pytest.approx([2.4e5])
+
+
 @pytest.mark.parametrize(
     ("header", "lines", "error", "rule"),
     [
@@ -81,6 +91,16 @@ def test_bad_tables_are_refused_with_place_and_next_step(tmp_path, header, lines
     assert caught.value.exit_code == 2
     assert "tire.csv" in caught.value.where
     assert caught.value.next_step
+
+
+def test_decimal_commas_are_told_to_be_saved_as_points(tmp_path):
+    with pytest.raises(CellError) as caught:
+        read_table(write(tmp_path, ["-1,5;2,0;3,0"], "SA [deg];FZ [N];FY [N]"))
+    assert caught.value.got == "'-1,5'"
+    assert caught.value.next_step == "save the table again with points for decimal commas"
+    with pytest.raises(CellError) as caught:
+        read_table(write(tmp_path, ["1e999,2,3"], "SA [deg],FZ [N],FY [N]"))
+    assert caught.value.next_step == "remove or mend that row"
 
 
 def test_missing_and_binary_files_and_unknown_axes(tmp_path):

@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from toolkit.channels import CHANNELS
+from toolkit.channels import CHANNELS, channel_of
 from toolkit.declared import Source, refuse
 from toolkit.declared.outline import outline
 from toolkit.declared.reading import attempt
@@ -249,10 +249,8 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
 
 
 def _symbol(name: str) -> str:
-    for channel in CHANNELS.values():
-        if name.casefold() in map(str.casefold, (channel.symbol, *channel.aliases)):
-            return channel.symbol
-    return name
+    channel = channel_of(name)
+    return name if channel is None else channel.symbol
 
 
 def _role(symbol: str, dimension: str | None) -> str | None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NoReturn, cast
 
-from toolkit.channels import CHANNELS, Channel
+from toolkit.channels import CHANNELS, channel_of
 from toolkit.errors import ColumnError, UnitError
 from toolkit.headers import split_header
 from toolkit.machine import Machine
@@ -95,7 +95,7 @@ def header_of(machine: Machine) -> Callable[[str], bool]:
 
 def _split(header: str, machine: Machine) -> tuple[str, str | None]:
     return split_header(
-        header, lambda name: _machine_column(name, machine) is not None or _channel(name, name) is not None
+        header, lambda name: _machine_column(name, machine) is not None or channel_of(name) is not None
     )
 
 
@@ -117,7 +117,7 @@ def _assign(index: int, header: str, machine: Machine, where: object) -> Assigne
     if column is not None:
         _check_dimension(header, read.text, read.dimension, unit(column.unit).dimension, column.unit, where)
         return Assigned(index=index, symbol=column.symbol, header=header, unit=read.text, role=column.role)
-    channel = _channel(name, header)
+    channel = channel_of(name)
     if channel is not None:
         _check_dimension(header, read.text, read.dimension, channel.dimension, channel.si, where)
     symbol = channel.symbol if channel else name
@@ -143,24 +143,6 @@ def _names(columns: tuple[Column, ...]) -> Mapping[str, Column]:
         for alias in (column.header, column.symbol, *(channel.aliases if channel else ())):
             by_name.setdefault(_plain(alias), column)
     return by_name
-
-
-def _channel(name: str, header: str) -> Channel | None:
-    # `t` is time and `T` temperature: the exact spelling goes first, then the one that fits uniquely.
-    if name in CHANNELS:
-        return CHANNELS[name]
-    for texts in ({" ".join(header.split())}, {_plain(name)}):
-        fits = [
-            channel
-            for channel in CHANNELS.values()
-            if any(
-                alias in texts or _plain(alias) in texts
-                for alias in (channel.symbol, channel.name, *channel.aliases)
-            )
-        ]
-        if len(fits) == 1:
-            return fits[0]
-    return None
 
 
 def _check_dimension(

@@ -36,6 +36,7 @@ _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 _PLAIN = b"0123456789+-eE \n"
 _LONG_EXPONENT = re.compile(rb"[eE][+-]?[0-9]{5}")  # no number in plain digits
 _PART = 1 << 20  # bytes at a time
+_MOST_TITLES = 50  # lines above a header that are looked through
 _BLANK_LINES = 64
 _NO_NUMBER = frozenset("nan +nan -nan inf +inf -inf infinity +infinity -infinity".split())
 
@@ -167,7 +168,10 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
     if separator is None:
         what = "the file is a text file, not a recording"
         next_step = "give the file that the acquisition program wrote"
-        if _is_tabular(text):
+        if titles := _titles(text, header_of(machine)):
+            what = f"{titles} line{'s stand' if titles > 1 else ' stands'} above the header row"
+            next_step = "remove what stands above the header row in a copy of the file"
+        elif _is_tabular(text):
             what = f"the table has no column of the machine {machine.name}"
             next_step = (
                 "name the machine that wrote it, or define it: toolkit machine new RIG.toml --from FILE"
@@ -189,6 +193,13 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
     for row in rows:
         row += [""] * (width - len(row))
     return Table(where=str(gated.path), rows=rows)
+
+
+def _titles(text: str, is_header: Callable[[str], bool]) -> int:
+    # How many lines stand above the first that has headers; 0 where no line near the top has any.
+    lines = [line for line in text[:_PART].splitlines() if line.strip(" \t,;")][:_MOST_TITLES]
+    with_headers = (any(_headers(line, mark, is_header) for mark in SEPARATORS) for line in lines)
+    return next((number for number, has_header in enumerate(with_headers) if has_header), 0)
 
 
 def _is_tabular(text: str) -> bool:

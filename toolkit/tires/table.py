@@ -2,8 +2,9 @@
 
     SA [deg],FZ [N],FY [N],MZ [N*m]        optional: IA [deg], P [kPa], V [km/h], FX [N], KAPPA [1], t [s]
 
-FZ may have either sign and is the load. The axis system is declared, never guessed. A column of text, named
-`calibration` and without a unit, may say how the record stands that the numbers rest on: `convert` writes it.
+A column is called by its channel's symbol, name or alias, in any case. FZ may have either sign and
+is the load. The axis system is declared, never guessed. A column of text, named `calibration` and without a
+unit, may say how the record stands that the numbers rest on: `convert` writes it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, NoReturn, get_args
 
 import numpy as np
 
-from toolkit.channels import AXES, CHANNELS, Axes
+from toolkit.channels import AXES, CHANNELS, Axes, channel_of
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
 from toolkit.headers import split_header
@@ -199,14 +200,10 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
 
 def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
     # "SA [deg]" -> symbol, factor and offset to SI.
-    symbols = {symbol.upper(): symbol for symbol in CHANNELS}
-
-    def symbol_of(name: str) -> str | None:
-        return name if name in CHANNELS else symbols.get(name.upper() if len(name) > 1 else name)
-
-    name, text = split_header(cell, lambda name: symbol_of(name) is not None)
-    symbol = symbol_of(name)
-    if symbol is None:
+    name, text = split_header(cell, lambda name: channel_of(name) is not None)
+    channel = channel_of(name)
+    if channel is None:
+        symbols = {symbol.upper(): symbol for symbol in CHANNELS}
         near = difflib.get_close_matches(name.upper(), symbols, n=1, cutoff=0.5)
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
@@ -218,12 +215,11 @@ def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
         )
     where = f"{path}, column {cell.strip()!r}"
     stated = unit(text, where=where)
-    dimension = CHANNELS[symbol].dimension
-    if stated.dimension != dimension:
+    if stated.dimension != channel.dimension:
         from toolkit.units import si_scale
 
-        si_scale(text, dimension, where=where)
-    return symbol, stated.factor, stated.offset
+        si_scale(text, channel.dimension, where=where)
+    return channel.symbol, stated.factor, stated.offset
 
 
 def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[float]:
@@ -243,7 +239,9 @@ def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[
                 where=f"{path}, row {row}, column {name.strip()!r}",
                 got=repr(text) if text else "an empty cell",
                 expected="a finite number with a decimal point",
-                next_step="remove or mend that row",
+                next_step="save the table again with points for decimal commas"
+                if "," in text and _NUMBER.fullmatch(text.replace(",", ".", 1))
+                else "remove or mend that row",
                 rule="text-cell" if text else "empty-cell",
             )
         numbers.append(number)
