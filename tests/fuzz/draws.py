@@ -50,10 +50,10 @@ def draw(data: bytes, kind: str, rng: random.Random) -> list[Mutation]:
 
 
 def _draw_tree(data: bytes, rng: random.Random) -> Mutation:
-    if rng.random() < 0.15:
+    listed = list(paths(tree_of(data)[0]))
+    if rng.random() < 0.15 or not listed:
         return _draw_text(data, rng)
-    tree, _ = tree_of(data)
-    path = rng.choice(list(paths(tree)))
+    path = rng.choice(listed)
     kinds = ["set"] * 8 + ["drop"] * 2 + ["add", "nest"]
     kinds += ["misspell"] * 3 if isinstance(path[-1], str) else ["double"] * 3
     kind = rng.choice(kinds)

@@ -31,6 +31,7 @@ Headline = TypedDict(
         "to": Annotated[str | None, "last one"],
         "unjudged": Annotated[int, "files whose change cannot be computed"],
         "unreadable": int,
+        "impossible": Annotated[int, "files besides the wrong ones with an Fy or Mz that no tire has"],
     },
 )
 Headline.__doc__ = "What an archive holds, in a sentence and in numbers."

@@ -53,7 +53,7 @@ def read_run(
     """
     units = {channel.name: channel.unit for channel in channels}
     # Another program's output stands in the unit of the channel that it is held against.
-    units = {column: units[output] for output, column in simulated.items()} | units
+    units = {column: units.get(output, "") for output, column in simulated.items()} | units
     table, present, own = _read(path, data, machine=machine, units=units)
     columns: dict[str, NDArray[np.float64]] = {}
     for channel in channels:
