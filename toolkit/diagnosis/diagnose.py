@@ -16,6 +16,7 @@ from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, with
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Search, search
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -36,13 +37,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Result:
-    """An answer and the search that it came from; None where there was nothing to search, or no time.
+    """An answer, the search that it came from and the laws of its rest; None without a search, or no time.
 
     ``predictions`` are name and content of the files that the case asks for, in its order.
     """
 
     diagnosis: Diagnosis
     search: Search | None
+    laws: Laws | None = None
     predictions: tuple[tuple[str, str], ...] = ()
 
 
@@ -91,7 +93,7 @@ def _diagnosed(
         *built_in_findings(case),
         *calibration_findings(case, calibrations),
     )
-    declared, outcome = None, None
+    declared, outcome, laws = None, None, None
     try:
         declared = _first_look(problem, budget)
         if does_not_vary(problem):
@@ -103,17 +105,18 @@ def _diagnosed(
             seed = int(case.sha256[:12], 16)
             with budget.limited():
                 outcome = search(problem, seed=seed, budget=budget)
-            answer = answer_of(case, outcome, findings)
+                laws = learned(outcome, withdrawn=mostly_unknown(outcome), budget=budget)
+            answer = answer_of(case, outcome, laws, findings)
     except BudgetSpentError as error:
         answer = _too_late(case, problem, declared, findings, str(error))
     finally:
         supervised.release()
     deaths = () if code is None else code.findings()
     answer = replace(answer, findings=(*answer.findings, *failed.findings(case), *deaths))
-    files, late = _predictions(problem, outcome, budget, budget_s, code)
+    files, late = _predictions(problem, outcome, laws, budget, budget_s, code)
     if late:
         answer = replace(answer, complete=False, skipped=(*answer.skipped, late))
-    return Result(diagnosis=answer, search=outcome, predictions=files)
+    return Result(diagnosis=answer, search=outcome, laws=laws, predictions=files)
 
 
 def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.float64]]:
@@ -132,7 +135,12 @@ def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.fl
 
 
 def _predictions(
-    problem: Problem, outcome: Search | None, budget: TimeBudget, budget_s: float, code: CaseCode | None
+    problem: Problem,
+    outcome: Search | None,
+    laws: Laws | None,
+    budget: TimeBudget,
+    budget_s: float,
+    code: CaseCode | None,
 ) -> tuple[tuple[tuple[str, str], ...], str]:
     """Return the files of predictions, or what was skipped where the time is up."""
     runs = problem.case.predict
@@ -143,6 +151,8 @@ def _predictions(
     if outcome is not None:
         fits[1] = outcome.refitted
         fits[2] = outcome.refitted if mostly_unknown(outcome) else outcome.augmented
+    if laws is not None and laws.listed:
+        fits[2] = laws.fit
     budget.tell("predictions")
     if code is not None:
         code.until = time.monotonic() + seconds

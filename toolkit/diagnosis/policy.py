@@ -268,6 +268,31 @@ class _Structure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Laws:
+    """Which law structure without a name is answered by."""
+
+    alpha: float = _set(0.0005, "of all laws", "as strict as the structure that it explains")
+    most: int = _set(3, "laws", "every further one has less evidence and more ways to be wrong")
+    sharpened: int = _set(30, "laws", "whose gain is computed with the noise estimated anew: quick ones rank")
+    refined: int = _set(10, "laws", "whose shape is moved to its best before their gain is computed")
+    rounds: int = _set(
+        12, "rounds", "of that, in which each law moves to its best neighbour or halves its steps"
+    )
+    fitted: int = _set(5, "laws", "fitted jointly, of those that are ranked first")
+    judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
+    share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
+    moved: float = _set(1.0, "prior sd", "a parameter that goes farther is what the law may be taken for")
+    knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
+    times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
+    cuts: int = _set(120, "stretches of a run", "on whose ends an event may begin and end")
+    event_rows: int = _set(40, "values of a run", "fewer do not tell an event from a few outliers")
+    event_least: int = _set(5, "rows", "fewer are single values far off, not an event")
+    event_most: float = _set(0.6, "of a run", "what lasts longer is no event but the run's own zero")
+    alike: float = _set(0.5, "of a response", "left beside a known effect's, above which it is not like it")
+    resembling: int = _set(3, "known effects", "that a law is told to be like, the nearest first")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Verdict:
     """What the answer says of what the search has found."""
 
@@ -322,10 +347,10 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER = _Scatter()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
-STRUCTURE, VERDICT, LOCATION, SURFACE = _Structure(), _Verdict(), _Location(), _Surface()
+STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, LATTICE, STRUCTURE, VERDICT,
-    LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, LATTICE, STRUCTURE, LAWS,
+    VERDICT,    LOCATION, SURFACE,
 )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +34,7 @@ class Diagnosed:
 
         if self.result.search is None:
             return None
-        return model_text(self.case, self.result.search, self.result.diagnosis, folder)
+        return model_text(self.case, self.result.search, self.result.laws, self.result.diagnosis, folder)
 
 
 def diagnose_case(
@@ -245,6 +246,17 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
             f"  held-out log score +{effect.held_out_log_score_gain:.1f}, "
             f"{chance(effect.p_value)} in the search"
         )
+    for law in answer.laws:
+        lines += ["", f"law without a name: {law.sentence}"]
+        for parameter in law.parameters:
+            if isinstance(parameter.value, str) or not math.isfinite(parameter.value):
+                continue
+            value, interval = rounded(parameter.value, parameter.ci95)
+            lines.append(
+                f"  {parameter.name} = {value} {parameter.unit}"
+                + (f"  (95 %: {interval})" if interval else "")
+            )
+        lines.append(f"  takes {100 * law.share_of_gap:.0f} % of the mean square that was left")
     for channel, names in answer.depends_on:
         lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
     for place in answer.mismatch:
@@ -258,14 +270,21 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
         [
             o.channel,
             o.unit,
-            *(f"{v:.4g}" for v in (o.nominal_rmse, o.refitted_rmse, o.augmented_rmse, o.noise_floor)),
+            *(f"{v:.4g}" for v in (o.nominal_rmse, o.refitted_rmse, o.augmented_rmse)),
+            *([] if o.with_laws_rmse is None else [f"{o.with_laws_rmse:.4g}"]),
+            f"{o.noise_floor:.4g}",
         ]
         for o in answer.held_out
     ]
+    lawful = ["with laws"] if any(o.with_laws_rmse is not None for o in answer.held_out) else []
     if rows:
         lines += ["", f"error on held-out rows (by {answer.held_out_by}):"]
         lines.append(
-            table(["output", "unit", "nominal", "refitted", "augmented", "noise"], rows, align="<<>>>>")
+            table(
+                ["output", "unit", "nominal", "refitted", "augmented", *lawful, "noise"],
+                rows,
+                align="<<>>>>" + ">" * len(lawful),
+            )
         )
     moved = [parameter for parameter in answer.nominal_parameters if parameter.prior_sd]
     if moved:

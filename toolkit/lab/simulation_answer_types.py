@@ -173,6 +173,54 @@ class DiagnosedEffect(TypedDict):
     evidence: EffectEvidence
 
 
+class LawPlace(TypedDict):
+    """Where a law acts."""
+
+    kind: Annotated[str, "output or state"]
+    channel: str
+
+
+class LawCurve(TypedDict):
+    """A law of one signal over what was recorded."""
+
+    x: list[float]
+    y: list[float]
+    band95: Annotated[list[list[float]], "lower and upper ends of a 95 % band"]
+    unit: str
+
+
+class ResembledEffect(TypedDict):
+    """A known effect that a law is like."""
+
+    name: str
+    distance: Annotated[float, "share of the law's response that is left beside the effect's"]
+
+
+class LawEvidence(TypedDict):
+    """What speaks for a law."""
+
+    held_out_log_score_gain: Annotated[float | None, "null of what explains and does not predict"]
+    p_value: float
+    share_of_gap: Annotated[float, "of the mean square that it takes"]
+
+
+class DiagnosedLaw(TypedDict):
+    """A law of what no known effect explains."""
+
+    place: LawPlace
+    form: Annotated[str, "static, mode, loop, event or tone"]
+    acts: Annotated[str, "adds or multiplies"]
+    variables: list[str]
+    memory_s: float | None
+    formula: Annotated[str | None, "null of a curve"]
+    parameters: list[EffectEstimate]
+    curve: LawCurve | None
+    range: Annotated[dict[str, list[float]], "recorded range of each variable"]
+    resembles: list[ResembledEffect]
+    confounded_with: Annotated[list[str], "parameters that moved far because of it"]
+    evidence: LawEvidence
+
+
 class NominalParameter(TypedDict):
     """A parameter of the simulation, before and after it was fitted."""
 
@@ -201,6 +249,7 @@ class HeldOutChannel(TypedDict):
     refitted_rmse: float | None
     augmented_rmse: Annotated[float | None, "with the effects that are named"]
     noise_floor: float | None
+    with_laws_rmse: Annotated[float | None, "with the laws of what has no name too"]
     noise: ChannelNoise | None
 
 
@@ -240,6 +289,7 @@ class DiagnoseAnswer(DraftKeys, Timed):
     skipped: list[str]
     mismatch: list[ChannelMismatch]
     effects: list[DiagnosedEffect]
+    laws: Annotated[list[DiagnosedLaw], "of what has no name"]
     nominal_parameters: list[NominalParameter]
     fit: HeldOutFit
     depends_on: list[Dependence]

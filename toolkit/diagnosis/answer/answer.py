@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.sensor_noise import NoiseParts
     from toolkit.effects.applied import EffectKey
 
+LAWS_STEP = "laws"
+"""The step of a search, among those skipped, that looks for laws of what has no name."""
 Verdict = Literal["named", "equivalent", "unknown", "nothing", "untestable"]
 
 
@@ -85,6 +87,57 @@ class FoundEffect:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LawCurve:
+    """A law of one signal as it runs over what was recorded, with its 95 % band; lists of one length."""
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundLaw:
+    """What structure without a name is answered by: where it acts, on what it depends, and how.
+
+    ``kind`` is that of its place, an output or the equation of a state. ``formula`` is None of a curve that
+    no formula fits; ``held_out_log_score_gain`` None of what explains and does not predict.
+    ``confounded_with`` are nominal parameters that moved far because of it; ``resembles`` known effects like
+    it, with the share of its response that is left beside each.
+    """
+
+    kind: Literal["output", "state"]
+    channel: str
+    form: str
+    acts: Literal["adds", "multiplies"]
+    variables: tuple[str, ...]
+    memory_s: float | None
+    formula: str | None
+    parameters: tuple[FoundParameter, ...]
+    curve: LawCurve | None
+    ranges: tuple[tuple[str, float, float], ...]
+    resembles: tuple[tuple[str, float], ...]
+    confounded_with: tuple[str, ...]
+    held_out_log_score_gain: float | None
+    p_value: float
+    share_of_gap: float
+
+    @property
+    def sentence(self) -> str:
+        """What it says, for people."""
+        place = f"{self.channel} = {self.channel}_model"
+        law = self.formula or f"a curve of {' and '.join(self.variables)}"
+        if self.kind == "state":
+            text = f"in the equation of {self.channel}: d{self.channel}/dt = ... - ({law})"
+        elif self.acts == "multiplies":
+            text = f"{place} * (1 + {law})"
+        else:
+            text = f"{place} + {law}"
+        return text if self.held_out_log_score_gain is not None else f"{text}; it explains, not predicts"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NominalParameter:
     """A parameter of the simulation before and after the fit."""
 
@@ -104,7 +157,8 @@ class NominalParameter:
 class HeldOutFit:
     """Root mean square errors of an output on rows that no fit has seen, in its unit.
 
-    ``noise`` parts the sensor's noise from the process's; None where no fit was made, and in older answers.
+    ``with_laws_rmse`` has the laws of what has no name in it, None without any. ``noise`` parts the sensor's
+    noise from the process's; None where no fit was made, and in older answers.
     """
 
     channel: str
@@ -114,6 +168,7 @@ class HeldOutFit:
     augmented_rmse: float
     noise_floor: float
     noise: NoiseParts | None = None
+    with_laws_rmse: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,11 +214,12 @@ class Diagnosis:
     complete: bool
     skipped: tuple[str, ...]
     recordings: tuple[Recorded, ...] | None = None
+    laws: tuple[FoundLaw, ...] = ()
 
 
 def cut_short(skipped: Sequence[str]) -> bool:
     """Tell whether a search ended before every known effect was tried; what comes later leaves names."""
-    return any(step not in ("swaps", "predictions") for step in skipped)
+    return any(step not in ("swaps", "predictions", LAWS_STEP) for step in skipped)
 
 
 def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:

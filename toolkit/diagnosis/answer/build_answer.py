@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import (
+    LAWS_STEP,
     Diagnosis,
     FoundEffect,
     FoundParameter,
@@ -17,6 +19,7 @@ from toolkit.diagnosis.answer.answer import (
     Verdict,
     recorded,
 )
+from toolkit.diagnosis.answer.found_laws import found_laws
 from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.next_measurements import (
     equivalent_to,
@@ -40,10 +43,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.diagnosis.law.learn import Laws
 
 
-def answer_of(case: Case, search: Search, findings: tuple[Finding, ...]) -> Diagnosis:
-    """Return the answer of a search; ``findings`` are those on the case itself."""
+def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, ...]) -> Diagnosis:
+    """Return the answer of a search and the laws of its rest; ``findings`` are those on the case itself."""
     problem = search.problem
     unknown = mostly_unknown(search)
     effects = () if unknown else tuple(_effect(search, step) for step in search.steps)
@@ -68,7 +72,7 @@ def answer_of(case: Case, search: Search, findings: tuple[Finding, ...]) -> Diag
         mismatch=_mismatches(search, unknown=unknown),
         effects=effects,
         nominal_parameters=nominal,
-        held_out=_held_out(search, unknown=unknown),
+        held_out=_with_laws(search, laws, _held_out(search, unknown=unknown)),
         held_out_by=search.folds.told(len(search.problem.runs)),
         depends_on=tuple(
             (structure.output, structure.variables)
@@ -77,9 +81,10 @@ def answer_of(case: Case, search: Search, findings: tuple[Finding, ...]) -> Diag
         not_found=not_found(search.screen, search.scored, names, alpha=SCREENING.alpha / tests, units=units),
         next_measurements=next_measurements(search, effects, verdict),
         findings=(*findings, *_outliers(case, search), *refit_findings(case, search)),
-        complete=not search.skipped,
-        skipped=search.skipped,
+        complete=not search.skipped and laws.complete,
+        skipped=search.skipped if laws.complete or search.skipped else (LAWS_STEP,),
         recordings=recorded(case.runs),
+        laws=found_laws(search, laws),
     )
 
 
@@ -357,6 +362,19 @@ def _held_out(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
             )
         )
     return tuple(errors)
+
+
+def _with_laws(search: Search, laws: Laws, errors: tuple[HeldOutFit, ...]) -> tuple[HeldOutFit, ...]:
+    """Return held-out errors with those that the laws leave beside them; an event tells nothing there."""
+    if not any(law.predicts for law in laws.listed):
+        return errors
+    problem = search.problem
+    told = []
+    for output in errors:
+        counted = problem.kept[output.channel]
+        away = (problem.observed[output.channel] - laws.held_out.simulated[output.channel])[counted]
+        told.append(replace(output, with_laws_rmse=math.sqrt(float(np.mean(away**2)))))
+    return tuple(told)
 
 
 def _floor(search: Search, name: str, sd: float | None) -> float:

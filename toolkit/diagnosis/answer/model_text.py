@@ -9,9 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.diagnosis.answer.found_laws import with_laws
 from toolkit.diagnosis.simulators.built_in import parameter_names
 from toolkit.diagnosis.simulators.parameter_units import unit_of
 from toolkit.diagnosis.simulators.setting import nominal_load
+from toolkit.effects.law import is_law
 from toolkit.files import real_path, sha256_file
 from toolkit.inputs import is_regular
 from toolkit.simulation.model_file import CONTENT, FittedEffect, effect_lines, toml_key, toml_lines
@@ -20,6 +22,7 @@ from toolkit.version import __version__
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
 
@@ -27,14 +30,18 @@ MODEL = "model.toml"
 _INTERNAL = ("_size_", "_half_")
 
 
-def model_text(case: Case, search: Search, diagnosis: Diagnosis, folder: Path) -> str | None:
+def model_text(
+    case: Case, search: Search, laws: Laws | None, diagnosis: Diagnosis, folder: Path
+) -> str | None:
     """Return the model file of an answer, None where it names nothing that could go back into use.
 
     Parameters
     ----------
     folder : where the file will lie; the simulation's own files are named relative to it
     """
-    if not diagnosis.effects:
+    if laws is not None and laws.listed:
+        search = with_laws(search, laws)
+    elif not diagnosis.effects:
         return None
     lines = [
         f"# Written by toolkit diagnose from {case.path.name}; nobody edits it.",
@@ -71,7 +78,13 @@ def model_text(case: Case, search: Search, diagnosis: Diagnosis, folder: Path) -
     steps = {step.active.key for step in search.steps}
     for active in search.augmented.active:
         if not active.effect.nuisance:  # of what is recorded, not of what is simulated
-            fitted = _fitted(case, search, active, same.get(active.key, ()), named=active.key in steps)
+            fitted = _fitted(
+                case,
+                search,
+                active,
+                same.get(active.key, ()),
+                named=active.key in steps or is_law(active.key.name),
+            )
             lines += effect_lines(fitted)
     return "\n".join(lines) + "\n"
 

@@ -10,8 +10,10 @@ from typing import Any, get_args
 from toolkit.diagnosis.answer.answer import (
     Diagnosis,
     FoundEffect,
+    FoundLaw,
     FoundParameter,
     HeldOutFit,
+    LawCurve,
     Mismatch,
     NominalParameter,
     NotFound,
@@ -92,6 +94,7 @@ def _answer(entries: dict[str, Any]) -> Diagnosis:
                 augmented_rmse=_number(output["augmented_rmse"]),
                 noise_floor=_number(output["noise_floor"]),
                 noise=_noise(output.get("noise")),
+                with_laws_rmse=_or_none(output.get("with_laws_rmse")),
             )
             for output in fit["held_out"]
         ),
@@ -118,6 +121,7 @@ def _answer(entries: dict[str, Any]) -> Diagnosis:
         complete=bool(entries["complete"]),
         skipped=_texts(entries["skipped"]),
         recordings=_recordings(entries.get("recordings")),
+        laws=tuple(map(_law, entries.get("laws", ()))),
     )  # fmt: skip
 
 
@@ -153,25 +157,49 @@ def _effect(effect: dict[str, Any]) -> FoundEffect:
         statement=_text(effect["statement"]),
         equation=_text(effect["equation"]),
         reference=_text(effect["reference"]),
-        parameters=tuple(
-            FoundParameter(
-                name=_text(parameter["name"]),
-                value=parameter["value"]
-                if isinstance(parameter["value"], str)
-                else _number(parameter["value"]),
-                unit=_text(parameter["unit"]),
-                ci95=None
-                if parameter["ci95"] is None
-                else (_number(parameter["ci95"][0]), _number(parameter["ci95"][1])),
-                runs=None if parameter["runs"] is None else _texts(parameter["runs"]),
-            )
-            for parameter in effect["parameters"]
-        ),
+        parameters=tuple(map(_parameter, effect["parameters"])),
         equivalent_to=_texts(effect["equivalent_to"]),
         rejected=tuple((_text(o["name"]), -_number(o["log_likelihood_less"])) for o in effect["rejected"]),
         held_out_log_score_gain=_number(effect["evidence"]["held_out_log_score_gain"]),
         p_value=_number(effect["evidence"]["p_value"]),
     )
+
+
+def _parameter(parameter: dict[str, Any]) -> FoundParameter:
+    value, ci95 = parameter["value"], parameter["ci95"]
+    return FoundParameter(
+        name=_text(parameter["name"]),
+        value=value if isinstance(value, str) else _number(value),
+        unit=_text(parameter["unit"]),
+        ci95=None if ci95 is None else (_number(ci95[0]), _number(ci95[1])),
+        runs=None if parameter["runs"] is None else _texts(parameter["runs"]),
+    )
+
+
+def _law(law: dict[str, Any]) -> FoundLaw:
+    curve, evidence = law["curve"], law["evidence"]
+    return FoundLaw(
+        kind=_one_of(law["place"]["kind"], ("output", "state")),
+        channel=_text(law["place"]["channel"]),
+        form=_text(law["form"]),
+        acts=_one_of(law["acts"], ("adds", "multiplies")),
+        variables=_texts(law["variables"]),
+        memory_s=_or_none(law["memory_s"]),
+        formula=None if law["formula"] is None else _text(law["formula"]),
+        parameters=tuple(map(_parameter, law["parameters"])),
+        curve=None if curve is None else LawCurve(
+            x=_numbers(curve["x"]), y=_numbers(curve["y"]), low=_numbers(curve["band95"][0]),
+            high=_numbers(curve["band95"][1]), unit=_text(curve["unit"]),
+        ),
+        ranges=tuple(
+            (_text(name), _number(ends[0]), _number(ends[1])) for name, ends in law["range"].items()
+        ),
+        resembles=tuple((_text(one["name"]), _number(one["distance"])) for one in law["resembles"]),
+        confounded_with=_texts(law["confounded_with"]),
+        held_out_log_score_gain=_or_none(evidence["held_out_log_score_gain"]),
+        p_value=_number(evidence["p_value"]),
+        share_of_gap=_number(evidence["share_of_gap"]),
+    )  # fmt: skip
 
 
 def _noise(entry: dict[str, Any] | None) -> NoiseParts | None:
@@ -214,6 +242,10 @@ def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise TypeError(f"{value!r} in the place of a number")
     return float(value)
+
+
+def _numbers(values: Any) -> tuple[float, ...]:
+    return tuple(map(_number, values))
 
 
 def _or_none(value: Any) -> float | None:

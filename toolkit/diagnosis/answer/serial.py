@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, Mismatch
+    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, FoundLaw, Mismatch
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -24,6 +24,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "skipped": list(diagnosis.skipped),
         "mismatch": [_mismatch(mismatch) for mismatch in diagnosis.mismatch],
         "effects": [_effect(effect) for effect in diagnosis.effects],
+        "laws": [_law(law) for law in diagnosis.laws],
         "nominal_parameters": [
             {
                 "name": parameter.name, "before": parameter.before, "after": parameter.after,
@@ -38,6 +39,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
                     "channel": output.channel, "unit": output.unit, "nominal_rmse": output.nominal_rmse,
                     "refitted_rmse": output.refitted_rmse, "augmented_rmse": output.augmented_rmse,
                     "noise_floor": output.noise_floor,
+                    "with_laws_rmse": output.with_laws_rmse,
                     "noise": None if output.noise is None else {
                         "sensor_sd": output.noise.sensor_sd, "process_sd": output.noise.process_sd,
                         "how": output.noise.how,
@@ -102,6 +104,37 @@ def _effect(effect: FoundEffect) -> dict[str, Any]:
         "rejected": [{"name": name, "log_likelihood_less": -value} for name, value in effect.rejected],
         "evidence": {"held_out_log_score_gain": effect.held_out_log_score_gain, "p_value": effect.p_value},
     }
+
+
+def _law(law: FoundLaw) -> dict[str, Any]:
+    curve = law.curve
+    return {
+        "place": {"kind": law.kind, "channel": law.channel},
+        "form": law.form,
+        "acts": law.acts,
+        "variables": list(law.variables),
+        "memory_s": law.memory_s,
+        "formula": law.formula,
+        "parameters": [
+            {
+                "name": parameter.name, "value": parameter.value, "unit": parameter.unit,
+                "ci95": None if parameter.ci95 is None else list(parameter.ci95),
+                "runs": None if parameter.runs is None else list(parameter.runs),
+            }
+            for parameter in law.parameters
+        ],
+        "curve": None if curve is None else {
+            "x": list(curve.x), "y": list(curve.y), "band95": [list(curve.low), list(curve.high)],
+            "unit": curve.unit,
+        },
+        "range": {name: [start, end] for name, start, end in law.ranges},
+        "resembles": [{"name": name, "distance": distance} for name, distance in law.resembles],
+        "confounded_with": list(law.confounded_with),
+        "evidence": {
+            "held_out_log_score_gain": law.held_out_log_score_gain, "p_value": law.p_value,
+            "share_of_gap": law.share_of_gap,
+        },
+    }  # fmt: skip
 
 
 def _finite(value: Any) -> Any:

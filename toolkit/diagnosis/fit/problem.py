@@ -94,7 +94,7 @@ class Problem:
         Parameters
         ----------
         applied : where and in which runs they act
-        pattern : positions (n,) to forces (n, forces)
+        pattern : positions and rates (n,) to forces (n, forces)
         """
         values = dict(self.known)
         values.update(zip((parameter.name for parameter in self.free), map(float, p), strict=True))
@@ -149,7 +149,7 @@ class Problem:
         """
         if applied.effect.term is None or applied.effect.term.pattern is None:
             return []
-        pattern = TermPattern(applied.effect, tuple(starts))
+        pattern = TermPattern(((applied.effect, tuple(starts)),))
         responses = self.pushed(p, active, applied, pattern, _QUARTERS * len(starts))
         for column in responses.values():
             if not np.isfinite(column).all():

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
-from toolkit.diagnosis.policy import STEP, STRUCTURE
+from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.screen_step import search_p_values
 
@@ -81,6 +81,71 @@ def _tail(ratio: float, runs: int) -> float:
     return float(chi2.sf(ratio * median / (1 + 2 / math.sqrt(2 * STRUCTURE.line_around)), 2 * runs))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """A stretch of one run's time, from the first to the last of its rows [s]; one of ``looked``."""
+
+    run: str
+    start: float
+    end: float
+    looked: int
+
+    def columns(self, problem: Problem) -> NDArray[np.float64]:
+        """Return one in its rows and zero elsewhere, (rows, 1)."""
+        inside = [
+            (run.t >= self.start) & (run.t <= self.end) & (run.name == self.run) for run in problem.runs
+        ]
+        return np.concatenate(inside).astype(np.float64)[:, None]
+
+
+def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64]) -> tuple[Event, ...]:
+    """Return for every run the stretch of its time that stands off the rest most clearly."""
+    events = []
+    for run, place in zip(problem.runs, problem.slices, strict=True):
+        good = problem.kept[name][place]
+        if not problem.case.has_time or good.sum() < LAWS.event_rows:
+            continue
+        t, values = run.t[good], residual[place][good]
+        edges = np.unique(np.linspace(0, len(values), LAWS.cuts + 1).astype(int))
+        total = np.concatenate([[0.0], np.cumsum(values - np.median(values))])[edges]
+        first, last = np.triu_indices(len(edges), 1)
+        rows = (edges[last] - edges[first]).astype(float)
+        usable = (rows >= LAWS.event_least) & (rows < LAWS.event_most * len(values))
+        strength = np.where(usable, (total[last] - total[first]) ** 2 / rows, 0.0)
+        at = int(np.argmax(strength))
+        events.append(
+            Event(
+                run=run.name, start=float(t[edges[first[at]]]), end=float(t[edges[last[at]] - 1]),
+                looked=int(usable.sum()),
+            )
+        )  # fmt: skip
+    return tuple(events)
+
+
+def _event(problem: Problem, screen: LinearisedFit, base: Fit, name: str) -> StructureFound | None:
+    """Return the clearest event of an output's residual, None where chance gives as much.
+
+    It follows nothing that was recorded: no smooth dependence shows it, and coloured noise takes it up.
+    """
+    from scipy.stats import chi2
+
+    listed = []
+    events = strongest_events(problem, name, base.residual[name])
+    none = np.zeros((problem.rows, 1))
+    for event in events:
+        column = event.columns(problem)
+        group = SmoothDependence(output=name, variables=("time",), columns=column)
+        if _share(problem, base, group) < LAWS.share:
+            continue
+        gain, _, trust = screen.gain({each: column if each == name else none for each in problem.names})
+        log_p = float(chi2.logsf(max(gain * trust, 0.0), 1)) + math.log(event.looked * len(events))
+        text = f"time (an event in {event.run} from {event.start:.4g} to {event.end:.4g} s)"
+        p = math.exp(min(max(log_p, -690.0), 0.0))
+        listed.append(StructureFound(output=name, variables=(text,), gain=gain, p_value=p, rest=True))
+    best = min(listed, key=lambda found: found.p_value, default=None)
+    return best if best is not None and best.p_value < STRUCTURE.alpha else None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StructureFound:
     """Structure that stays: where it is, and its p-value in the search.
@@ -96,6 +161,11 @@ class StructureFound:
     p_value: float
     rest: bool = False
     columns: int = 0
+
+    @property
+    def is_lawful(self) -> bool:
+        """Tell whether a law may answer it: an event has one, what only differs from run to run has none."""
+        return not self.rest or self.variables[0].startswith("time (")
 
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -134,6 +204,8 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
             findings.append(
                 StructureFound(output=name, variables=(line_text,), gain=gain, p_value=line.p_value)
             )
+        event = _event(problem, screen, base, name)
+        findings += [] if event is None else [event]
         beyond = _beyond_noise(problem, base, name)
         if beyond is not None:
             findings.append(beyond)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -108,13 +108,13 @@ class Motion:
         self,
         simulated: Mapping[str, NDArray[np.float64]],
         run: Run,
-        pattern: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+        pattern: Pattern,
     ) -> dict[str, NDArray[np.float64]]:
         """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
         x = simulated.get(str(self.position), run.columns.get(str(self.position)))
         if x is None:
             return {}
-        pushes = pattern(x)
+        pushes = pattern(x, np.zeros(len(x)))  # what follows the rate is simulated
         if self.kind != "force":
             pushes = integrated(run.t, pushes)
             if self.kind == "position":
@@ -210,7 +210,7 @@ class AlongMotion(ABC):
 
         return Moving(
             integrates=False, sizes=sizes, units=lambda _: motion.units(), way=lambda _: motion.way(),
-            pushed=pushed,
+            position=lambda _: motion.position, pushed=pushed,
         )  # fmt: skip
 
 

@@ -105,7 +105,7 @@ class OdeModel:
             together=self._prepare,
             motion=Moving(
                 integrates=True, sizes=self._motion_sizes, units=self._motion_units, way=self._way,
-                pushed=self._pushed,
+                position=lambda channel: self.position_of(str(channel)), pushed=self._pushed,
             ),
         )  # fmt: skip
 
@@ -182,7 +182,7 @@ class OdeModel:
         channel: str | None,
         pattern: Pattern,
     ) -> dict[str, NDArray[np.float64]]:
-        """Return linear responses of every output to small forces of a pattern over the position.
+        """Return linear responses of every output to small forces of a pattern along the motion.
 
         They have the shape (rows, forces).
         """
@@ -200,8 +200,8 @@ class OdeModel:
         try:
             with silenced():
                 moved = propagated(
-                    rates_at, self._finer(run).t, fine, pattern(fine[self._derivative_of[at]]),
-                    at=at, sizes=sizes,
+                    rates_at, self._finer(run).t, fine,
+                    pattern(fine[self._derivative_of.get(at, at)], fine[at]), at=at, sizes=sizes,
                 )[::_FINER]  # fmt: skip
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error

@@ -11,6 +11,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import channel_places
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, TermPattern
 from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effect as named_effect
 from toolkit.effects.catalogue import effects
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import FitError
@@ -56,6 +57,7 @@ class OdeApart:
                 sizes=lambda channel, _: self._motions[str(channel)].sizes,
                 units=lambda channel: self._motions[str(channel)].units,
                 way=lambda channel: self._motions[str(channel)].way,
+                position=lambda channel: self._motions[str(channel)].position,
                 pushed=self._pushed,
             ),
         )
@@ -117,10 +119,10 @@ class OdeApart:
         if run.rows < 2:
             return {}
         assert isinstance(pattern, TermPattern)  # noqa: S101  no other crosses
-        forces = pattern(np.zeros(1)).shape[1]
+        forces = pattern(np.zeros(1), np.zeros(1)).shape[1]
         shapes = {output.name: (run.rows, forces) for output in self.outputs}
-        term = (pattern.effect.name, tuple(dict(start) for start in pattern.starts))
-        return self._code.arrays("pushed", run, p, shapes, _crossing(active), channel, term)
+        terms = [(effect.name, tuple(map(dict, starts))) for effect, starts in pattern.terms]
+        return self._code.arrays("pushed", run, p, shapes, _crossing(active), channel, terms)
 
 
 def handlers_of(case: Case, model: Model) -> Handlers:
@@ -145,6 +147,7 @@ def handlers_of(case: Case, model: Model) -> Handlers:
                 [*(float(getattr(motion, name)) for name in _SIZES), float(motion.has_position)],
                 list(moving.units(channel)),
                 [float(length) for length in moving.way(channel)],
+                moving.position(channel),
             ]
         return [places, motions]
 
@@ -171,9 +174,9 @@ def handlers_of(case: Case, model: Model) -> Handlers:
         return answers
 
     def pushed(
-        run: int, p: Mapping[str, float], active: Crossing, channel: str | None, term: tuple[str, Any]
+        run: int, p: Mapping[str, float], active: Crossing, channel: str | None, terms: list[tuple[str, Any]]
     ) -> Any:
-        pattern = TermPattern(effects()[term[0]], term[1])
+        pattern = TermPattern(tuple((named_effect(name), starts) for name, starts in terms))
         return Numbers(moving.pushed(runs[run], p, _crossed(active), channel, pattern))
 
     return {
@@ -186,11 +189,15 @@ def handlers_of(case: Case, model: Model) -> Handlers:
 
 @dataclass(frozen=True, slots=True)
 class _Motion:
-    """What moves at one state: sizes of its motion, units of force, velocity and position, and its ways."""
+    """What moves at one state: sizes of its motion, units of force, velocity and position, and its ways.
+
+    ``position`` is the state of which it is the rate.
+    """
 
     sizes: MotionSizes
     units: tuple[str, str, str]
     way: tuple[float, float]
+    position: str | None
 
 
 def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion]]:
@@ -215,7 +222,7 @@ def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion]]:
     return places, motions
 
 
-def _motion(sizes: Sequence[float], units: Sequence[str], way: Sequence[float]) -> _Motion:
+def _motion(sizes: Sequence[float], units: Sequence[str], way: Sequence[float], rate_of: object) -> _Motion:
     *numbers, has_position = map(float, sizes)
     force, velocity, position = map(str, units)
     longest, usual = map(float, way)
@@ -223,6 +230,7 @@ def _motion(sizes: Sequence[float], units: Sequence[str], way: Sequence[float]) 
         sizes=MotionSizes(**dict(zip(_SIZES, numbers, strict=True)), has_position=bool(has_position)),
         units=(force, velocity, position),
         way=(longest, usual),
+        position=_text(rate_of),
     )
 
 
@@ -244,7 +252,7 @@ def _crossing(active: Sequence[AppliedEffect]) -> Crossing:
 def _crossed(active: Crossing) -> list[AppliedEffect]:
     return [
         AppliedEffect(
-            effect=effects()[name], channel=channel, source=source, runs=runs, values=values, units=units,
+            effect=named_effect(name), channel=channel, source=source, runs=runs, values=values, units=units,
             condition=condition,
         )
         for name, channel, source, runs, values, units, condition in active

@@ -12,7 +12,7 @@ from toolkit.effects.applied import AppliedEffect
 
 def unit_of(case: Case, model: Model, active: AppliedEffect, name: str) -> str:
     """Return the unit of one parameter of an effect at its place."""
-    text = active.effect.parameter(name).unit
+    text = active.effect.parameter(name).unit or active.units.get(name, "1")
     if "{" not in text:
         return text
     if active.effect.stage == "dynamics":

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from toolkit.simulation.case_plan import CaseParameter
 
     Arrays = dict[str, NDArray[np.float64]]
-    # Positions of shape (n,) to force-like terms of shape (n, forces): a `TermPattern`
-    Pattern = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    # Positions and rates of shape (n,) to force-like terms of shape (n, forces): a `TermPattern`
+    Pattern = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
     Parameters = Mapping[str, float]
     # A channel's name to its largest recorded magnitude over the runs that are judged
     Largest = Callable[[str | None], float]
@@ -33,17 +33,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class TermPattern:
-    """An effect's pattern at several starts: positions (n,) to forces (n, directions x starts)."""
+    """What terms of effects would add along a motion, each at several starts, as columns of forces.
 
-    effect: Effect
-    starts: tuple[Mapping[str, float], ...]
+    A term with a pattern has its directions in blocks of columns, (n, directions x starts); another one has
+    a column for each start.
+    """
 
-    def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the forces at positions."""
-        term = self.effect.term
-        assert term is not None  # noqa: S101  it was asked of the effect before
-        assert term.pattern is not None  # noqa: S101
-        return term.pattern(x, self.starts)
+    terms: tuple[tuple[Effect, tuple[Mapping[str, float], ...]], ...]
+
+    def __call__(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the forces at positions and their rates, (n, forces)."""
+        import numpy as np
+
+        columns = []
+        for effect, starts in self.terms:
+            term = effect.term
+            assert term is not None  # noqa: S101  it was asked of the effect before
+            if term.pattern is not None:
+                columns.append(term.pattern(x, starts))
+                continue
+            assert term.force is not None  # noqa: S101
+            listed = [np.broadcast_to(term.force(x, v, values), x.shape) for values in starts]
+            columns.append(np.stack(listed, axis=1))
+        return np.nan_to_num(np.hstack(columns))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +77,7 @@ class Moving:
     units : channel -> units of a force-like term, of its velocity and of its position
     way : channel -> the longest way of a run [position's unit] and the usual one from row to row, zero where
         it stands in the rows themselves
+    position : channel -> the state or channel of which it is the rate, None where there is none
     pushed : (run, parameters, effects, channel, pattern) -> linear responses of every output to small forces
         of a pattern over the position, (rows, forces); none where none move
     """
@@ -73,6 +86,7 @@ class Moving:
     sizes: Callable[[str | None, Largest], MotionSizes]
     units: Callable[[str | None], tuple[str, str, str]]
     way: Callable[[str | None], tuple[float, float]]
+    position: Callable[[str | None], str | None]
     pushed: Callable[[Run, Parameters, Sequence[AppliedEffect], str | None, Pattern], Arrays]
 
 

@@ -9,6 +9,7 @@ from pkgutil import iter_modules
 from typing import get_args
 
 from toolkit.effects.effect import Effect, Stage
+from toolkit.effects.law import is_law, law_effect
 from toolkit.errors import ConfigError
 
 _ORDER = get_args(Stage)  # of the stages in a list: from the recording back to the road
@@ -27,13 +28,15 @@ def effects() -> dict[str, Effect]:
 
 
 def effect(name: str, *, where: str = "--effect") -> Effect:
-    """Return one effect.
+    """Return one effect: of the catalogue, or the law that a name is.
 
     Raises
     ------
     ConfigError
-        no effect has that name
+        no effect has that name; ``formula``: a law cannot be read
     """
+    if is_law(name):
+        return law_effect(name)
     listed = effects()
     if name in listed:
         return listed[name]

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.answer.answer import Diagnosis, Place
+    from toolkit.diagnosis.answer.answer import Diagnosis, FoundLaw, Place
+    from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.search import Search
 
 GREY, ORANGE, BLUE, GREEN = "#6b6b6b", "#d9822b", "#1565c0", "#2e7d32"
@@ -117,8 +118,14 @@ def worst_run(search: Search, channel: str) -> int:
     return int(np.argmax([float(np.sum(residual[one] ** 2)) for one in problem.slices]))
 
 
-def run_in_time(search: Search, channel: str, *, after: bool) -> bytes:
-    """Return the run with the largest mismatch of an output: recorded and simulated, residuals beneath."""
+def run_in_time(search: Search, channel: str, *, after: bool, laws: Laws | None = None) -> bytes:
+    """Return the run with the largest mismatch of an output: recorded and simulated, residuals beneath.
+
+    Parameters
+    ----------
+    after : whether effects are told, and shown
+    laws : of what has no name, shown where there are any
+    """
     problem = search.problem
     which = worst_run(search, channel)
     rows, run = problem.slices[which], problem.runs[which]
@@ -135,6 +142,8 @@ def run_in_time(search: Search, channel: str, *, after: bool) -> bytes:
         fits = [("refitted", ORANGE, search.refitted)]
         if after:
             fits.append(("with the effect", BLUE, search.augmented))
+        if laws is not None and laws.listed:
+            fits.append(("with the laws", GREEN if after else BLUE, laws.fit))
         for label, colour, fit in fits:
             upper.plot(*drawn(t, fit.simulated[channel][rows]), color=colour, linewidth=1.2, label=label)
             lower.plot(*drawn(t, fit.residual[channel][rows]), color=colour, linewidth=0.8)
@@ -160,6 +169,25 @@ def drawn(t: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.fl
     ends = np.append(starts[1:], len(order)) - 1
     rows = np.unique(usable[order[np.concatenate([starts, ends])]])
     return t[rows], y[rows]
+
+
+def law_curve(law: FoundLaw) -> bytes | None:
+    """Return a law of one signal with its 95 % band, None of one that has no curve."""
+    curve = law.curve
+    if curve is None:
+        return None
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.fill_between(curve.x, curve.low, curve.high, color=BLUE, alpha=0.25, linewidth=0, label="95 %")
+        axes.plot(curve.x, curve.y, color=BLUE, linewidth=1.4, label=law.formula or "curve")
+        axes.axhline(0, color="#333333", linewidth=0.8)
+        axes.set_xlabel(law.variables[0])
+        what = "factor less one" if law.acts == "multiplies" else f"added [{curve.unit}]"
+        axes.set_ylabel(f"{law.channel}: {what}" if law.kind == "output" else f"taken from d{law.channel}/dt")
+        axes.legend(frameon=False)
+
+    return draw_svg((5.6, 3.0), draw)
 
 
 def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, Mismatch
+    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, FoundLaw, Mismatch
     from toolkit.diagnosis.diagnose import Result
 
 _NEAREST = 8  # candidates that are listed as rejected
@@ -50,6 +50,16 @@ class _Place:
     figures: Sequence[Figure]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Law:
+    """A law of what has no name: its sentence, parameters, curve, and what is to be known of it."""
+
+    sentence: str
+    parameters: Table
+    figure: Figure | None
+    notes: Sequence[str]
+
+
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict as a sentence; a search that was cut off has not tried every effect."""
     from toolkit.diagnosis.answer.answer import cut_short
@@ -58,6 +68,10 @@ def headline(diagnosis: Diagnosis) -> str:
         return "Something is missing; the budget was spent before every known effect was tried."
     if diagnosis.verdict == "untestable" and diagnosis.skipped:
         return "The budget was spent before this recording could be judged."
+    if diagnosis.laws and not diagnosis.effects:
+        return f"{HEADLINES[diagnosis.verdict]} Its law was learned: {diagnosis.laws[0].sentence}."
+    if diagnosis.effects and diagnosis.remaining == "unknown" and diagnosis.laws:
+        return f"{HEADLINES[diagnosis.verdict]} What is left follows a law: {diagnosis.laws[0].sentence}."
     if diagnosis.effects and diagnosis.remaining == "unknown":
         # Who reads the first line alone must not take a name for the whole of it.
         return f"{HEADLINES[diagnosis.verdict]} More is left that no known effect explains."
@@ -115,6 +129,7 @@ def page(result: Result, use: CalibrationUse | None = None) -> str:
             lead=_lead(diagnosis),
             chart=chart,
             effects=[_effect(result, effect) for effect in diagnosis.effects],
+            laws=[_law(law) for law in diagnosis.laws],
             places=list(_places(result)),
             run_map=run_map,
             held_out=_held_out(diagnosis),
@@ -172,6 +187,35 @@ def _effect(result: Result, effect: FoundEffect) -> _Effect:
     )
 
 
+def _law(law: FoundLaw) -> _Law:
+    rows = [
+        (parameter.name, value, parameter.unit, interval)
+        for parameter in law.parameters
+        if not isinstance(parameter.value, str)
+        for value, interval in (rounded(parameter.value, parameter.ci95),)
+    ]
+    svg = figures.law_curve(law)
+    notes = [f"It takes {100 * law.share_of_gap:.0f} % of the mean square that was left"]
+    if law.held_out_log_score_gain is None:
+        notes[0] += ", on rows that were fitted: of others it says nothing."
+    else:
+        notes[0] += (
+            f" on rows that no fit has seen; their log score rose by {law.held_out_log_score_gain:.1f}."
+        )
+    notes += [f"{name} was recorded from {few(low, 4)} to {few(high, 4)}." for name, low, high in law.ranges]
+    if law.confounded_with:
+        notes.append(f"It may be taken for {', '.join(law.confounded_with)}, which moved far because of it.")
+    if law.resembles:
+        near = ", ".join(f"{name} ({100 * distance:.0f} % apart)" for name, distance in law.resembles)
+        notes.append(f"Known effects that are like it, and explain less: {near}.")
+    return _Law(
+        sentence=law.sentence,
+        parameters=table(("parameter", "value", "unit", "95 % interval"), rows, numbers=(1,)),
+        figure=None if svg is None else Figure(svg=svg, alt=f"the law over {law.variables[0]}"),
+        notes=notes,
+    )
+
+
 def condition(result: Result, runs: Sequence[str]) -> str:
     """Return the conditions that these runs have and no other: people know a surface, not a file's name."""
     if result.search is None:
@@ -219,13 +263,13 @@ def _places(result: Result) -> Iterator[_Place]:
         sizes = size_maps(search, diagnosis, channel, after=after)
         if sizes is not None:
             drawn.append(Figure(svg=sizes, alt=f"size of the residual of {channel} over each variable"))
-        in_time = figures.run_in_time(search, channel, after=after)
+        in_time = figures.run_in_time(search, channel, after=after, laws=result.laws)
         drawn.append(Figure(svg=in_time, alt=f"{channel} in one run"))
         yield _Place(sentence=_place_sentence(mismatch), figures=drawn)
     if not diagnosis.mismatch:
         # "Nothing" is believed by whoever sees that the lines lie on each other.
         for fit in diagnosis.held_out:
-            in_time = figures.run_in_time(search, fit.channel, after=after)
+            in_time = figures.run_in_time(search, fit.channel, after=after, laws=result.laws)
             yield _Place(
                 sentence=f"{fit.channel}: nothing stands out of the noise. The run with the largest error:",
                 figures=[Figure(svg=in_time, alt=f"{fit.channel} in one run")],
@@ -248,12 +292,14 @@ def _held_out(diagnosis: Diagnosis) -> Table:
     errors = {"as declared": "nominal_rmse", "refitted": "refitted_rmse"}
     if diagnosis.effects:  # without an effect there is no error with it
         errors["with the effects"] = "augmented_rmse"
+    if any(fit.with_laws_rmse is not None for fit in diagnosis.held_out):
+        errors["with the laws"] = "with_laws_rmse"
     errors["noise"] = "noise_floor"
     rows = [
         (fit.channel, fit.unit, *(number(getattr(fit, field), ".4g", "–") for field in errors.values()))
         for fit in diagnosis.held_out
     ]
-    return table(("output", "unit", *errors), rows, numbers=(2, 3, 4, 5))
+    return table(("output", "unit", *errors), rows, numbers=tuple(range(2, 2 + len(errors))))
 
 
 def _nominal_parameters(diagnosis: Diagnosis) -> Table:

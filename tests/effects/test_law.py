@@ -1,0 +1,68 @@
+"""A law as an effect: by its name alone, on an output or in an equation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effect
+from toolkit.effects.forward import through
+from toolkit.effects.law import conversion, law_effect, law_name
+from toolkit.effects.signals import Setting
+from toolkit.errors import ConfigError
+
+T = np.arange(5.0)
+
+
+def _setting(**channels: np.ndarray) -> Setting:
+    return Setting(t=T, elapsed_s=T, channels=channels)
+
+
+def _through(name: str, y: np.ndarray, values: dict[str, float], **channels: np.ndarray) -> np.ndarray:
+    applied = AppliedEffect(effect=effect(name), channel="F", values=values)
+    return through({"F": y}, [applied], _setting(**channels))["F"]
+
+
+def test_a_law_adds_and_multiplies():
+    y, x = np.array([1.0, 2, 3, 4, 5]), np.array([0.0, 1, 0, -1, 2])
+    np.testing.assert_allclose(_through("law adds: a*[x]**2", y, {"a": 3.0}, x=x), y + 3 * x**2)
+    np.testing.assert_allclose(_through("law multiplies: a*[x]", y, {"a": 0.1}, x=x), y * (1 + 0.1 * x))
+    np.testing.assert_allclose(_through("law adds: a*[itself]*[time]", y, {"a": 2.0}), y + 2 * y * T)
+
+
+def test_signals_are_in_the_units_of_the_recording():
+    """20 degC stand as 293.15 K in a setting; a law over the recorded temperature sees 20."""
+    kelvin = np.full(5, 293.15)
+    values = {"a": 1.0, **conversion("T", 1.0, 273.15)}
+    np.testing.assert_allclose(_through("law adds: a*[T]", np.zeros(5), values, T=kelvin), 20.0)
+
+
+def test_a_law_in_an_equation_is_taken_from_the_rate():
+    term = law_effect(law_name("enters", "a*[itself]*[position]**2")).term
+    assert term is not None
+    assert term.force is not None
+    assert term.force(3.0, 2.0, {"a": 5.0}) == pytest.approx(5 * 2 * 9)
+
+
+def test_an_amplitude_can_be_off_and_a_width_is_positive():
+    parameters = {p.name: p for p in law_effect("law adds: a*tanh(([x] - c)/s)").parameters}
+    assert parameters["a"].off == 0.0
+    assert parameters["c"].off is None
+    assert parameters["s"].bounds[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["law adds: open(a)", "law takes: a", "law ", "law enters: a*lag([itself], tau)", "law enters: a*[x]"],
+)
+def test_what_is_no_law_is_refused(name):
+    with pytest.raises(ConfigError) as caught:
+        effect(name)
+    assert caught.value.rule == "formula"
+
+
+def test_a_law_without_its_channel_says_which_one_is_missing():
+    with pytest.raises(ConfigError, match="not recorded") as caught:
+        _through("law adds: a*[x]", np.zeros(5), {"a": 1.0})
+    assert caught.value.expected == "x"

@@ -1,0 +1,140 @@
+"""The laws of a search as the answer tells them: parameters with intervals, curves with bands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.answer.answer import FoundLaw, FoundParameter, LawCurve
+from toolkit.diagnosis.policy import VERDICT
+from toolkit.effects.formula import formula
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.law.learn import Law, Laws
+    from toolkit.diagnosis.search.search import Search
+    from toolkit.effects.applied import AppliedEffect
+
+_POINTS = 41  # of a curve
+_STEP = 1e-4  # of a parameter, by which a curve's band is drawn
+
+
+def with_laws(search: Search, laws: Laws) -> Search:
+    """Return a search whose augmented simulation has its laws in it."""
+    return replace(search, augmented=laws.fit, held_augmented=laws.held_out)
+
+
+def found_laws(search: Search, laws: Laws) -> tuple[FoundLaw, ...]:
+    """Return the laws for the answer.
+
+    Parameters
+    ----------
+    search : as it was before them
+    """
+    whole = with_laws(search, laws)
+    return tuple(_found(whole, law) for law in laws.listed)
+
+
+def _found(search: Search, law: Law) -> FoundLaw:
+    trial = law.trial
+    same = (applied for applied in search.augmented.active if applied.key == law.applied.key)
+    fitted = next(same, law.applied)
+    covariance = _covariance(search, fitted)
+    reach = _quantile(search) * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    values = [fitted.values[name] for name in fitted.effect.names]
+    runs = None if fitted.runs is None else tuple(sorted(fitted.runs))
+    shaped = trial.shape.text.startswith("spline(")
+    plain = formula(fitted.effect.name.split(": ", 1)[1]).plain(fitted.channel)
+    for signal in trial.signals:
+        plain = plain.replace(signal.written.strip("[]"), signal.name) if trial.acts == "enters" else plain
+    return FoundLaw(
+        kind="state" if trial.acts == "enters" else "output",
+        channel=str(fitted.channel),
+        form=trial.form,
+        acts="multiplies" if trial.acts == "multiplies" else "adds",
+        variables=tuple(signal.name for signal in trial.signals),
+        memory_s=_memory(fitted),
+        formula=None if shaped else plain,
+        parameters=tuple(
+            FoundParameter(
+                name=name, value=value, unit=fitted.units[name], runs=runs,
+                ci95=(value - half, value + half)
+                if math.isfinite(half) and half < VERDICT.open_interval * max(abs(value), 1e-300)
+                else None,
+            )
+            for name, value, half in zip(fitted.effect.names, values, reach.tolist(), strict=True)
+        ),
+        curve=_curve(law, fitted, covariance, _quantile(search)),
+        ranges=tuple(
+            (signal.name, float(signal.values.min()), float(signal.values.max())) for signal in trial.signals
+        ),
+        resembles=law.resembles,
+        confounded_with=law.confounded,
+        held_out_log_score_gain=law.held_out_gain,
+        p_value=law.p_value,
+        share_of_gap=min(max(law.share, 0.0), 1.0),
+    )  # fmt: skip
+
+
+def _memory(fitted: AppliedEffect) -> float | None:
+    """Return how long a law remembers [s]: its time constant, or that of a vibration's decay."""
+    values = fitted.values
+    if "tau" in values:
+        return values["tau"]
+    if "damping" in values and values["damping"] > 0:
+        return 1 / (2 * math.pi * values["frequency"] * values["damping"])
+    return None
+
+
+def _covariance(search: Search, fitted: AppliedEffect) -> NDArray[np.float64]:
+    """Return the covariance of a law's parameters, in their units."""
+    augmented, at = search.augmented, len(search.problem.free)
+    if all(applied.key != fitted.key for applied in augmented.active):  # it explains, and is in no fit
+        return np.full((len(fitted.searched), len(fitted.searched)), math.nan)
+    for applied in augmented.active:
+        if applied.key == fitted.key:
+            break
+        at += len(applied.searched)
+    own = slice(at, at + len(fitted.searched))
+    return np.asarray(augmented.covariance[own, own]) / search.screen.trust(augmented.noise)
+
+
+def _quantile(search: Search) -> float:
+    from scipy.stats import t as student
+
+    n = sum(int(counted.sum()) for counted in search.problem.kept.values())
+    degrees = max(n - len(search.augmented.covariance), 1)
+    return float(student.ppf((1 + VERDICT.interval) / 2, degrees))
+
+
+def _curve(
+    law: Law, fitted: AppliedEffect, covariance: NDArray[np.float64], quantile: float
+) -> LawCurve | None:
+    """Return a law of one signal without memory over what was recorded; its band is linear in the errors."""
+    trial = law.trial
+    if len(trial.signals) != 1 or trial.form != "static":
+        return None
+    signal = trial.signals[0]
+    curve = formula(trial.shape.text.replace(signal.written, "{x}").format(x="[x]"))
+    low, high = float(signal.values.min()), float(signal.values.max())
+    x = np.linspace(low, high, _POINTS)
+
+    def at(values: dict[str, float]) -> NDArray[np.float64]:
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(curve({"x": x}, values), _POINTS).astype(float)
+
+    values = dict(fitted.values)
+    y, slopes = at(values), []
+    for name, sd in zip(fitted.effect.names, np.sqrt(np.clip(np.diag(covariance), 0, None)), strict=True):
+        step = _STEP * (abs(values[name]) or float(sd) or 1.0)
+        slopes.append((at({**values, name: values[name] + step}) - y) / step)
+    J = np.stack(slopes, axis=1)
+    half = quantile * np.sqrt(np.clip(np.einsum("ij,jk,ik->i", J, covariance, J), 0.0, None))
+    return LawCurve(
+        x=tuple(x.tolist()), y=tuple(y.tolist()), low=tuple((y - half).tolist()),
+        high=tuple((y + half).tolist()), unit=trial.unit,
+    )  # fmt: skip

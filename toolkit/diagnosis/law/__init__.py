@@ -1,0 +1,1 @@
+"""Laws: what structure without a name is answered by."""

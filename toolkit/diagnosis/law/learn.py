@@ -1,0 +1,254 @@
+"""Learning the law of what has no name: joint fits of ranked shapes, judged as effects are.
+
+Where structure stays, each law is the simplest of those that the data do not tell from the best one; it has
+to hold on rows that no fit has seen, beside nominal parameters that are refitted with it. An event belongs to
+one stretch of one run: it explains and does not predict, and no row that it has not seen can judge it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.folds import hold_out, matters
+from toolkit.diagnosis.law.trials import (
+    Trial,
+    amplitudes,
+    curve_trial,
+    p_value,
+    ranked,
+    responses,
+    terms_of,
+    trials_of,
+    unlocked_tone,
+)
+from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE, VERDICT
+from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
+from toolkit.diagnosis.search.screen import LinearisedFit, best_of
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
+from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.fit import Fit
+    from toolkit.diagnosis.fit.folds import HeldOut
+    from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.diagnosis.search.search import Search
+    from toolkit.diagnosis.search.unexplained import StructureFound
+    from toolkit.effects.applied import AppliedEffect
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Law:
+    """One law that was learned.
+
+    ``held_out_gain`` is None of an event; ``shares`` are what it takes of each output's mean square above
+    the noise, on held-out rows where it predicts; ``confounded`` are the nominal parameters that moved far
+    because of it; ``resembles`` the known effects whose responses are most like its own, with their distance.
+    """
+
+    trial: Trial
+    applied: AppliedEffect
+    p_value: float
+    held_out_gain: float | None
+    share: float
+    confounded: tuple[str, ...]
+    resembles: tuple[tuple[str, float], ...]
+
+    @property
+    def predicts(self) -> bool:
+        """Tell whether it says something of rows that nobody has recorded."""
+        return self.held_out_gain is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Laws:
+    """The laws of a search's rest: the fit with them, its held-out rows, and whether there was time."""
+
+    listed: tuple[Law, ...]
+    fit: Fit
+    held_out: HeldOut
+    complete: bool = True
+
+
+def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
+    """Return the laws of what a search left without a name.
+
+    Parameters
+    ----------
+    withdrawn : the effects that were found are not told: laws begin beside the refitted simulation
+    """
+    base, held_out = (
+        (search.refitted, search.held_refitted) if withdrawn else (search.augmented, search.held_augmented)
+    )
+    structure = search.structure_before if withdrawn and search.steps else search.structure
+    outputs = _outputs(search.problem, structure)
+    listed: list[Law] = []
+    complete = not search.skipped
+    try:
+        for turn in range(LAWS.most if complete and outputs else 0):
+            budget.check(f"laws of what has no name: {turn + 1}")
+            outcome = _next(search, base, held_out, outputs)
+            if outcome is None:
+                listed += _unlocked(search.problem, base, outputs, listed)
+                break
+            law, base, held_out = outcome
+            listed.append(law)
+    except BudgetSpentError:
+        complete = False
+    return Laws(listed=tuple(listed), fit=base, held_out=held_out, complete=complete)
+
+
+def _unlocked(problem: Problem, base: Fit, outputs: Sequence[str], before: Sequence[Law]) -> list[Law]:
+    """Return tones that hold no phase from run to run: they explain, and no fit has them in it."""
+    toned = {law.applied.channel for law in before if law.trial.form == "tone"}
+    trials = [unlocked_tone(problem, base, output) for output in outputs if output not in toned]
+    return [
+        Law(
+            trial=trial, applied=trial.applied, p_value=STRUCTURE.line, held_out_gain=None,
+            share=trial.gain, confounded=(), resembles=(),
+        )
+        for trial in trials
+        if trial is not None
+    ]  # fmt: skip
+
+
+def _outputs(problem: Problem, structure: Sequence[StructureFound]) -> tuple[str, ...]:
+    shown = {each.output for each in structure if each.is_lawful}
+    return tuple(name for name in problem.names if name in shown)
+
+
+def _next(
+    search: Search, base: Fit, held_out: HeldOut, outputs: Sequence[str]
+) -> tuple[Law, Fit, HeldOut] | None:
+    """Return the next law with the fit beside it, None where none stands."""
+    problem = search.problem
+    weight = 0.5 * math.log(sum(int(kept.sum()) for kept in problem.kept.values()))
+    screen = LinearisedFit.of(problem, base)
+    present = {applied.key for applied in base.active}
+    trials = [
+        trial
+        for trial in (*trials_of(problem, base, outputs), *terms_of(problem))
+        if trial.applied.key not in present
+    ]
+    looked = len(trials)
+    likely = [
+        trial
+        for trial in ranked(problem, base, screen, trials, weight)
+        if p_value(trial, looked) < LAWS.alpha
+    ]
+    near = [trial for trial in likely if trial.gain > STEP.far_behind * likely[0].gain]
+    fitted = _fitted(problem, base, near[: LAWS.fitted], weight)
+    if fitted and (drawn := curve_trial(problem, fitted[0][1])) is not None:
+        best = fitted[0][0] - base.log_posterior
+        curves = [
+            trial
+            for trial in ranked(problem, base, screen, [drawn], weight)
+            if 0.5 * trial.gain - weight * trial.cost > best
+        ]
+        fitted += _fitted(problem, base, curves, weight)
+    for _, trial, made in _simplest_first(fitted)[: LAWS.judged]:
+        law = _judged(search, base, held_out, trial, made, looked)
+        if law is not None:
+            return law
+    return None
+
+
+def _fitted(
+    problem: Problem, base: Fit, trials: Sequence[Trial], weight: float
+) -> list[tuple[float, Trial, Fit]]:
+    """Return joint fits with their log-posterior less their parameters' cost, the best first."""
+    fitted = []
+    for trial in trials:
+        made = joint_fit(problem, base, (trial.applied,))
+        if made is not None and not at_bound(made.active[-1]):
+            fitted.append((made.log_posterior - weight * trial.cost, trial, made))
+    return sorted(fitted, key=lambda entry: -entry[0])
+
+
+def _simplest_first(fitted: Sequence[tuple[float, Trial, Fit]]) -> list[tuple[float, Trial, Fit]]:
+    """Return fits in order, of those that the data do not tell from the best one the simplest first."""
+    best = max((score for score, _, _ in fitted), default=0.0)
+
+    def order(entry: tuple[float, Trial, Fit]) -> tuple[bool, float]:
+        score, trial, _ = entry
+        behind = score <= best - VERDICT.close
+        return behind, -score if behind else trial.cost + 1e-3 * len(trial.applied.effect.name)
+
+    return sorted(fitted, key=order)
+
+
+def _judged(
+    search: Search, base: Fit, held_out: HeldOut, trial: Trial, made: Fit, looked: int
+) -> tuple[Law, Fit, HeldOut] | None:
+    problem = search.problem
+    applied = made.active[-1]
+    gain: float | None = None
+    scores = held_out
+    if trial.form == "event":
+        share = _taken(problem, base.residual, made.residual)
+        if share < LAWS.share:
+            return None
+    else:
+        try:
+            scores = hold_out(problem, search.folds, made.active, made)
+        except FitError:
+            return None
+        gain = scores.total - held_out.total
+        if gain < STEP.least_gain or not matters(problem, held_out, scores, LAWS.share):
+            return None
+        errors = [
+            {name: problem.observed[name] - simulated[name] for name in problem.names}
+            for simulated in (held_out.simulated, scores.simulated)
+        ]
+        share = _taken(problem, *errors)
+    moved = [
+        parameter.name
+        for parameter, before, after in zip(problem.free, base.p, made.p, strict=True)
+        if parameter.sd and abs(after - before) > LAWS.moved * parameter.sd
+    ]
+    law = Law(
+        trial=trial,
+        applied=applied,
+        p_value=p_value(trial, looked),
+        held_out_gain=gain,
+        share=share,
+        confounded=tuple(moved),
+        resembles=_resembling(search, base, replace(trial, applied=applied)),
+    )
+    return law, made, scores
+
+
+def _taken(problem: Problem, before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> float:
+    """Return the largest share of an output's mean square that is gone."""
+    shares = [
+        1 - float(np.mean(after[name][kept] ** 2)) / max(float(np.mean(before[name][kept] ** 2)), 1e-300)
+        for name, kept in problem.kept.items()
+        if kept.any()
+    ]
+    return max(shares, default=0.0)
+
+
+def _resembling(search: Search, base: Fit, trial: Trial) -> tuple[tuple[str, float], ...]:
+    """Return known effects whose responses are like the law's, with what is left of it beside each."""
+    problem = search.problem
+    directions = responses(problem, base, trial)
+    if directions is None:
+        return ()
+    screen = LinearisedFit.of(problem, base)
+    amount = np.array([trial.applied.values[name] for name in amplitudes(trial.applied)])
+    law = {name: columns @ amount[:, None] for name, columns in directions.items()}
+    _, own = screen.quick(law)
+    distances: dict[str, float] = {}
+    for scored in best_of(search.scored):
+        _, block = screen.quick(scored.directions)
+        if not own.shape[1] or not block.shape[1]:
+            continue
+        distance = math.sqrt(max(0.0, 1 - float(np.sum((block.T @ own[:, 0]) ** 2))))
+        name = scored.active.effect.name
+        distances[name] = min(distance, distances.get(name, 1.0))
+    near = sorted(((d, name) for name, d in distances.items() if d < LAWS.alike))
+    return tuple((name, distance) for distance, name in near[: LAWS.resembling])

@@ -1,0 +1,147 @@
+"""A law without a name as an effect: what a diagnosis learned of structure that no effect explains.
+
+Its name is its formula and how it acts, so that a model file, a worker and a fit mean the same by it:
+``law adds: a*tanh([SA]/s)``. It acts on an output (``adds`` to it, ``multiplies`` it), or ``enters`` the
+equation of a state, where it is taken from the state's rate. Signals are in the units of the recording:
+an applied law carries the factor and zero by which its setting's SI values become those.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+
+import numpy as np
+
+from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.facts import ChannelFacts, Term, Values
+from toolkit.effects.formula import Formula, formula
+from toolkit.errors import ConfigError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.effects.signals import Setting
+
+Acts = Literal["adds", "multiplies", "enters"]
+ITSELF = "itself"
+"""The signal that is the channel or the state that a law acts on."""
+POSITION = "position"
+"""The signal, in an equation, of which the state that a law acts on is the rate."""
+_NAME = re.compile(rf"law ({'|'.join(get_args(Acts))}): (.+)", re.DOTALL)
+_POSITIVE = ("s", "w", "reach", "period", "tau", "frequency", "damping")
+
+
+def law_name(acts: Acts, text: str) -> str:
+    """Return the name of a law."""
+    return f"law {acts}: {text}"
+
+
+def is_law(name: str) -> bool:
+    """Tell whether an effect's name is that of a law."""
+    return name.startswith("law ")
+
+
+def parts_of(name: str) -> tuple[Acts, Formula]:
+    """Return how a law acts, and its formula.
+
+    Raises
+    ------
+    ConfigError
+        ``formula``: the name is none of a law, or its formula cannot be read
+    """
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise ConfigError(
+            "a law does not say how it acts", where=name[:200], got=name[:40],
+            expected=" or ".join(f"'law {acts}: ...'" for acts in get_args(Acts)),
+            next_step="take the law as a diagnosis has written it", rule="formula",
+        )  # fmt: skip
+    return cast("Acts", match[1]), formula(match[2])
+
+
+def conversion(name: str, factor: float, zero: float) -> dict[str, float]:
+    """Return the numbers of an applied law by which a signal's SI values become the recording's."""
+    return {f"factor {name}": factor, f"zero {name}": zero}
+
+
+@cache
+def law_effect(name: str) -> Effect:
+    """Return a law as an effect; its parameters have the units that are stated where it is applied.
+
+    Raises
+    ------
+    ConfigError
+        ``formula``: its formula cannot be read, or remembers where it enters an equation
+    """
+    acts, law = parts_of(name)
+    if acts == "enters" and (law.has_memory or set(law.signals) - {ITSELF, POSITION}):
+        raise ConfigError(
+            "a law cannot enter an equation", where=name[:200], got=law.plain(),
+            expected=f"a formula of [{ITSELF}] and [{POSITION}] without memory",
+            next_step="take the law as a diagnosis has written it", rule="formula",
+        )  # fmt: skip
+
+    def added(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+        with np.errstate(all="ignore"):  # what is no number is told by whoever simulates
+            change = np.asarray(law(_signals(law, y, values, setting), values, setting.t), dtype=np.float64)
+        return y * (1 + change) if acts == "multiplies" else y + change
+
+    def entering(position: Any, velocity: Any, values: Values) -> Any:
+        return law({ITSELF: velocity, POSITION: position}, values)
+
+    return Effect(
+        name=name,
+        stage="dynamics" if acts == "enters" else "acquisition",
+        rank=99,
+        in_time=law.in_time,
+        statement=_STATEMENTS[acts],
+        equation=_EQUATIONS[acts].format(law.plain("y_model" if acts != "enters" else "x")),
+        reference="learned from the recordings of its case",
+        signature="",
+        separates="",
+        parameters=tuple(_parameter(parameter) for parameter in law.parameters),
+        channel=None if acts == "enters" else added,
+        on_channel=None
+        if acts == "enters"
+        else ChannelFacts(where=("output",), tare="own", by_value=ITSELF in law.signals),
+        term=Term(of="state", force=entering) if acts == "enters" else None,
+    )
+
+
+_STATEMENTS: dict[Acts, str] = {
+    "adds": "A law without a name adds to the channel.",
+    "multiplies": "A law without a name multiplies the channel.",
+    "enters": "A law without a name is missing in the state's equation.",
+}
+_EQUATIONS: dict[Acts, str] = {
+    "adds": "y = y_model + {}", "multiplies": "y = y_model * (1 + {})", "enters": "x' = ... - ({})",
+}  # fmt: skip
+
+
+def _parameter(name: str) -> EffectParameter:
+    """Return a parameter: an amplitude by its first letter, a, else what shapes the law."""
+    amplitude = name.startswith("a")
+    return EffectParameter(
+        name=name, unit="", text="amplitude" if amplitude else "shape", typical=(1.0, 1.0),
+        off=0.0 if amplitude else None,
+        bounds=(0.0, float("inf")) if name in _POSITIVE else (-float("inf"), float("inf")),
+    )  # fmt: skip
+
+
+def _signals(
+    law: Formula, y: NDArray[np.float64], values: Values, setting: Setting
+) -> dict[str, NDArray[np.float64]]:
+    signals = {ITSELF: y, "time": setting.t}
+    for name in law.signals:
+        if name in signals:
+            continue
+        column = setting.channel(name)
+        if column is None:
+            raise ConfigError(
+                "a law needs a channel that was not recorded", where=law.plain(), got="no such channel",
+                expected=name, next_step="give inputs with that channel", rule="model-place",
+            )  # fmt: skip
+        signals[name] = (column - values.get(f"zero {name}", 0.0)) / values.get(f"factor {name}", 1.0)
+    return signals
