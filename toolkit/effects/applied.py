@@ -42,8 +42,9 @@ class EffectKey(NamedTuple):
 
     @property
     def dotted(self) -> str:
-        """Name and place, as a plan and the name of a parameter have it: ``crosstalk.FZ.FY``."""
-        return ".".join(part for part in (self.name, self.source, self.channel) if part)
+        """Name and place, as a plan and the name of a parameter have it: ``crosstalk.FZ.FY``, ``law.FY``."""
+        name = self.name.partition(" ")[0]  # a law's is followed by its formula
+        return ".".join(part for part in (name, self.source, self.channel) if part)
 
 
 class Conditioned(Protocol):

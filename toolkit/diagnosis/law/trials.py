@@ -15,8 +15,8 @@ from toolkit.diagnosis.policy import LAWS, STRUCTURE
 from toolkit.diagnosis.search.unexplained import strongest_events, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.simulator import TermPattern
+from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.catalogue import effects
 from toolkit.effects.law import ITSELF, POSITION, Acts, conversion, law_effect, law_name, parts_of
 from toolkit.errors import FitError
 from toolkit.units import unit
@@ -145,13 +145,7 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
     motion = problem.model.capability.motion
     if motion is None or not motion.integrates:
         return
-    places = {
-        str(channel): effect.term.of
-        for effect in effects().values()
-        if effect.term is not None and effect.term.of in ("velocity", "state")
-        for channel, _ in problem.model.places(effect)
-    }
-    for channel, of in places.items():
+    for channel, of in term_places(problem.model.places).items():
         sizes = motion.sizes(channel, lambda _: 1.0)
         force, speed, position = motion.units(channel)
         grid = np.linspace(-sizes.fastest, sizes.fastest, 41) if of == "velocity" else None
@@ -179,13 +173,22 @@ def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
     line = strongest_line(problem, output, base.residual[output])
     if line is None or line.p_value >= STRUCTURE.line or line.share <= STRUCTURE.line_share:
         return None
-    amplitudes_of, frequency = [], line.frequency
-    for run, rows in zip(problem.runs, problem.slices, strict=True):
-        good = problem.kept[output][rows]
-        turn = 2 * math.pi * frequency * run.t[good]
-        columns = np.stack([np.sin(turn), np.cos(turn)], axis=1)
-        found = np.linalg.lstsq(columns, base.residual[output][rows][good], rcond=None)[0]
-        amplitudes_of.append(float(np.hypot(*found)))
+    longest = max(float(np.ptp(run.t)) for run in problem.runs if run.rows)
+
+    def amplitudes_at(frequency: float) -> Array:
+        listed = []
+        for run, rows in zip(problem.runs, problem.slices, strict=True):
+            good = problem.kept[output][rows]
+            turn = 2 * math.pi * frequency * run.t[good]
+            columns = np.stack([np.sin(turn), np.cos(turn)], axis=1)
+            both = np.linalg.lstsq(columns, base.residual[output][rows][good], rcond=None)[0]
+            listed.append(float(np.hypot(*both)))
+        return np.array(listed)
+
+    # A line is as wide as a run is short: between the frequencies of a spectrum stands the true one.
+    near = line.frequency + np.linspace(-1, 1, LAWS.tones) / longest
+    frequency = float(max(near, key=lambda each: float(np.sum(amplitudes_at(each) ** 2))))
+    amplitudes_of = amplitudes_at(frequency)
     time = signals_of(problem, base, output)[-1:]
     start = {"a": float(np.mean(amplitudes_of)), "frequency": frequency, "phase": math.nan}
     return replace(_trial(problem, UNLOCKED, time, "adds", output, start), gain=line.share)
@@ -356,6 +359,8 @@ def _trial(
         key: _bracketed(signal.unit) for key, signal in zip(("x", "z"), signals, strict=False)
     }
     values: dict[str, float] = {name: start.get(name, 0.0) for name in effect.names}
+    if acts != "enters":
+        values |= conversion(ITSELF, unit(channel_unit(case, problem.model, channel)).factor, 0.0)
     for signal in signals if acts != "enters" else ():
         if any(driver.name in signal.written for driver in case.drivers):
             name = signal.written[signal.written.index("[") + 1 : signal.written.index("]")]

@@ -11,9 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.simulators.parameter_units import unit_of
+from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
 from toolkit.diagnosis.simulators.simulator import Capability, Model
 from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.law import ITSELF, is_law
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 from toolkit.simulation.case_plan import CaseParameter
@@ -151,8 +152,9 @@ def _built(
         runs=None if acting == runs else acting,
         condition=None,
         values=applied.numerics,
-        units={},
+        units=applied.units if is_law(effect.name) else {},
     )
+    _check_unit(case, model, applied)
     stated, free = [], []
     for name, parameter in zip(names, effect.parameters, strict=True):
         sense = parameter.sign_in(one.axes or case.axes)
@@ -172,6 +174,21 @@ def _built(
         )
         stated.append(_Told(name=name, parameter=parameter.name, factor=sense * scale))
     return _BuiltIn(active=active, told=tuple(stated)), free
+
+
+def _check_unit(case: Case, model: Model, applied: AppliedEffect) -> None:
+    """Refuse a law on a channel that is in another unit than the one that it was learned of."""
+    learned = applied.values.get(f"factor {ITSELF}")
+    if learned is None:
+        return
+    text = channel_unit(case, model, applied.channel)
+    if abs(unit(text).factor - learned) > 1e-12 * abs(learned):
+        raise ConfigError(
+            "a law of the model was learned of a channel in another unit",
+            where=f"{case.path}: {applied.channel}", got=text,
+            expected=f"a unit of {learned:g} in SI, as in the model's own case",
+            next_step="give the channel in the unit that it had there", rule="model-place",
+        )  # fmt: skip
 
 
 def _scale(case: Case, model: Model, active: AppliedEffect, name: str, text: str) -> float:

@@ -19,12 +19,13 @@ from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output
-from toolkit.diagnosis.simulators.states import dimensions, fitting
+from toolkit.diagnosis.simulators.states import dimensions, fitting, term_places
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.filters import STRAIGHT
+from toolkit.effects.law import is_law
 from toolkit.effects.signals import Setting
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import ConfigError, FitError
@@ -438,6 +439,8 @@ class OdeModel:
         """Return the states and outputs on which an effect could act."""
         drivers = set(self._drivers)
         if effect.term is not None:
+            if is_law(effect.name):
+                return [(state, None) for state in term_places(self.places)]
             if effect.term.of == "state":
                 return [(name, None) for i, name in enumerate(self.states) if i not in self._derivative_of]
             at = [self.states.index(name) for name in self.force_units]

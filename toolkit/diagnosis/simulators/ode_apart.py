@@ -10,9 +10,11 @@ import numpy as np
 
 from toolkit.diagnosis.simulators.channels import channel_places
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, TermPattern
+from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effect as named_effect
 from toolkit.effects.catalogue import effects
+from toolkit.effects.law import is_law
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import FitError
 
@@ -82,6 +84,8 @@ class OdeApart:
             outputs = [(output.name, output.unit) for output in self.outputs]
             drivers = [(driver.name, driver.unit) for driver in self.case.drivers]
             return channel_places(effect, outputs, drivers, {name for name, _ in drivers})
+        if is_law(effect.name):
+            return [(state, None) for state in term_places(self.places)]
         return self._places[effect.name]
 
     def _together(

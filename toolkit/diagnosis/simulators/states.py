@@ -6,17 +6,19 @@ out there, under a name that has no meaning.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.simulators.setting import dimension
+from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.simulators.simulator import Output
+    from toolkit.effects.effect import Effect
     from toolkit.effects.facts import Term
 
 _SPEEDS = frozenset({"speed", "frequency"})
@@ -45,6 +47,19 @@ def dimensions(
             if ratio and off <= 1e-9 * abs(ratio * state[at]):
                 meanings[i] = dimension(output.unit)
     return {i: meaning for i, meaning in meanings.items() if meaning not in _OPEN}
+
+
+def term_places(places: Callable[[Effect], Sequence[tuple[str | None, str | None]]]) -> dict[str, str]:
+    """Return the states whose equation a law may enter, and whether each is a velocity or another state.
+
+    They are those that some term of the catalogue may enter; ``places`` says where an effect could act.
+    """
+    return {
+        str(channel): effect.term.of
+        for effect in effects().values()
+        if effect.term is not None and effect.term.of in ("velocity", "state")
+        for channel, _ in places(effect)
+    }
 
 
 def fitting(
