@@ -78,4 +78,4 @@ def test_a_spline_goes_through_its_points_and_on_straight():
 def test_what_is_no_formula_of_a_law_is_refused(text):
     with pytest.raises(ConfigError) as caught:
         formula(text)({"x": 1.0}, {"a": 1.0})
-    assert caught.value.rule == "formula"
+    assert caught.value.rule == "law-formula"

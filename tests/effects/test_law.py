@@ -59,7 +59,7 @@ def test_an_amplitude_can_be_off_and_a_width_is_positive():
 def test_what_is_no_law_is_refused(name):
     with pytest.raises(ConfigError) as caught:
         effect(name)
-    assert caught.value.rule == "formula"
+    assert caught.value.rule == "law-formula"
 
 
 def test_a_law_without_its_channel_says_which_one_is_missing():

@@ -160,7 +160,7 @@ def formula(text: str) -> Formula:
     Raises
     ------
     ConfigError
-        ``formula``: it is none, or uses what a law cannot
+        ``law-formula``: it is none, or uses what a law cannot
     """
     if len(text) > _LONGEST:
         raise _wrong(text, f"{len(text)} characters", f"at most {_LONGEST}")
@@ -218,5 +218,5 @@ def _check(node: ast.AST, text: str) -> None:
 def _wrong(text: str, got: str, expected: str) -> ConfigError:
     return ConfigError(
         "a law's formula cannot be read", where=text[:200], got=got, expected=expected,
-        next_step="take the formula as a diagnosis has written it", rule="formula",
+        next_step="take the formula as a diagnosis has written it", rule="law-formula",
     )  # fmt: skip

@@ -49,14 +49,14 @@ def parts_of(name: str) -> tuple[Acts, Formula]:
     Raises
     ------
     ConfigError
-        ``formula``: the name is none of a law, or its formula cannot be read
+        ``law-formula``: the name is none of a law, or its formula cannot be read
     """
     match = _NAME.fullmatch(name)
     if match is None:
         raise ConfigError(
             "a law does not say how it acts", where=name[:200], got=name[:40],
             expected=" or ".join(f"'law {acts}: ...'" for acts in get_args(Acts)),
-            next_step="take the law as a diagnosis has written it", rule="formula",
+            next_step="take the law as a diagnosis has written it", rule="law-formula",
         )  # fmt: skip
     return cast("Acts", match[1]), formula(match[2])
 
@@ -73,14 +73,14 @@ def law_effect(name: str) -> Effect:
     Raises
     ------
     ConfigError
-        ``formula``: its formula cannot be read, or remembers where it enters an equation
+        ``law-formula``: its formula cannot be read, or remembers where it enters an equation
     """
     acts, law = parts_of(name)
     if acts == "enters" and (law.has_memory or set(law.signals) - {ITSELF, POSITION}):
         raise ConfigError(
             "a law cannot enter an equation", where=name[:200], got=law.plain(),
             expected=f"a formula of [{ITSELF}] and [{POSITION}] without memory",
-            next_step="take the law as a diagnosis has written it", rule="formula",
+            next_step="take the law as a diagnosis has written it", rule="law-formula",
         )  # fmt: skip
 
     def added(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:

@@ -355,9 +355,7 @@ def _trial(
     text = shape.text.format(**tokens) if "{x}" in shape.text else shape.text
     effect = law_effect(law_name(acts, text))
     y = {"adds": channel_unit(case, problem.model, channel), "multiplies": "1", "enters": force}[acts]
-    named = {"y": _bracketed(y)} | {
-        key: _bracketed(signal.unit) for key, signal in zip(("x", "z"), signals, strict=False)
-    }
+    plain = {"y": y} | {key: signal.unit for key, signal in zip(("x", "z"), signals, strict=False)}
     values: dict[str, float] = {name: start.get(name, 0.0) for name in effect.names}
     if acts != "enters":
         values |= conversion(ITSELF, unit(channel_unit(case, problem.model, channel)).factor, 0.0)
@@ -372,9 +370,17 @@ def _trial(
         shape=shape, signals=signals, acts=acts,
         applied=AppliedEffect(
             effect=effect, channel=channel, values=values,
-            units={name: reduced(shape.units[name].format(**named)) for name in effect.names},
+            units={name: _filled(shape.units[name], plain) for name in effect.names},
         ),
     )  # fmt: skip
+
+
+def _filled(template: str, units: Mapping[str, str]) -> str:
+    """Return a unit with its places filled in, in brackets where something stands around them."""
+    alone = template.strip("{}")
+    if alone in units:
+        return units[alone]
+    return reduced(template.format_map({place: _bracketed(text) for place, text in units.items()}))
 
 
 def _bracketed(text: str) -> str:

@@ -33,7 +33,7 @@ def effect(name: str, *, where: str = "--effect") -> Effect:
     Raises
     ------
     ConfigError
-        no effect has that name; ``formula``: a law cannot be read
+        no effect has that name; ``law-formula``: a law cannot be read
     """
     if is_law(name):
         return law_effect(name)
