@@ -373,7 +373,10 @@ def _with_laws(search: Search, laws: Laws, errors: tuple[HeldOutFit, ...]) -> tu
     for output in errors:
         counted = problem.kept[output.channel]
         away = (problem.observed[output.channel] - laws.held_out.simulated[output.channel])[counted]
-        told.append(replace(output, with_laws_rmse=math.sqrt(float(np.mean(away**2)))))
+        rmse = math.sqrt(float(np.mean(away**2)))
+        stated = problem.sd_of(output.channel) is not None
+        floor = output.noise_floor if stated else min(output.noise_floor, rmse)
+        told.append(replace(output, with_laws_rmse=rmse, noise_floor=floor))
     return tuple(told)
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.search import Search
 
-GREY, ORANGE, BLUE, GREEN = "#6b6b6b", "#d9822b", "#1565c0", "#2e7d32"
+GREY, ORANGE, BLUE, GREEN, VIOLET = "#6b6b6b", "#d9822b", "#1565c0", "#2e7d32", "#6a3d9a"
 _RC: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
@@ -39,23 +39,22 @@ _WIDE = 200.0  # errors over noise from which a chart goes by powers of ten
 
 
 def error_bars(diagnosis: Diagnosis) -> bytes:
-    """Return the chart of the first ten seconds: held-out error over noise, three bars an output."""
+    """Return the chart of the first ten seconds: held-out error over noise, a bar for each simulation of an output."""
     names = [one.channel for one in diagnosis.held_out]
 
     def draw(figure: Figure) -> None:
         from matplotlib.patches import Rectangle
 
         axes = figure.add_subplot()
-        steps = [("as declared", GREY), ("refitted", ORANGE), ("with the effect", BLUE)]
-        if not diagnosis.effects:
-            steps = steps[:2]
-        for i, (label, colour) in enumerate(steps):
-            values = [
-                (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)[i] / max(one.noise_floor, 1e-300)
-                for one in diagnosis.held_out
-            ]
-            at = np.arange(len(names)) + (i - (len(steps) - 1) / 2) * 0.26
-            bars = axes.barh(at, values, height=0.24, color=colour, label=label)
+        steps = [("as declared", GREY, "nominal_rmse"), ("refitted", ORANGE, "refitted_rmse")]
+        if diagnosis.effects:
+            steps.append(("with the effect", BLUE, "augmented_rmse"))
+        if any(one.with_laws_rmse is not None for one in diagnosis.held_out):
+            steps.append(("with the laws", VIOLET, "with_laws_rmse"))
+        for i, (label, colour, field) in enumerate(steps):
+            values = [getattr(one, field) / max(one.noise_floor, 1e-300) for one in diagnosis.held_out]
+            at = np.arange(len(names)) + (i - (len(steps) - 1) / 2) * 0.78 / len(steps)
+            bars = axes.barh(at, values, height=0.72 / len(steps), color=colour, label=label)
             axes.bar_label(
                 bars, labels=[f"{v:#.3g}".rstrip(".") for v in values], padding=4, fontsize=9, color="#333333"
             )
@@ -76,7 +75,7 @@ def error_bars(diagnosis: Diagnosis) -> bytes:
         axes.margins(x=0.12)
         axes.grid(visible=False, axis="y")
         # Above the bars: the longest of them would run through a legend inside.
-        figure.legend(loc="outside upper right", ncols=3, frameon=False)
+        figure.legend(loc="outside upper right", ncols=4, frameon=False)
 
     return draw_svg((8.6, 1.5 + 0.85 * max(len(names), 1)), draw)
 
@@ -143,7 +142,7 @@ def run_in_time(search: Search, channel: str, *, after: bool, laws: Laws | None 
         if after:
             fits.append(("with the effect", BLUE, search.augmented))
         if laws is not None and laws.listed:
-            fits.append(("with the laws", GREEN if after else BLUE, laws.fit))
+            fits.append(("with the laws", VIOLET, laws.fit))
         for label, colour, fit in fits:
             upper.plot(*drawn(t, fit.simulated[channel][rows]), color=colour, linewidth=1.2, label=label)
             lower.plot(*drawn(t, fit.residual[channel][rows]), color=colour, linewidth=0.8)
@@ -179,8 +178,8 @@ def law_curve(law: FoundLaw) -> bytes | None:
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
-        axes.fill_between(curve.x, curve.low, curve.high, color=BLUE, alpha=0.25, linewidth=0, label="95 %")
-        axes.plot(curve.x, curve.y, color=BLUE, linewidth=1.4, label=law.formula or "curve")
+        axes.fill_between(curve.x, curve.low, curve.high, color=VIOLET, alpha=0.25, linewidth=0, label="95 %")
+        axes.plot(curve.x, curve.y, color=VIOLET, linewidth=1.4, label=law.formula or "curve")
         axes.axhline(0, color="#333333", linewidth=0.8)
         axes.set_xlabel(law.variables[0])
         what = "factor less one" if law.acts == "multiplies" else f"added [{curve.unit}]"

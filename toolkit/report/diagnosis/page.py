@@ -149,6 +149,9 @@ def _lead(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """Return what stands under the headline: pairs of an effect's name, or none, and a statement."""
     if diagnosis.effects:
         return [(_name(effect), effect.statement) for effect in diagnosis.effects]
+    if diagnosis.verdict == "unknown" and diagnosis.laws:
+        share = f"{100 * diagnosis.laws[0].share_of_gap:.0f} %"
+        return [("", f"It takes {share} of what was left; it is a description, and no known effect's name.")]
     if diagnosis.verdict == "unknown":
         parts = [over(channel, names) for channel, names in diagnosis.depends_on[:3]]
         return [("", f"What remains: {'; '.join(parts)}.")]
