@@ -39,7 +39,7 @@ _WIDE = 200.0  # errors over noise from which a chart goes by powers of ten
 
 
 def error_bars(diagnosis: Diagnosis) -> bytes:
-    """Return the chart of the first ten seconds: held-out error over noise, a bar for each simulation of an output."""
+    """Return the chart of the first ten seconds: held-out error over noise, a bar for each simulation."""
     names = [one.channel for one in diagnosis.held_out]
 
     def draw(figure: Figure) -> None:
