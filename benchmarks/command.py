@@ -20,7 +20,7 @@ def answer_of(case: Path, out: Path, *, budget_s: float) -> tuple[dict[str, Any]
     ------
     ToolkitError : where the command ends with an error
     """
-    command = [str(Path(sys.executable).with_name("toolkit")), "diagnose", str(case), "--out", str(out)]
+    command = [sys.executable, "-m", "toolkit", "diagnose", str(case), "--out", str(out)]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     run = subprocess.run(
         [*command, "--budget", str(budget_s), "--quiet"],

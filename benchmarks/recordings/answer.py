@@ -29,6 +29,7 @@ class Answer:
     errors: str = ""
     processor_s: float = 0.0
     remark: str = ""
+    laws: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """Return the answer as a JSON-ready dict."""
@@ -80,12 +81,21 @@ def diagnose(recording: Recording, runs: Sequence[Run], folder: Path, *, budget_
         recording=recording.name, outcome=outcome(recording, document["verdict"], effects),
         verdict=document["verdict"], effects=effects, remaining=document["remaining"],
         complete=bool(document["complete"]), processor_s=processor_s,
+        laws=tuple(_law(law) for law in document["laws"]),
         errors="; ".join(_errors(row) for row in document["fit"]["held_out"]),
     )  # fmt: skip
+
+
+def _law(law: dict[str, Any]) -> str:
+    """Return a law in one line: where, what, and the share that it takes."""
+    what = law["formula"] or f"a curve of {' and '.join(law['variables'])}"
+    share = 100 * law["evidence"]["share_of_gap"]
+    return f"{law['place']['channel']} {law['acts']} {what}: {share:.0f} %"
 
 
 def _errors(row: dict[str, Any]) -> str:
     """Return the three errors of an output on held-out rows, with its floor of noise."""
     keys = ("nominal_rmse", "refitted_rmse", "augmented_rmse", "noise_floor")
     nominal, refitted, augmented, floor = ("-" if row.get(k) is None else f"{row[k]:.3g}" for k in keys)
-    return f"{nominal}, {refitted}, {augmented} ({floor}) {row['unit']}"
+    lawful = "" if row.get("with_laws_rmse") is None else f", with laws {row['with_laws_rmse']:.3g}"
+    return f"{nominal}, {refitted}, {augmented}{lawful} ({floor}) {row['unit']}"
