@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.by_hand import Beside, Sized
+    from toolkit.diagnosis.by_hand import Beside, Sized, Trial
     from toolkit.lab.holdings import Holdings
     from toolkit.simulation.model_file import ModelFile
 
@@ -128,6 +128,11 @@ def trial_answer(sizable: SizableModel, sized: Sequence[Sized], home: Path) -> d
         sizable.model, sizable.case, sized, machine_registry(sizable.model.kind, None, home),
         budget_s=TRIAL_S, limits=worker_limits(isolated=True),
     )  # fmt: skip
+    return shown_trial(trial)
+
+
+def shown_trial(trial: Trial) -> dict[str, Any]:
+    """Return a trial as a page shows it: ``rmse`` by output with its unit, ``charts``: title, view, chart."""
     units = {row.output: row.unit for row in trial.beside}
     return {
         "rmse": [

@@ -75,12 +75,12 @@ def hand_in_template(home: Path, files: Sequence[tuple[str, bytes]], *, replace:
     from toolkit.report.style import read_style, style_file
     from toolkit.report.word.package import read_template
 
-    contents = _named(files, "one .docx or .dotx, and a .toml of the same name where it has a style")
+    contents = named_files(files, "one .docx or .dotx, and a .toml of the same name where it has a style")
     templates = [name for name in contents if name.lower().endswith(WORD)]
     style = [name for name in contents if name.lower().endswith(".toml")]
     stems = {Path(name).stem for name in contents}
     if len(templates) != 1 or len(stems) != 1 or len(contents) != 1 + len(style):
-        raise _not_those("one template", contents, "one .docx or .dotx, and a .toml of the same name")
+        raise not_those("one template", contents, "one .docx or .dotx, and a .toml of the same name")
     (template,) = templates
     check_size(contents[template], TEMPLATE_FILE, template)
     for name in style:
@@ -115,18 +115,29 @@ def hand_in_case(home: Path, files: Sequence[tuple[str, bytes]]) -> str:
     """
     from toolkit.diagnosis.case.reader import read_case
 
-    contents = _named(files, f"{CASE} and every file that it names")
+    contents = named_files(files, f"{CASE} and every file that it names")
     settings = [name for name in contents if name.lower().endswith(".toml")]
     if CASE not in contents and len(settings) == 1:
         contents = {CASE if name in settings else name: data for name, data in contents.items()}
     if CASE not in contents:
-        raise _not_those("a case", contents, f"{CASE} and every file that it names")
+        raise not_those("a case", contents, f"{CASE} and every file that it names")
     for name, data in contents.items():
         check_size(data, SETTINGS_FILE if name == CASE else NAMED_FILE, name)
 
     def read(place: Path) -> None:
-        _check_inside(read_case(place / CASE), place, frozenset(contents))
+        check_inside(read_case(place / CASE), place, frozenset(contents))
 
+    return enter_case(home, contents, read)
+
+
+def enter_case(home: Path, contents: Mapping[str, bytes], read: Callable[[Path], None]) -> str:
+    """Put files into a new folder of cases once ``read`` took them where they are staged; return its place.
+
+    Raises
+    ------
+    OutputError
+        it cannot be made; what ``read`` raises. Nothing is kept
+    """
     folder = home / CASES
     name = claimed_folder(folder, "case")
     try:
@@ -138,7 +149,7 @@ def hand_in_case(home: Path, files: Sequence[tuple[str, bytes]]) -> str:
     return f"{CASES}/{name}"
 
 
-def _check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
+def check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
     """Refuse a case that names a file which was not handed in with it."""
     simulation = case.simulation
     machine = Path(simulation.machine) if simulation.machine.endswith(".toml") else None
@@ -151,13 +162,14 @@ def _check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
     if os.sep in simulation.calibration:
         outside.append(simulation.calibration)
     if outside:
-        raise _not_those("a whole case", outside, "files that are handed in with the case, by their names")
+        raise not_those("a whole case", outside, "files that are handed in with the case, by their names")
 
 
-def _named(files: Sequence[tuple[str, bytes]], expected: str) -> dict[str, bytes]:
+def named_files(files: Sequence[tuple[str, bytes]], expected: str) -> dict[str, bytes]:
+    """Return files by name, each of its own; a name leads to no other folder."""
     contents = dict(files)
     if len(contents) < len(files) or not all(FILE_NAME.match(name) for name in contents):
-        raise _not_those("files with names of their own", [name for name, _ in files], expected)
+        raise not_those("files with names of their own", [name for name, _ in files], expected)
     return contents
 
 
@@ -180,7 +192,8 @@ def _places_of(folder: Path, stage: Path) -> Iterator[None]:
         raise
 
 
-def _not_those(noun: str, names: Sequence[str] | Mapping[str, bytes], expected: str) -> ConfigError:
+def not_those(noun: str, names: Sequence[str] | Mapping[str, bytes], expected: str) -> ConfigError:
+    """Return the error of files that are none of what was asked for."""
     return ConfigError(
         f"the files are not {noun}", where="files", got=", ".join(names) or "no file", expected=expected,
         next_step="choose them again; nothing was written", rule="usage",
