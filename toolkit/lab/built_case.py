@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,13 +25,12 @@ from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, check_size, read_input
 from toolkit.lab.case_columns import columns_of, guessed_case
 from toolkit.lab.holdings import CASE
 from toolkit.lab.statements import Group, statement_groups, with_entry, with_statement, without_entry
-from toolkit.lab.uploads import CASES, check_inside, enter_case, named_files, not_those
+from toolkit.lab.uploads import CASES, check_inside, enter_case, leading_out, named_files, not_those
 from toolkit.publication import publication
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
 
-_LONGEST = 255  # of a name in a folder: what is longer leads nowhere
 TRIAL_S = 10.0
 """Seconds that the simulation may take for one answer while somebody waits."""
 CHANNELS, RUNS = "recording.channels", ("recording.run", "recording.predict")
@@ -211,26 +210,13 @@ def trial_of(folder: Path, home: Path) -> dict[str, Any]:
 def _keep(folder: Path, text: str) -> None:
     """Keep a text in which nothing leads to a file that is not of the case."""
     files = open_case(folder).files
-    outside = [word for word in _words(tomllib.loads(text)) if word not in files and _leads_out(folder, word)]
-    if outside:
+    if outside := leading_out(tomllib.loads(text), folder, files):
         raise not_those("of this case", outside, ", ".join(files))
     write_atomic(folder / CASE, text)
 
 
 def _entries(case: BuiltCase) -> list[str]:
     return [entry.name for group in case.groups for entry in group.statements]
-
-
-def _leads_out(folder: Path, word: str) -> bool:
-    return bool(word) and "\0" not in word and len(word) < _LONGEST and os.path.lexists(folder / word)
-
-
-def _words(value: Any) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, dict | list):
-        for each in value.values() if isinstance(value, dict) else value:
-            yield from _words(each)
 
 
 def _sized(contents: dict[str, bytes]) -> dict[str, bytes]:

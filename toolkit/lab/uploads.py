@@ -9,12 +9,12 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError, OutputError, ToolkitError
-from toolkit.files import same_file
+from toolkit.files import parse_toml, same_file
 from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, TEMPLATE_FILE, check_size
 from toolkit.lab.holdings import CASE
 from toolkit.lab.home import TEMPLATES
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
 
 CASES = "cases"
+_LONGEST = 4096  # of a path: what is longer leads nowhere
+_BY_NAME = "files that are handed in with the case, by their names"
 FILE_NAME = re.compile(r"[^\W_.][\w ().+-]{0,99}\Z")
 """A name of a file that is handed in: it begins with a letter or a digit and leads to no other folder."""
 
@@ -125,6 +127,9 @@ def hand_in_case(home: Path, files: Sequence[tuple[str, bytes]]) -> str:
         check_size(data, SETTINGS_FILE if name == CASE else NAMED_FILE, name)
 
     def read(place: Path) -> None:
+        table = parse_toml(contents[CASE], where=place / CASE)
+        if outside := leading_out(table, place, contents):
+            raise not_those("a whole case", outside, _BY_NAME)
         check_inside(read_case(place / CASE), place, frozenset(contents))
 
     return enter_case(home, contents, read)
@@ -162,7 +167,19 @@ def check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
     if os.sep in simulation.calibration:
         outside.append(simulation.calibration)
     if outside:
-        raise not_those("a whole case", outside, "files that are handed in with the case, by their names")
+        raise not_those("a whole case", outside, _BY_NAME)
+
+
+def leading_out(table: Any, folder: Path, names: Collection[str]) -> list[str]:
+    """Return the texts of a file that lead from a folder to what is there but is none of its named files.
+
+    Whatever an entry means by its text: none of these is opened.
+    """
+    if isinstance(table, dict | list):
+        entries = table.values() if isinstance(table, dict) else table
+        return [text for entry in entries for text in leading_out(entry, folder, names)]
+    is_text = isinstance(table, str) and table not in ("", *names) and "\0" not in table
+    return [table] if is_text and len(table) < _LONGEST and os.path.lexists(folder / table) else []
 
 
 def named_files(files: Sequence[tuple[str, bytes]], expected: str) -> dict[str, bytes]:
