@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -120,6 +121,30 @@ def test_what_is_no_case_leaves_nothing(
     assert got in str(caught.value)
     assert ".toolkit" not in str(caught.value)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_run_that_is_no_recording_is_told_by_the_reader_and_can_be_left_out(folder: Path) -> None:
+    add_files(folder, [("notes.csv", b"1,2\n3,4\n")])
+    add_entry(folder, "recording.run", "notes.csv")
+    assert open_case(folder).offers[CHANNELS] == ("L", "F")
+    with pytest.raises(ToolkitError):
+        read_whole(folder)
+    drop_entry(folder, "recording.run.2")
+    assert "notes.csv" not in open_case(folder).text
+
+
+@pytest.mark.parametrize(("text", "is_toml"), [
+    ("title = [", False), ("\x00", False), ("recording = 3\n", True),
+    ("simulation = []\nrecording.run = 1", True),
+])  # fmt: skip
+def test_a_text_that_somebody_spoiled_is_shown_where_it_is_toml(
+    folder: Path, text: str, is_toml: bool
+) -> None:  # fmt: skip
+    (folder / "case.toml").write_text(text)
+    with contextlib.nullcontext() if is_toml else pytest.raises(ToolkitError, match=r"case\.toml"):
+        assert open_case(folder).text == text
+    with pytest.raises(ToolkitError):
+        read_whole(folder)
 
 
 def test_no_file_takes_the_place_of_another(folder: Path) -> None:

@@ -6,6 +6,7 @@ What headers and units tell is guessed (`toolkit.lab.starters`); the rest is sta
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tomllib
 from collections.abc import Sequence
@@ -19,8 +20,8 @@ from toolkit.declared.describe import summary
 from toolkit.declared.kinds import FileKind
 from toolkit.declared.tables import FormsKind, TableKind
 from toolkit.diagnosis.case.case_file import CONDITIONS, CaseFile
-from toolkit.errors import ConfigError
-from toolkit.files import write_atomic
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.files import parse_toml, write_atomic
 from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, check_size, read_input
 from toolkit.lab.case_columns import columns_of, guessed_case
 from toolkit.lab.holdings import CASE
@@ -117,10 +118,12 @@ def open_case(folder: Path) -> BuiltCase:
     ------
     TrustError
         case.toml cannot be read
+    ConfigError
+        it is no TOML
     """
-    text = (
-        read_input(folder / CASE, SETTINGS_FILE).decode("utf-8-sig", errors="replace").replace("\r\n", "\n")
-    )
+    data = read_input(folder / CASE, SETTINGS_FILE)
+    parse_toml(data, where=folder / CASE)
+    text = data.decode("utf-8-sig").replace("\r\n", "\n")
     files = tuple(sorted(path.name for path in folder.iterdir() if path.is_file() and path.name != CASE))
     groups = tuple(_with_choices(group, files) for group in statement_groups(text, CaseFile))
     title = next((entry.text for group in groups[:1] for entry in group.statements), "")
@@ -128,7 +131,7 @@ def open_case(folder: Path) -> BuiltCase:
     offers = dict.fromkeys(RUNS, tuple(name for name in files if name not in stated))
     channels = [group.name for group in groups if group.name.startswith(f"{CHANNELS}.")]
     offers[CHANNELS] = tuple(
-        name for name in columns_of(folder, _recordings(text)) if f"{CHANNELS}.{name}" not in channels
+        name for name in _columns(folder, groups, files) if f"{CHANNELS}.{name}" not in channels
     )
     return BuiltCase(text=text, title=title, groups=groups, files=files, offers=offers)
 
@@ -157,7 +160,7 @@ def add_entry(folder: Path, name: str, key: str) -> None:
     case = open_case(folder)
     value: Any = {} if name == "simulation.parameters" else ""
     if name == CHANNELS:
-        unit = columns_of(folder, _recordings(case.text)).get(key)
+        unit = _columns(folder, case.groups, case.files).get(key)
         value = {"unit": unit} if unit else {}
     elif name in RUNS:
         value = {"file": key}
@@ -239,10 +242,15 @@ def _own_file(kind: str, names: Sequence[str]) -> dict[str, str]:
     return {keys[0]: names[0]} if len(keys) == len(names) == 1 else {}
 
 
-def _recordings(text: str) -> list[str]:
-    recording = tomllib.loads(text).get("recording", {})
-    runs = [run for key in ("run", "predict") for run in recording.get(key, ())]
-    return [run["file"] for run in runs if isinstance(run.get("file"), str)]
+def _columns(case_folder: Path, groups: Sequence[Group], files: Sequence[str]) -> dict[str, str | None]:
+    """Return the columns of the recordings that a case names; who reads it whole tells of a bad one."""
+    columns: dict[str, str | None] = {}
+    for group in groups:
+        for entry in group.statements:
+            if group.name.startswith(RUNS) and entry.key == "file" and entry.text in files:
+                with contextlib.suppress(ToolkitError):
+                    columns = columns_of(case_folder, [entry.text]) | columns
+    return columns
 
 
 def _with_choices(group: Group, files: tuple[str, ...]) -> Group:
