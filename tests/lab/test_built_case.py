@@ -22,6 +22,7 @@ from toolkit.lab.built_case import (
     read_whole,
     state_entry,
 )
+from toolkit.lab.laboratory import example
 
 FILES = dict(CASE_FILES)
 RECORDINGS = [(name, FILES[name]) for name in ("r0.csv", "r1.csv")]
@@ -86,6 +87,18 @@ def test_the_recordings_of_the_machine_have_its_channels(tmp_path: Path) -> None
     assert {name: roles[name] for name in ("t", "SA", "FZ", "D51", "D52", "E5")} == {
         "t": "time", "SA": "input", "FZ": "input", "D51": "output", "D52": "output", "E5": "output",
     }  # fmt: skip
+
+
+def test_a_workbook_of_the_machine_is_a_case_without_a_word_typed(tmp_path: Path) -> None:
+    recording = Path(example("fig4_4"))
+    folder = tmp_path / begin_case(tmp_path, "machine", [(recording.name, recording.read_bytes())], [])
+    case = read_whole(folder)
+    # What the rig computed is none of the simulation's; the units are those of the machine's definition.
+    assert {channel.name: (channel.unit, channel.role) for channel in case.channels} == {
+        "FZ": ("lbf", "input"), "SA": ("deg", "input"), "D51": ("lbf", "output"), "D52": ("lbf", "output"),
+        "E5": ("lbf", "output"),
+    }  # fmt: skip
+    assert case.runs[0].own
 
 
 def test_another_kind_of_simulation_has_its_own_entries(folder: Path) -> None:

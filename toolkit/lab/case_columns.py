@@ -24,27 +24,32 @@ _MEASUREMENTS = ("tdms", "mdf", "mat", "hdf5", "lvm")
 
 def guessed_case(folder: Path, names: Sequence[str], kind: str) -> dict[str, Any]:
     """Return the entries of a case of some recordings, as far as their headers tell."""
-    columns = [(name, name, unit) for name, unit in columns_of(folder, names).items()]
-    guess = guess_case(names[0], columns).values
+    columns = columns_of(folder, names)
+    guess = guess_case(names[0], [(name, name, unit) for name, unit in columns.items()]).values
     simulation: dict[str, Any] = {"kind": kind}
     if guess.get("simulation", {}).get("kind") == kind:
         simulation = guess["simulation"]
-    recording = {"channels": {}} | guess["recording"] | {"run": [{"file": name} for name in names]}
+    channels = guess["recording"].get("channels", {})
     if kind == "machine":
-        recording["channels"] |= _own_channels(columns_of(folder, names))
+        channels = _with_own_channels(channels, columns)
+    recording = {"channels": channels, "run": [{"file": name} for name in names]}
     return {"schema": 1, "title": Path(names[0]).stem, "simulation": simulation, "recording": recording}
 
 
-def _own_channels(columns: Mapping[str, str | None]) -> dict[str, dict[str, str]]:
-    """Return the channels that the standard machine's own recordings have, by symbol."""
+def _with_own_channels(
+    channels: Mapping[str, dict[str, str]], columns: Mapping[str, str | None]
+) -> dict[str, dict[str, str]]:
+    """Return channels with those of the standard machine's own recordings, by symbol, in their places."""
     from toolkit.machine import load_machine
 
-    return {
+    own = load_machine(_MACHINE).columns
+    names = {name for column in own for name in (column.header, column.symbol)}
+    return {name: entries for name, entries in channels.items() if name not in names} | {
         column.symbol: {
             "unit": columns.get(column.symbol) or columns.get(column.header) or column.unit,
             "role": _ROLES[column.role],
         }
-        for column in load_machine(_MACHINE).columns
+        for column in own
         if column.role in _ROLES and (column.header in columns or column.symbol in columns)
     }
 
