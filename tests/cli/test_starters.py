@@ -12,6 +12,7 @@ import pytest
 
 from toolkit.cli.main import run
 from toolkit.declared import read
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import ConfigError
 from toolkit.lab.starters import FORMS, form_of
 from toolkit.machine import load_machine
@@ -176,6 +177,27 @@ def test_a_case_shows_every_kind_of_simulation_and_the_chosen_one_alone(
     assert '#path = "sim.py"   # FILL IN' in text
     assert "#states = " in text
     assert "function" not in text
+
+
+def test_a_case_of_a_recording_names_its_channels_and_leaves_open_what_no_header_tells(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "".join(f"{i},{i % 5},3000,{-900 * (i % 5)},{-890 * (i % 5)},7\n" for i in range(40))
+    (folder / "r.csv").write_text(f"Time [s],SA [deg],FZ [N],FY [N],FY_sim,x\n{rows}")
+    code, told = answered(capsys, "case", "new", "c.toml", "--from", "r.csv")
+    assert (code, told["open"], told["not_guessed"]) == (0, [], ["x: what it is to the simulation"])
+    channels = {channel.name: (channel.unit, channel.role) for channel in read_case(Path("c.toml")).channels}
+    assert channels == {
+        "Time": ("s", "time"), "SA": ("deg", "input"), "FZ": ("N", "input"), "FY": ("N", "output"),
+    }  # fmt: skip
+    assert told["guessed"]["simulation"] == {"kind": "columns", "simulated": {"FY": "FY_sim"}}
+    # What somebody states goes before a guess, which is then none.
+    _, told = answered(capsys, "case", "new", "p.toml", "--from", "r.csv", "--set", "simulation.kind=python")
+    assert (set(told["guessed"]), told["open"]) == ({"recording"}, ["simulation.path"])
+    # A channel without a unit is one: its unit is asked for.
+    (folder / "bare.csv").write_text("t,FY\n0,1\n")
+    _, told = answered(capsys, "case", "new", "b.toml", "--from", "bare.csv", "--set", "simulation.kind=ode")
+    assert {"recording.channels.t.unit", "recording.channels.FY.unit"} <= set(told["open"])
 
 
 def test_a_plan_is_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

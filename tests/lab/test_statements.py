@@ -6,6 +6,7 @@ import tomllib
 
 import pytest
 
+from toolkit.calibration.session.session_file import SessionFile
 from toolkit.errors import ConfigError
 from toolkit.lab.statements import Statement, statement_groups, with_statement
 
@@ -33,7 +34,7 @@ indications = { S1 = { value = 1, unit = "mV/V" }, S2 = { value = 2, unit = "mV/
 
 
 def statements(session: str = SESSION) -> dict[str, Statement]:
-    return {each.name: each for group in statement_groups(session) for each in group.statements}
+    return {each.name: each for group in statement_groups(session, SessionFile) for each in group.statements}
 
 
 def test_every_entry_is_a_field_with_what_the_declaration_says() -> None:
@@ -49,7 +50,7 @@ def test_every_entry_is_a_field_with_what_the_declaration_says() -> None:
     assert found["cells.S2.serial"].text == ""
     assert found["reference.uncertainty.FY.k"].help == "coverage factor"
     assert found["polarity.0.load"].text == "FY"
-    assert [group.title for group in statement_groups(SESSION)][-4:] == [
+    assert [group.title for group in statement_groups(SESSION, SessionFile)][-4:] == [
         "polarity 1", "polarity 2", "certificate", "standard",
     ]  # fmt: skip
     assert found["certificate.country"].expected == 'an ISO 3166-1 code, such as "US"'
@@ -70,7 +71,7 @@ def test_every_entry_is_a_field_with_what_the_declaration_says() -> None:
     ],
 )  # fmt: skip
 def test_a_change_is_in_its_own_line_and_nothing_else_changes(name: str, typed: str, line: str) -> None:
-    after = with_statement(SESSION, name, typed)
+    after = with_statement(SESSION, SessionFile, name, typed)
     assert line in after.splitlines()
     before_lines, after_lines = set(SESSION.splitlines()), set(after.splitlines())
     assert len(before_lines - after_lines) <= 1
@@ -82,29 +83,29 @@ def test_a_change_is_in_its_own_line_and_nothing_else_changes(name: str, typed: 
 
 
 def test_an_empty_field_leaves_the_entry_out() -> None:
-    after = with_statement(SESSION, "degree", " ")
+    after = with_statement(SESSION, SessionFile, "degree", " ")
     assert after == SESSION.replace("degree = 3\n", "")
-    assert with_statement(after, "degree", "") == after
+    assert with_statement(after, SessionFile, "degree", "") == after
 
 
 def test_an_entry_of_several_lines_is_changed_as_a_whole() -> None:
     text = SESSION.replace('["S1", "S2"]', '[\n  "S1",\n  "S2",\n]')
-    after = with_statement(text, "indications", "S1, S2, S3")
+    after = with_statement(text, SessionFile, "indications", "S1, S2, S3")
     assert tomllib.loads(after) == tomllib.loads(SESSION) | {"indications": ["S1", "S2", "S3"]}
 
 
 def test_a_session_that_is_no_toml_has_no_fields_and_none_is_changed() -> None:
-    assert statement_groups("a = [") == ()
+    assert statement_groups("a = [", SessionFile) == ()
     for session, name in (("a = [", "operator"), (SESSION, "cells.S9.serial"), (SESSION, "__class__")):
         with pytest.raises(ConfigError) as caught:
-            with_statement(session, name, "x")
+            with_statement(session, SessionFile, name, "x")
         assert caught.value.where == name
 
 
 @pytest.mark.parametrize("typed", ['"', "'''", "x\n[cells]", "{ a = ", "\\", "\x00", "1e999", "nan"])
 def test_whatever_is_typed_stays_in_its_entry(typed: str) -> None:
     for name in ("operator", "degree", "cells.S1.resolution", "loads"):
-        after = tomllib.loads(with_statement(SESSION, name, typed))
+        after = tomllib.loads(with_statement(SESSION, SessionFile, name, typed))
         known = tomllib.loads(SESSION)
         key = name.partition(".")[0]
         assert {k: v for k, v in after.items() if k != key} == {k: v for k, v in known.items() if k != key}

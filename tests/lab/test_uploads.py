@@ -104,6 +104,11 @@ def test_a_case_reads_no_file_that_was_not_handed_in(tmp_path: Path) -> None:
     with pytest.raises(ToolkitError, match="not a whole case") as caught:
         hand_in_case(home, changed("case.toml", outside(tmp_path)))
     assert "secret.csv" in str(caught.value.got)
+    # It is refused before it is opened: not a cell of it is told.
+    (tmp_path / "secret.csv").write_text("L,F\n1,hunter2\n")
+    secret = TOML.replace('"r1.csv"', f'"{tmp_path}/secret.csv"').encode()
+    with pytest.raises(ToolkitError, match="not a whole case"):
+        hand_in_case(home, changed("case.toml", secret))
     sim = TOML.replace('"sim.py"', '"../../../sim.py"').encode()
     (tmp_path / "sim.py").write_text(SIMULATOR)
     with pytest.raises(ToolkitError):

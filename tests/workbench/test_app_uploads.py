@@ -64,5 +64,6 @@ def test_a_case_comes_from_this_computer_alone(bench: Served) -> None:
     bench.cookie = f"toolkit={keys.cookie}"
     assert "case.toml and every file" not in bench.page("/diagnoses").body
     assert sent(bench, "/diagnoses", CASE).status == 404
+    assert bench.upload("/case", [("recordings", *CASE[2])], kind="columns").status == 404
     assert sent(bench, "/templates", [("own.docx", ORG)]).status == 303
     assert not (bench.home / "cases").exists()

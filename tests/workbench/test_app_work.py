@@ -69,6 +69,11 @@ def test_make_a_report_from_an_own_template(browser: BrowserContext, bench: Serv
     own = page.locator(f"[data-template='{holding_id('report_templates/own.docx')}']")
     settled(page)
     expect(own.locator("[data-rule=unknown-tag]").first).to_contain_text("report.titel")
+    # Its pages carry the number of each finding where it stands.
+    own.get_by_role("button", name="See its pages").click()
+    expect(own.locator("[data-page] .mark-number").first).to_be_visible(timeout=60_000)
+    expect(own.locator("[data-page='1'] figcaption")).to_contain_text("unknown-tag")
+    page.wait_for_load_state("networkidle")
     photographed(page, "templates")
     looked_at(page, "templates")
     # Mended, it takes the place of the first one, with consent.

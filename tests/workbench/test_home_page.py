@@ -50,7 +50,7 @@ def test_the_agenda_counts_what_the_commands_answer(
     part = served.page("/agenda/due")
     overdue = [row for row in due["instruments"] if row["overdue"]]
     assert part.data(count="due") == [str(len(overdue))] == ["1"]
-    assert part.data(instrument="cell") == [str(-overdue[0]["days_left"])]
+    assert part.data(instrument="cell") == [str(overdue[0]["days_left"])]
 
     chart = command(capsys, "calibration", "chart", "cell", "--home", served.home)
     part = served.page("/agenda/drift")

@@ -34,7 +34,9 @@ def test_the_page_has_the_effects_of_the_answer_and_the_simulation_answers(answe
         body = bench.page(PAGE).body
         form = fields(body)
         values = {row["name"]: row["value"] for row in answer["effects"][0]["parameters"]}
-        assert {float(text) for name, text in form.items() if name.startswith("size")} == set(values.values())
+        # Each field shows what the interval supports; the value itself stays, to its last digit.
+        assert {float(text) for text in re.findall(r'data-fitted="([^"]+)"', body)} == set(values.values())
+        assert all(len(text) <= 9 for name, text in form.items() if name.startswith("size"))
         for text in answer["next_measurements"]:
             assert text.partition("'")[0] in body
         whole = bench.send(f"{PAGE}/try", form)
@@ -67,6 +69,11 @@ def test_what_is_kept_can_be_simulated_and_sized_again(answered: Path) -> None:
         assert 'data-kept="models/model-1/model.toml"' in bench.page(f"{PAGE}?kept=model-1/model.toml").body
         for hostile in ("model-2/model.toml", "../calibrations", "model-1/model.toml%0A<b>"):
             assert "data-kept" not in bench.page(f"{PAGE}?kept={hostile}").body
+        untouched = bench.send(f"{PAGE}/keep", form).headers["location"].rpartition("kept=")[2]
+    fitted = read_model(answered / "diagnoses" / "cases" / "cell" / "model.toml")
+    whole = read_model(answered / "models" / untouched)
+    assert (whole.verdict, whole.effects[0].applied.values) == ("named", fitted.effects[0].applied.values)
+    shutil.rmtree((answered / "models" / untouched).parent)
     model = read_model(answered / "models" / "model-1" / "model.toml")
     assert (model.verdict, model.effects[0].applied.values[size.split("-")[2]]) == ("by hand", 1e-6)
 

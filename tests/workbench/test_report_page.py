@@ -41,13 +41,31 @@ def previewed(bench: Served) -> None:
     assert f"/test/{TEST}/report" in page.body
 
 
-def picture(bench: Served, number: int) -> tuple[int, str | None, bytes]:
+def picture(
+    bench: Served, number: int, address: str = f"/test/{TEST}/report"
+) -> tuple[int, str | None, bytes]:
     connection = http.client.HTTPConnection("127.0.0.1", bench.port, timeout=60)
     with contextlib.closing(connection):
         headers = {"Host": bench.guard.authority, "Cookie": bench.cookie}
-        connection.request("GET", f"{bench.place}/test/{TEST}/report/page/{number}.png", headers=headers)
+        connection.request("GET", f"{bench.place}{address}/page/{number}.png", headers=headers)
         answer = connection.getresponse()
         return answer.status, answer.headers["content-type"], answer.read()[:6]
+
+
+def test_a_template_is_seen_page_by_page_and_only_those_of_the_home(home: Path) -> None:
+    with serving(home) as bench:
+        pages = bench.page(f"/template/{ORG}/pages")
+        count = pages.body.count("data-page=")
+        assert (pages.status, count > 1) == (200, True)
+        assert picture(bench, count, f"/template/{ORG}")[:2] == (200, "image/png")
+        assert picture(bench, count + 9, f"/template/{ORG}")[0] == 400
+        # It is printed once: what is there is shown again.
+        (printed,) = (home / "jobs" / "templates").iterdir()
+        before = printed.stat().st_mtime_ns
+        assert bench.page(f"/template/{ORG}/pages").body == pages.body
+        assert printed.stat().st_mtime_ns == before
+        assert bench.page(f"/template/{TEST}/pages").status == 404
+        assert picture(bench, 1, f"/template/{TEST}")[0] == 404
 
 
 def test_a_report_is_seen_with_its_holes_before_it_is_issued(home: Path) -> None:

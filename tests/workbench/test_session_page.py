@@ -15,6 +15,7 @@ from tests.workbench.conftest import Answer, Served, plain
 from tests.workbench.test_signing_page import People, people
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import run as run_toolkit
+from toolkit.errors import ConfigError
 from toolkit.lab.drafts import open_draft
 
 __all__ = ["people"]
@@ -323,3 +324,9 @@ def test_a_statement_is_changed_in_its_field(own: Served, tmp_path: Path) -> Non
         assert (refused.status, "cannot be changed" in refused.body) == (400, True)
     own.send(f"/session/{draft}/state", content | {"session": "a = [", **stated}, HX_Request="true")
     assert open_draft(own.home, draft).session == content["session"]
+
+
+def test_a_draft_that_was_entered_while_it_was_tried_is_told_as_gone(tmp_path: Path) -> None:
+    # A rehearsal that ends after the entry has nothing to show; it is no bug of the program.
+    with pytest.raises(ConfigError, match="no longer there"):
+        open_draft(tmp_path, "draft-1")

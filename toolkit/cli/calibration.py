@@ -72,6 +72,9 @@ def list_records(
 def show(
     record_id: Id,
     known_at: KnownAt = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="Also what an approval meets: gates, responses in SI, as found.")
+    ] = False,
     calibrations: Calibrations = None,
     home: Home = None,
     as_json: Json = False,
@@ -81,9 +84,14 @@ def show(
 
     Example: toolkit calibration show m15-r2
     """
+    from toolkit.lab.gates_answer import full_record
     from toolkit.lab.registry_answer import shown
 
-    payload, text = shown(_registry(calibrations, home), record_id, known_at=_day(known_at, "--known-at"))
+    registry = _registry(calibrations, home)
+    payload, text = shown(registry, record_id, known_at=_day(known_at, "--known-at"))
+    if full:
+        more, lines = full_record(registry, record_id)
+        payload, text = {**payload, **more}, f"{text}\n\n{lines}"
     answer(payload, text, as_json=as_json, quiet=quiet)
     return 0
 

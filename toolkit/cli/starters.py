@@ -83,14 +83,14 @@ def new_test(
 @case.command(NEW)
 @answers("toolkit.lab.installation_answer_types:StarterAnswer")
 def new_case(
-    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
-    quiet: Quiet = False,
+    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
+    json: Json = False, quiet: Quiet = False,
 ) -> int:  # fmt: skip
-    """Begin a case: a simulation and the recordings that it is held against.
+    """Begin a case: a simulation and the recordings that it is held against; --from takes the channels.
 
-    Example: toolkit case new CASE.toml
+    Example: toolkit case new CASE.toml --from run_01.csv --set simulation.kind=machine
     """
-    return _begin("case", file, entries, None, ask=ask, json=json, quiet=quiet)
+    return _begin("case", file, entries, recording, ask=ask, json=json, quiet=quiet)
 
 
 @answers("toolkit.lab.installation_answer_types:StarterAnswer")

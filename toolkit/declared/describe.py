@@ -24,7 +24,7 @@ def starter(cls: type) -> str:
     space, so that an editor can switch one on by taking the sign away).
     """
     form, kind = form_of(cls) or Format(), table_of(cls)
-    lines = [*_comment(f"{form.title[0].upper()}{form.title[1:]}: {_summary(cls)}"), ""]
+    lines = [*_comment(f"{form.title[0].upper()}{form.title[1:]}: {summary(cls)}"), ""]
     if form.schema is not None:
         lines += [f"{'' if form.schema_required else '#'}schema = {form.schema}", ""]
     lines += _starter_table(kind, (), on=True)
@@ -91,7 +91,8 @@ def _comment(text: str) -> list[str]:
     return [f"# {line}" for line in textwrap.wrap(text, _WIDTH)]
 
 
-def _summary(cls: type) -> str:
+def summary(cls: type) -> str:
+    """Return what a declared class says of itself, the first paragraph in one line."""
     text = inspect.getdoc(cls) or cls.__name__
     return " ".join(text.split("\n\n")[0].split())
 
@@ -105,7 +106,7 @@ def reference(cls: type) -> str:
         lines += [f"`schema = {form.schema}` at the top: {needed}.", ""]
     for number, (header, kind) in enumerate(_sections(table_of(cls), "", set())):
         lines += [f"## `{header}`", ""] if number else []
-        lines += [_summary(kind.cls), ""]
+        lines += [summary(kind.cls), ""]
         lines += ["| entry | holds | default | meaning |", "|---|---|---|---|"]
         lines += [_reference_row(declared) for declared in kind.fields]
         units: dict[str, list[Field]] = {}
@@ -167,7 +168,7 @@ def json_schema(cls: type) -> dict[str, Any]:
 def _define(kind: TableKind, definitions: dict[str, Any]) -> None:
     if kind.definition in definitions:
         return
-    schema: dict[str, Any] = {"type": "object", "description": _summary(kind.cls)}
+    schema: dict[str, Any] = {"type": "object", "description": summary(kind.cls)}
     definitions[kind.definition] = schema
     properties: dict[str, Any] = {}
     if kind.form_of is not None and kind.form_of.schema is not None:

@@ -16,7 +16,7 @@ from toolkit.declared.describe import (
     _inner_table,
     _sentence,
     _starter_table,
-    _summary,
+    summary,
 )
 from toolkit.declared.lists import KeyedKind, ListKind
 from toolkit.declared.marks import Format
@@ -37,7 +37,7 @@ def outline(cls: type, values: Mapping[str, Any], notes: Notes | None = None) ->
     notes : what stands beside an entry, such as where its value was found
     """
     form, kind = form_of(cls) or Format(), table_of(cls)
-    lines = [*_comment(f"{form.title[0].upper()}{form.title[1:]}: {_summary(cls)}"), "#"]
+    lines = [*_comment(f"{form.title[0].upper()}{form.title[1:]}: {summary(cls)}"), "#"]
     lines += [*_comment("Take the sign # away from an entry to state it; FILL IN marks what must be stated.")]
     lines += ["", *([] if form.schema is None else [f"schema = {form.schema}", ""])]
     lines += _entries(kind, (), values, notes or {})
@@ -92,7 +92,7 @@ def _forms(
     yield f"#[{header}]" + ("   # FILL IN" if required else "")
     for at, (word, form) in enumerate(kind.tables.items()):
         chosen_by = f"{kind.tag} = {value_text(word)}"
-        yield from _comment(f"{'or' if at else 'either'} {chosen_by}: {_summary(form.cls)}")
+        yield from _comment(f"{'or' if at else 'either'} {chosen_by}: {summary(form.cls)}")
         yield f"#{chosen_by}"
         for declared in (field for field in form.fields if field.key != kind.tag):
             yield from _told(declared, {})

@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -109,13 +109,42 @@ def tried(
     _same_recordings(case, model)
     # Behind the model's own stand the corrections of its machine, which nobody sizes here.
     corrections = case.effects[len(model.effects) :]
-    effects = (*_applied(model, sized), *corrections)
-    with running(replace(case, effects=effects), limits) as code:
+    case = replace(case, effects=(*_applied(model, sized), *corrections))
+
+    def check(simulator: Model) -> None:
+        _check_sizes(simulator, case.effects, model.path)
+
+    return as_declared(case, calibrations, budget_s=budget_s, limits=limits, check=check)
+
+
+def as_declared(
+    case: Case,
+    calibrations: Path | None,
+    *,
+    budget_s: float,
+    limits: Limits | None,
+    check: Callable[[Model], None] = lambda _: None,
+) -> Trial:
+    """Return what the simulation of a case says beside its recordings, with its parameters as declared.
+
+    Parameters
+    ----------
+    calibrations, budget_s, limits : as in `tried`
+    check : judges the simulator before it runs
+
+    Raises
+    ------
+    ConfigError
+        the simulator cannot be built; what ``check`` raises
+    FitError
+        the simulation gives no usable output, or not in time
+    """
+    with running(case, limits) as code:
         if code is not None:
             code.until = time.monotonic() + budget_s
         try:
-            simulator = model_of(replace(case, effects=effects), calibrations, code)
-            _check_sizes(simulator, effects, model.path)
+            simulator = model_of(case, calibrations, code)
+            check(simulator)
             p = {parameter.name: parameter.value for parameter in simulator.parameters}
             pairs = [(run, simulator.simulate(run, p, ())) for run in case.runs]
         except LateError:

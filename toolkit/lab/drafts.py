@@ -94,7 +94,7 @@ def open_draft(home: Path, draft_id: str) -> Draft:
     Raises
     ------
     ConfigError
-        its session cannot be read
+        its session cannot be read; ``no-file``: it was entered or removed meanwhile
     """
     folder = home / DRAFTS / draft_id
     settle(folder)
@@ -102,9 +102,16 @@ def open_draft(home: Path, draft_id: str) -> Draft:
     data = read_input(folder / SESSION, SETTINGS_FILE) if os.path.lexists(folder / SESSION) else b""
     session = data.decode("utf-8-sig", errors="replace")
     names = _names(session)
-    files = sorted(
-        path.name for path in folder.iterdir() if is_regular(path) and not path.name.startswith(".")
-    )
+    try:
+        files = sorted(
+            path.name for path in folder.iterdir() if is_regular(path) and not path.name.startswith(".")
+        )
+    except FileNotFoundError:
+        raise ConfigError(
+            "the draft is no longer there", where=f"{DRAFTS}/{draft_id}", got="no such folder",
+            expected="a draft that is being typed",
+            next_step="look at the records: it was entered, or removed", rule="no-file",
+        ) from None  # fmt: skip
     return Draft(
         id=draft_id,
         session=session,

@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, cast
+
+from toolkit.lab.answers import table
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.record_answer_types import Found, FoundLoad, Gate, Judged, Response, Responses
+
+
+class FullRecord(TypedDict):
+    """What stands beside a record on its page."""
+
+    judged: Judged
+    responses: Responses
+    as_found: Found | None
+
 
 _HISTORY, _MACHINE, _CHECK = "an earlier approved record", "a machine definition", "check loads"
 GATES: dict[str, str | None] = {
@@ -30,7 +42,7 @@ GATES: dict[str, str | None] = {
 _STATES = {"blocks": "fail", "asks": "asks", "tells": "note"}
 
 
-def gates_answer(registry: Registry, record_id: str) -> dict[str, Any]:
+def gates_answer(registry: Registry, record_id: str) -> Judged:
     """Return the gates of a record as an approval meets them today, and by what its signs are confirmed.
 
     ``state`` of a gate: ``fail``, ``asks``, ``note``, ``pass``; ``not judged`` where something is missing.
@@ -54,7 +66,7 @@ def gates_answer(registry: Registry, record_id: str) -> dict[str, Any]:
         _MACHINE: machine is not None,
         _CHECK: stored_check(registry.folder, record) is not None,
     }
-    gates = [
+    gates: list[Gate] = [
         {
             "rule": result.rule,
             "state": _STATES[result.effect],
@@ -83,7 +95,7 @@ def gates_answer(registry: Registry, record_id: str) -> dict[str, Any]:
     }
 
 
-def as_found_answer(registry: Registry, record_id: str) -> dict[str, Any]:
+def as_found_answer(registry: Registry, record_id: str) -> Found:
     """Return what the record in force before a session makes of the session's rows: as found, load by load.
 
     ``phase`` is what the session states: as_found, as_left, or None.
@@ -107,11 +119,11 @@ def as_found_answer(registry: Registry, record_id: str) -> dict[str, Any]:
         "record": result.record,
         "within": result.within,
         "reason": result.reason,
-        "loads": [{**asdict(load), "within": load.within} for load in result.loads],
+        "loads": [cast("FoundLoad", {**asdict(load), "within": load.within}) for load in result.loads],
     }
 
 
-def responses_answer(registry: Registry, record_id: str) -> dict[str, Any]:
+def responses_answer(registry: Registry, record_id: str) -> Responses:
     """Return each load's response to each indication in SI, beside that of the last approved record.
 
     The responses are those that the gates of sign and span compare.
@@ -126,7 +138,7 @@ def responses_answer(registry: Registry, record_id: str) -> dict[str, Any]:
 
     record = registry.load(record_id)
     before = history_of(registry, record, registry.ledger(record.instrument), but=record.id).last
-    rows: list[dict[str, Any]] = []
+    rows: list[Response] = []
     for load in record.loads:
         old_load = None if before is None else next((o for o in before.loads if o.load == load.load), None)
         for cell in record.cells:
@@ -150,3 +162,38 @@ def responses_answer(registry: Registry, record_id: str) -> dict[str, Any]:
                 }
             )  # fmt: skip
     return {"record": record_id, "before": None if before is None else before.id, "responses": rows}
+
+
+def full_record(registry: Registry, record_id: str) -> tuple[FullRecord, str]:
+    """Return the gates, the responses and as found of a record, as JSON and as text.
+
+    Raises
+    ------
+    RecordError, RegistryError
+        a record fails a gate of its loading
+    """
+    judged, compared = gates_answer(registry, record_id), responses_answer(registry, record_id)
+    found = as_found_answer(registry, record_id) if registry.load(record_id).kind == "fit" else None
+    rows = [[gate["state"], gate["rule"], gate["where"], gate["message"]] for gate in judged["gates"]]
+    responses = [
+        [row["load"], row["indication"], _digits(row["value"]), _digits(row["before"]), row["unit"],
+         _digits(row["change_percent"])]
+        for row in compared["responses"]
+    ]  # fmt: skip
+    errors = [
+        [row["load"], _digits(row["max_error"]), _digits(row["tolerance"]), row["unit"],
+         "within" if row["within"] else "OUT"]
+        for row in (found or {"loads": []})["loads"]
+    ]  # fmt: skip
+    before = compared["before"] or "-"
+    text = "\n".join([
+        table(["gate", "rule", "where", "message"], rows, align="<<<<"), "",
+        table(["load", "indication", record_id, before, "unit", "change %"], responses, align="<<>><>"),
+        *(["", table(["as found", "largest error", "tolerance", "unit", ""], errors, align="<>><<")]
+          if errors else []),
+    ])  # fmt: skip
+    return {"judged": judged, "responses": compared, "as_found": found}, text
+
+
+def _digits(value: float | None) -> str:
+    return "-" if value is None else f"{value:.6g}"

@@ -242,11 +242,88 @@ class RecordContent(TypedDict):
     data: list[StoredFile]
 
 
+class Gate(TypedDict):
+    """A gate of an approval."""
+
+    rule: str
+    state: Annotated[str, "fail, asks, note, pass, not judged"]
+    where: str
+    message: str
+
+
+class JudgedMachine(TypedDict):
+    """A machine definition."""
+
+    name: str
+    version: int
+
+
+class Judged(TypedDict):
+    """What an approval meets today."""
+
+    id: str
+    compared_with: Annotated[str | None, "the last approved record"]
+    blocked: bool
+    gates: list[Gate]
+    evidence: Annotated[list[str], "of its signs"]
+    machine: Annotated[JudgedMachine | None, "definition that states its signs"]
+
+
+class Response(TypedDict):
+    """The response of a load to an indication."""
+
+    load: str
+    indication: str
+    unit: str
+    value: Annotated[float, "in SI"]
+    u: Annotated[float | None, "standard uncertainty"]
+    before: Annotated[float | None, "that of the last approved record"]
+    unit_before: str | None
+    change_percent: float | None
+
+
+class Responses(TypedDict):
+    """Responses in SI beside those of the last approved record."""
+
+    record: str
+    before: str | None
+    responses: list[Response]
+
+
+class FoundLoad(TypedDict):
+    """The errors of a session's rows by the record that was in force before it."""
+
+    load: str
+    unit: str
+    reference: Annotated[Sequence[float], "of each row"]
+    error: Annotated[Sequence[float], "fitted minus reference of each row"]
+    tolerance: float
+    full_scale: float
+    max_error: Annotated[float, "the largest one, with its sign"]
+    max_percent_fs: float
+    worst_row: Annotated[int, "from 1"]
+    within: bool
+
+
+class Found(TypedDict):
+    """As found."""
+
+    phase: Annotated[str | None, "as_found or as_left, where the session states it"]
+    session: Annotated[str | None, "record of the session that was judged"]
+    record: Annotated[str | None, "in force before it"]
+    within: bool | None
+    reason: Annotated[str | None, "why nothing could be compared"]
+    loads: list[FoundLoad]
+
+
 class ShowAnswer(RecordContent):
-    """One record."""
+    """One record; with --full what an approval meets."""
 
     record: RecordRow
     head: Annotated[str, "of the ledger"]
+    judged: NotRequired[Judged]
+    responses: NotRequired[Responses]
+    as_found: NotRequired[Annotated[Found | None, "null where no session stands behind the record"]]
 
 
 class Event(TypedDict):

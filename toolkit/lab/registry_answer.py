@@ -90,7 +90,8 @@ def shown(registry: Registry, record_id: str, *, known_at: dt.date | None) -> tu
     content, content_lines = _described(record, registry.folder)
     head = registry.head(record.instrument)
     lines += [f"{'ledger head':<14}{head}", *content_lines]
-    return {"record": row, "head": head, **content}, "\n".join(lines)
+    answer: ShowAnswer = {"record": row, "head": head, **content}  # type: ignore[typeddict-item]
+    return answer, "\n".join(lines)
 
 
 def history(ledger: Ledger, instrument: str, name: str) -> tuple[HistoryAnswer, str]:

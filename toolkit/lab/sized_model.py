@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
+from toolkit.estimate import plus_minus
 from toolkit.files import same_file
 from toolkit.lab.curves_answer import SAMPLES
 from toolkit.lab.holdings import CASE
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.by_hand import Beside, Sized
+    from toolkit.diagnosis.by_hand import Beside, Sized, Trial
     from toolkit.lab.holdings import Holdings
     from toolkit.simulation.model_file import ModelFile
 
@@ -38,7 +39,7 @@ class SizableModel:
 
     @property
     def effects(self) -> list[dict[str, Any]]:
-        """Each effect with its parameters: value, unit, standard error, and a step to size by."""
+        """Each effect with its parameters: value, as its field shows it, unit, standard error, and a step."""
         return [
             {
                 "label": fitted.label, "statement": fitted.applied.effect.statement,
@@ -46,6 +47,7 @@ class SizableModel:
                 "parameters": [
                     {
                         "name": name, "value": fitted.applied.values[name],
+                        "shown": _shown(fitted.applied.values[name], fitted.standard_errors.get(name)),
                         "unit": fitted.applied.units[name],
                         "standard_error": fitted.standard_errors.get(name),
                         "step": _step(fitted.applied.values[name], fitted.standard_errors.get(name)),
@@ -86,6 +88,8 @@ def sizable_model(folder: Path, holdings: Holdings) -> SizableModel | None:
 def sized_from(model: ModelFile, stated: Mapping[str, str]) -> tuple[Sized, ...]:
     """Return the effects of a model as a form states them: ``on-I``, and ``size-I-NAME`` of effect I.
 
+    A size that stands as its field showed it is the fitted one, to its last digit.
+
     Raises
     ------
     ConfigError
@@ -96,9 +100,14 @@ def sized_from(model: ModelFile, stated: Mapping[str, str]) -> tuple[Sized, ...]
     return tuple(
         Sized(
             on=stated.get(f"on-{at}") == "yes",
-            values={name: _number(stated, f"size-{at}-{name}", value) for name, value in own.values.items()},
+            values={
+                name: _number(
+                    stated, f"size-{at}-{name}", value, _shown(value, fitted.standard_errors.get(name))
+                )
+                for name, value in own.values.items()
+            },
         )
-        for at, own in enumerate(as_fitted(model))
+        for at, (own, fitted) in enumerate(zip(as_fitted(model), model.effects, strict=True))
     )
 
 
@@ -119,6 +128,11 @@ def trial_answer(sizable: SizableModel, sized: Sequence[Sized], home: Path) -> d
         sizable.model, sizable.case, sized, machine_registry(sizable.model.kind, None, home),
         budget_s=TRIAL_S, limits=worker_limits(isolated=True),
     )  # fmt: skip
+    return shown_trial(trial)
+
+
+def shown_trial(trial: Trial) -> dict[str, Any]:
+    """Return a trial as a page shows it: ``rmse`` by output with its unit, ``charts``: title, view, chart."""
     units = {row.output: row.unit for row in trial.beside}
     return {
         "rmse": [
@@ -173,10 +187,15 @@ def _step(value: float, error: float | None) -> float:
     return 10.0 ** math.floor(math.log10(size)) if size > 0 and math.isfinite(size) else 0.1
 
 
-def _number(stated: Mapping[str, str], key: str, default: float) -> float:
+def _shown(value: float, error: float | None) -> str:
+    """Return a size to the last place that its 95 % interval supports, as a field holds it."""
+    return plus_minus(value, 2 * error if error else math.nan, spec=".6g").split(" ± ")[0]
+
+
+def _number(stated: Mapping[str, str], key: str, fitted: float, shown: str) -> float:
     text = stated.get(key)
-    if text is None:
-        return default
+    if text is None or text == shown:
+        return fitted
     try:
         return float(text.strip().replace(",", "."))
     except ValueError:

@@ -10,7 +10,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -35,6 +35,8 @@ FORMS = {
 """Word of the command -> the class that declares its file."""
 
 _BOOKKEEPING = ("run", "direction", "rotation", "comment")
+_CASE_ROLES = {"t": "time", "T": "covariate"} | dict.fromkeys(("FX", "FY", "MX", "MY", "MZ"), "output")
+"""What a channel is to a simulation; the others are inputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +118,7 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
         the recording cannot be read
     """
     guess = Guess() if recording is None else guess_from(word, recording, file.parent)
+    guess = replace(guess, values={key: guess.values[key] for key in guess.values if key not in entries})
     values, cls = {**guess.values, **entries}, form_of(word)
     # What is given is judged as it was given: an unknown entry has no place in the file.
     text = outline(cls, {})
@@ -156,19 +159,19 @@ def refuse_existing(path: Path) -> None:
 
 
 def guess_from(word: str, recording: Path, folder: Path) -> Guess:
-    """Return what a recording's columns and units say of a session or machine, to stand in a folder.
+    """Return what a recording's columns and units say of a session, machine or case, to stand in a folder.
 
     Raises
     ------
     ConfigError
         ``usage``: a file of this format says nothing of columns
     """
-    guesses = {"session": _session, "machine": _machine}
+    guesses = {"session": _session, "machine": _machine, "case": guess_case}
     if word not in guesses:
         raise ConfigError(
             f"a recording says nothing of a {word}", where="--from", got=recording,
-            expected="--from beside 'session new' or 'machine new'", next_step="leave --from away",
-            rule="usage",
+            expected="--from beside 'session new', 'machine new' or 'case new'",
+            next_step="leave --from away", rule="usage",
         )  # fmt: skip
     name = os.path.relpath(recording.absolute(), folder.absolute())
     return guesses[word](Path(name).as_posix(), headers_of(recording))
@@ -246,6 +249,33 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
     note = f"guessed from {name}: FZ is the load, other forces and moments are computed by the rig"
     values = {"column": entries} if entries else {}
     return Guess(values=values, notes={"column": note} if entries else {}, silent=tuple(silent))
+
+
+def guess_case(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess:
+    """Return what the columns of a recording, as `headers_of` gives them, say of a case."""
+    units = {plain: unit for _, plain, unit in columns}
+    roles = {plain: _CASE_ROLES.get(found.symbol, "input") for plain in units if (found := channel_of(plain))}
+    channels = {
+        plain: {"unit": units[plain], "role": role} if units[plain] else {"role": role}
+        for plain, role in roles.items()
+    }
+    # Another program's output stands beside the recorded one, under a name that begins as its own.
+    others = {
+        plain: [other for other in units.keys() - roles.keys() if other.startswith(plain)]
+        for plain, role in roles.items()
+        if role == "output"
+    }
+    simulated = {plain: names[0] for plain, names in others.items() if len(names) == 1}
+    recording = ({"channels": channels} if channels else {}) | {"run": [{"file": name}]}
+    values: dict[str, Any] = {"recording": recording}
+    if simulated:
+        values["simulation"] = {"kind": "columns", "simulated": simulated}
+    unknown = units.keys() - roles.keys() - set(simulated.values())
+    return Guess(
+        values=values,
+        notes={"recording": f"guessed from {name}: forces and moments but the load are outputs"},
+        silent=tuple(f"{plain}: what it is to the simulation" for plain in units if plain in unknown),
+    )
 
 
 def _symbol(name: str) -> str:

@@ -1,7 +1,7 @@
-"""The statements of a session as fields: each entry that its format declares, with what may stand there.
+"""The statements of a settings file as fields: each entry that its format declares, and what may stand.
 
-The text of SESSION.toml stays what is kept: a field that changes is changed there, in its own line, and no
-other line of the text with it.
+The text of the file stays what is kept: a field that changes is changed there, in its own line, and no other
+line of the text with it.
 """
 
 from __future__ import annotations
@@ -11,21 +11,20 @@ import itertools
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from toolkit.declared import toml_text
 from toolkit.declared.declaration import fields_of
-from toolkit.declared.kinds import BoolKind, ChoiceKind, DateKind, NumberKind, TextKind
+from toolkit.declared.kinds import BoolKind, ChoiceKind, DateKind, FileKind, NumberKind, TextKind
 from toolkit.declared.lines import lines_of
 from toolkit.declared.lists import KeyedKind, ListKind
-from toolkit.declared.tables import TableKind
+from toolkit.declared.tables import Field, FormsKind, TableKind
 from toolkit.declared.writing import key_of, value_text
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from toolkit.declared.kinds import Kind
-    from toolkit.declared.tables import Field
 
 Place = tuple[str | int, ...]
 
@@ -35,7 +34,7 @@ class Statement:
     """One entry: ``name`` is its place, as ``cells.D51.serial``; ``text`` what stands there, for a field.
 
     ``choices`` are the words that may stand there, empty where it is no choice; ``form`` is the kind of the
-    field: text, date or number, with ``low`` and ``high`` where the declaration has such bounds.
+    field: text, file, date or number, with ``low`` and ``high`` where the declaration has such bounds.
     """
 
     name: str
@@ -53,10 +52,16 @@ class Statement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
-    """A table of the session: its name, empty for the session itself, and its entries."""
+    """A table of the file: its name, empty for the file itself, and its entries.
+
+    ``opens``: further entries may stand in it, under names that somebody chooses; ``removable``: it is such
+    an entry itself, and may be left out as a whole.
+    """
 
     name: str
     statements: tuple[Statement, ...]
+    opens: bool = False
+    removable: bool = False
 
     @property
     def title(self) -> str:
@@ -69,89 +74,184 @@ class Group:
         return any(statement.text for statement in self.statements)
 
 
-def statement_groups(session: str) -> tuple[Group, ...]:
-    """Return the entries of a session by table; none where its text is no TOML."""
-    from toolkit.calibration.session.session_file import SessionFile
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Section:
+    """A table at a place of the file: its fields and what stands there; ``forms`` where a word chose it."""
 
-    table = _parsed(session)
-    return () if table is None else tuple(_groups(fields_of(SessionFile), (), table, table))
+    place: Place = ()
+    fields: tuple[Field, ...] = ()
+    content: Mapping[str, Any]
+    opens: bool = False
+    is_list: bool = False
+    removable: bool = False
+    forms: FormsKind | None = None
 
 
-def with_statement(session: str, name: str, typed: str) -> str:
-    """Return the session's text with an entry as it was typed; an empty one is left out.
+def statement_groups(text: str, form: type) -> tuple[Group, ...]:
+    """Return the entries of a file of a declared form by table; none where its text is no TOML."""
+    table = _parsed(text)
+    return () if table is None else tuple(
+        Group(
+            name=_name(section.place), opens=section.opens, removable=section.removable,
+            statements=tuple(
+                _statement(field, (*section.place, field.key), section.content.get(field.key))
+                for field in section.fields
+            ),
+        )
+        for section in _sections(_whole(form, table), table)
+    )  # fmt: skip
+
+
+def with_statement(text: str, form: type, name: str, typed: str) -> str:
+    """Return the file's text with an entry as it was typed; an empty one is left out.
+
+    Another word for the form of a table leaves out what that form has not.
 
     Raises
     ------
     ConfigError
         ``usage``: the text is no TOML, or no entry has this name
     """
-    from toolkit.calibration.session.session_file import SessionFile
-
-    table = _parsed(session)
+    table = _parsed(text)
     if table is None:
         raise _unusable(name, "statements that are no TOML", "statements that can be read")
-    kinds = {
-        _name(place): (place, declared.kind)
-        for place, declared in _entries(fields_of(SessionFile), (), table, table)
+    entries = {
+        _name((*section.place, field.key)): (section, field)
+        for section in _sections(_whole(form, table), table)
+        for field in section.fields
     }
-    if name not in kinds:
-        raise _unusable(name, name, "an entry of a session")
-    place, kind = kinds[name]
-    value = _value(kind, typed.strip()) if typed.strip() else None
-    if value is None and place not in lines_of(session):
-        return session
+    if name not in entries:
+        raise _unusable(name, name, "an entry of the file")
+    section, field = entries[name]
+    place = (*section.place, field.key)
+    value = _value(field.kind, typed.strip()) if typed.strip() else None
+    if value is None and place not in lines_of(text):
+        return text
     target = copy.deepcopy(table)
     _put(target, place, value)
-    edited = _edited(session, place, value)
-    # Where an entry stands in several lines, or inside of another one, the whole text is written anew.
-    return edited if edited is not None and _parsed(edited) == target else toml_text(target)
+    if section.forms is not None and field.name == section.forms.tag and value in section.forms.tables:
+        chosen: dict[str, Any] = _at(target, section.place)
+        for key in chosen.keys() - set(section.forms.tables[value].keys):
+            del chosen[key]
+    return _written(text, target, place, value)
 
 
-def _groups(
-    declared: tuple[Field, ...], place: Place, table: Mapping[str, Any], whole: Mapping[str, Any]
-) -> Iterator[Group]:
-    entries = [field for field in declared if not _tables(field.kind, table.get(field.key), whole)]
-    yield Group(
-        name=_name(place),
-        statements=tuple(_statement(field, (*place, field.key), table.get(field.key)) for field in entries),
-    )
-    for field in declared:
-        below = _tables(field.kind, table.get(field.key), whole)
-        for keys, inner, content in below:
-            yield from _groups(inner.fields, (*place, field.key, *keys), content, whole)
+def with_entry(text: str, form: type, name: str, key: str, value: Any) -> str:
+    """Return the file's text with one more entry in a table that takes any name, or in a list of tables.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: no such table, or it has an entry of this name
+    """
+    section = _section(text, form, name, opens=True)
+    target = copy.deepcopy(_parsed(text) or {})
+    content = _at(target, section.place) or ()
+    if not section.is_list and (not key or key in content):
+        raise _unusable(name, key or "no name", "a name that is not there yet")
+    place = (*section.place, len(content) if section.is_list else key)
+    _put(target, place, value)
+    return _written(text, target, place, value)
 
 
-def _entries(
-    declared: tuple[Field, ...], place: Place, table: Mapping[str, Any], whole: Mapping[str, Any]
-) -> Iterator[tuple[Place, Field]]:
-    for field in declared:
-        below = _tables(field.kind, table.get(field.key), whole)
-        for keys, inner, content in below:
-            yield from _entries(inner.fields, (*place, field.key, *keys), content, whole)
-        if not below:
-            yield (*place, field.key), field
+def without_entry(text: str, form: type, name: str) -> str:
+    """Return the file's text without a table that may be left out.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: no such table
+    """
+    place = _section(text, form, name, opens=False).place
+    target = copy.deepcopy(_parsed(text) or {})
+    _put(target, place, None)
+    return _written(text, target, place, None)
 
 
-def _tables(
-    kind: Kind, value: Any, whole: Mapping[str, Any]
-) -> list[tuple[Place, TableKind, dict[str, Any]]]:
-    """Return the tables below an entry, by their keys in it; none where a field of its own holds it."""
+def _written(text: str, target: Mapping[str, Any], place: Place, value: Any) -> str:
+    """Return the text of ``target``: the smallest change of a text that reads as it, else written anew."""
+    edits = _edited(text, target, place, value)
+    return next((edit for edit in edits if _parsed(edit) == target), None) or toml_text(target)
+
+
+def _section(text: str, form: type, name: str, *, opens: bool) -> _Section:
+    table = _parsed(text) or {}
+    for section in _sections(_whole(form, table), table):
+        if _name(section.place) == name and (section.opens if opens else section.removable):
+            return section
+    raise _unusable(name, name, "a table of the file")
+
+
+def _whole(form: type, table: Mapping[str, Any]) -> _Section:
+    return _Section(fields=fields_of(form), content=table)
+
+
+def _sections(section: _Section, whole: Mapping[str, Any]) -> Iterator[_Section]:
+    """Yield a table with the entries that are fields of their own, then the tables below it."""
+    below = {
+        field.key: _tables(field.kind, section.content.get(field.key), whole) for field in section.fields
+    }
+    yield replace(section, fields=tuple(field for field in section.fields if not below[field.key]))
+    for key, tables in below.items():
+        for inner in tables:
+            yield from _sections(replace(inner, place=(*section.place, key, *inner.place)), whole)
+
+
+def _tables(kind: Kind, value: Any, whole: Mapping[str, Any]) -> list[_Section]:
+    """Return the tables below an entry, placed by their keys in it; none where it is a field of its own."""
     if isinstance(kind, TableKind):
-        inline = {field.key for field in kind.fields} == {"value", "unit"}
-        return [] if inline else [((), kind, value if isinstance(value, dict) else {})]
-    if isinstance(kind, KeyedKind) and isinstance(kind.item, TableKind):
-        if {field.key for field in kind.item.fields} == {"value", "unit"}:
+        content = value if isinstance(value, dict) else {}
+        return [] if _is_quantity(kind) else [_Section(fields=kind.fields, content=content)]
+    if isinstance(kind, FormsKind) and kind.tag is not None and isinstance(value, dict):
+        chosen = kind.tables.get(value.get(kind.tag))
+        if chosen is None:
             return []
-        tables = value if isinstance(value, dict) else {}
-        declared = whole.get(kind.names.of or "", ()) if kind.names is not None else ()
-        keys = dict.fromkeys([*(name for name in declared if isinstance(name, str)), *tables])
-        below = [((key,), tables.get(key, {})) for key in keys]
-        return [(place, kind.item, content) for place, content in below if isinstance(content, dict)]
-    if isinstance(kind, ListKind) and isinstance(kind.item, TableKind) and isinstance(value or [], list):
+        fields = tuple(
+            replace(field, kind=ChoiceKind(entry=kind.entry, choices=tuple(kind.tables)))
+            if field.name == kind.tag
+            else field
+            for field in chosen.fields
+        )
+        return [_Section(fields=fields, content=value, forms=kind)]
+    if isinstance(kind, KeyedKind):
+        return _named_tables(kind, value if isinstance(value, dict) else {}, whole)
+    if isinstance(kind, ListKind) and isinstance(value or [], list):
         entries = [content for content in value or [] if isinstance(content, dict)]
-        # One more than there are: typing into it begins the next.
-        return [((at,), kind.item, content) for at, content in enumerate([*entries, {}])]
+        if isinstance(kind.item, TableKind):
+            # One more than there are: typing into it begins the next.
+            return [
+                _Section(place=(at,), fields=kind.item.fields, content=content)
+                for at, content in enumerate([*entries, {}])
+            ]
+        if isinstance(kind.item, KeyedKind) and kind.item.names is None:
+            below = [
+                replace(each, place=(at,), removable=True)
+                for at, content in enumerate(entries)
+                for each in _named_tables(kind.item, content, whole)
+            ]
+            return [_Section(content={}, opens=True, is_list=True), *below]
     return []
+
+
+def _named_tables(kind: KeyedKind, value: Mapping[str, Any], whole: Mapping[str, Any]) -> list[_Section]:
+    item, is_open = kind.item, kind.names is None
+    if not isinstance(item, TableKind):
+        fields = tuple(Field(name=key, key=key, kind=item) for key in value)
+        return [_Section(fields=fields, content=value, opens=True)] if is_open else []
+    if _is_quantity(item):
+        return []
+    names = whole.get(kind.names.of or "", ()) if kind.names is not None else ()
+    keys = dict.fromkeys([*(name for name in names if isinstance(name, str)), *value])
+    below = [
+        _Section(place=(key,), fields=item.fields, content=content, removable=is_open)
+        for key in keys
+        if isinstance(content := value.get(key, {}), dict)
+    ]
+    return [_Section(content={}, opens=True), *below] if is_open else below
+
+
+def _is_quantity(kind: TableKind) -> bool:
+    return {field.key for field in kind.fields} == {"value", "unit"}
 
 
 def _statement(field: Field, place: Place, value: Any) -> Statement:
@@ -162,8 +262,8 @@ def _statement(field: Field, place: Place, value: Any) -> Statement:
         choices = tuple(map(str, kind.choices))
     elif isinstance(kind, BoolKind):
         choices = ("true", "false")
-    elif isinstance(kind, DateKind):
-        form = "date"
+    elif isinstance(kind, DateKind | FileKind):
+        form = "date" if isinstance(kind, DateKind) else "file"
     elif isinstance(kind, NumberKind):
         form, schema = "number", kind.schema()
         low, high = (
@@ -186,7 +286,7 @@ def _text(kind: Kind, value: Any) -> str:
 
 def _value(kind: Kind, typed: str) -> Any:
     """Return what was typed as TOML holds it; what is none is kept as a text, and told by the reader."""
-    if isinstance(kind, TextKind):
+    if kind.shape is str:
         return typed
     if _is_words(kind) and not typed.startswith("["):
         return [word.strip() for word in typed.split(",") if word.strip()]
@@ -203,6 +303,17 @@ def _is_words(kind: Kind) -> bool:
     return isinstance(kind, ListKind) and isinstance(kind.item, TextKind)
 
 
+def _at(table: Mapping[str, Any], place: Place) -> Any:
+    """Return what stands at a place, None where nothing does."""
+    content: Any = table
+    for key in place:
+        if isinstance(key, int):
+            content = content[key] if isinstance(content, list) and key < len(content) else None
+        else:
+            content = content.get(key) if isinstance(content, dict) else None
+    return content
+
+
 def _put(table: dict[str, Any], place: Place, value: Any) -> None:
     content: Any = table
     for key, below in itertools.pairwise(place):
@@ -211,40 +322,57 @@ def _put(table: dict[str, Any], place: Place, value: Any) -> None:
             content = content[key]
         else:
             content = content.setdefault(key, [] if isinstance(below, int) else {})
-    if value is None:
-        content.pop(place[-1], None)
-    else:
-        content[place[-1]] = value
+    last = place[-1]
+    if value is None and _at(table, place) is not None:
+        del content[last]
+    elif isinstance(last, int) and last == len(content):
+        content.append(value)
+    elif value is not None:
+        content[last] = value
 
 
-def _edited(session: str, place: Place, value: Any) -> str | None:
-    """Return the text with the entry's own line changed, None where it has none of its own."""
-    lines, at = session.split("\n"), lines_of(session)
+def _edited(text: str, target: Mapping[str, Any], place: Place, value: Any) -> Iterator[str]:
+    """Yield the text with the entry's own line changed, then with ever more changed around it."""
+    lines, at = text.split("\n"), lines_of(text)
+    ending = [*text.rstrip("\n").split("\n"), ""]
     line = None if value is None else f"{key_of(str(place[-1]))} = {value_text(value)}"
+
+    def edited(first: int, last: int, *added: str) -> str:
+        return "\n".join([*lines[:first], *added, *lines[last:]])
+
     if place in at:
-        lines[at[place] - 1 : at[place]] = [] if line is None else [line]
+        first = at[place] - 1
+        yield edited(first, first + 1, *([] if line is None else [line]))
     elif line is None:
-        return None
+        return
     elif len(place) == 1:
-        header = next((i for i, text in enumerate(lines) if text.lstrip().startswith("[")), len(lines))
-        while header and not lines[header - 1].strip():
-            header -= 1
-        lines.insert(header, line)
+        first = next((i for i, text in enumerate(lines) if text.lstrip().startswith("[")), len(lines))
+        while first and not lines[first - 1].strip():
+            first -= 1
+        yield edited(first, first, line)
     elif place[:-1] in at:
-        lines.insert(at[place[:-1]], line)
-    elif len(place) == 3 and isinstance(place[1], int):  # one more of a list of tables
-        lines = [*session.rstrip("\n").split("\n"), "", f"[[{key_of(str(place[0]))}]]", line, ""]
+        yield edited(at[place[:-1]], at[place[:-1]], line)
     elif all(isinstance(key, str) for key in place):
-        lines = [
-            *session.rstrip("\n").split("\n"),
-            "",
-            f"[{'.'.join(key_of(str(k)) for k in place[:-1])}]",
-            line,
-            "",
-        ]
-    else:
-        return None
-    return "\n".join(lines)
+        yield "\n".join([*ending, _header(place[:-1]), line, ""])
+    if isinstance(value, dict) and place not in at:  # a table with lines of its own
+        entries = [f"{key_of(key)} = {value_text(entry)}" for key, entry in value.items()]
+        header = f"[{_header(place[:-1])}]" if isinstance(place[-1], int) else _header(place)
+        yield "\n".join([*ending, header, *entries, ""])
+    if len(place) == 3 and isinstance(place[1], int) and line is not None:
+        yield "\n".join([*ending, f"[{_header(place[:1])}]", line, ""])
+    if place in at and line is None:  # a table with all its lines
+        first = at[place] - 1
+        last = next((i for i in range(first + 1, len(lines)) if lines[i].startswith("[")), len(lines))
+        yield edited(first, last)
+    for depth in range(len(place) - 1, 0, -1):  # the line of the table inside of which it stands
+        above = place[:depth]
+        if above in at and isinstance(above[-1], str):
+            held = f"{key_of(above[-1])} = {value_text(_at(target, above))}"
+            yield edited(at[above] - 1, at[above], held)
+
+
+def _header(place: Place) -> str:
+    return f"[{'.'.join(key_of(str(key)) for key in place)}]"
 
 
 def _name(place: Place) -> str:

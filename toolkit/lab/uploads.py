@@ -9,12 +9,12 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError, OutputError, ToolkitError
-from toolkit.files import same_file
+from toolkit.files import parse_toml, same_file
 from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, TEMPLATE_FILE, check_size
 from toolkit.lab.holdings import CASE
 from toolkit.lab.home import TEMPLATES
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
 
 CASES = "cases"
+_LONGEST = 4096  # of a path: what is longer leads nowhere
+_BY_NAME = "files that are handed in with the case, by their names"
 FILE_NAME = re.compile(r"[^\W_.][\w ().+-]{0,99}\Z")
 """A name of a file that is handed in: it begins with a letter or a digit and leads to no other folder."""
 
@@ -75,12 +77,12 @@ def hand_in_template(home: Path, files: Sequence[tuple[str, bytes]], *, replace:
     from toolkit.report.style import read_style, style_file
     from toolkit.report.word.package import read_template
 
-    contents = _named(files, "one .docx or .dotx, and a .toml of the same name where it has a style")
+    contents = named_files(files, "one .docx or .dotx, and a .toml of the same name where it has a style")
     templates = [name for name in contents if name.lower().endswith(WORD)]
     style = [name for name in contents if name.lower().endswith(".toml")]
     stems = {Path(name).stem for name in contents}
     if len(templates) != 1 or len(stems) != 1 or len(contents) != 1 + len(style):
-        raise _not_those("one template", contents, "one .docx or .dotx, and a .toml of the same name")
+        raise not_those("one template", contents, "one .docx or .dotx, and a .toml of the same name")
     (template,) = templates
     check_size(contents[template], TEMPLATE_FILE, template)
     for name in style:
@@ -115,18 +117,32 @@ def hand_in_case(home: Path, files: Sequence[tuple[str, bytes]]) -> str:
     """
     from toolkit.diagnosis.case.reader import read_case
 
-    contents = _named(files, f"{CASE} and every file that it names")
+    contents = named_files(files, f"{CASE} and every file that it names")
     settings = [name for name in contents if name.lower().endswith(".toml")]
     if CASE not in contents and len(settings) == 1:
         contents = {CASE if name in settings else name: data for name, data in contents.items()}
     if CASE not in contents:
-        raise _not_those("a case", contents, f"{CASE} and every file that it names")
+        raise not_those("a case", contents, f"{CASE} and every file that it names")
     for name, data in contents.items():
         check_size(data, SETTINGS_FILE if name == CASE else NAMED_FILE, name)
 
     def read(place: Path) -> None:
-        _check_inside(read_case(place / CASE), place, frozenset(contents))
+        table = parse_toml(contents[CASE], where=place / CASE)
+        if outside := leading_out(table, place, contents):
+            raise not_those("a whole case", outside, _BY_NAME)
+        check_inside(read_case(place / CASE), place, frozenset(contents))
 
+    return enter_case(home, contents, read)
+
+
+def enter_case(home: Path, contents: Mapping[str, bytes], read: Callable[[Path], None]) -> str:
+    """Put files into a new folder of cases once ``read`` took them where they are staged; return its place.
+
+    Raises
+    ------
+    OutputError
+        it cannot be made; what ``read`` raises. Nothing is kept
+    """
     folder = home / CASES
     name = claimed_folder(folder, "case")
     try:
@@ -138,7 +154,7 @@ def hand_in_case(home: Path, files: Sequence[tuple[str, bytes]]) -> str:
     return f"{CASES}/{name}"
 
 
-def _check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
+def check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
     """Refuse a case that names a file which was not handed in with it."""
     simulation = case.simulation
     machine = Path(simulation.machine) if simulation.machine.endswith(".toml") else None
@@ -151,13 +167,26 @@ def _check_inside(case: Case, folder: Path, names: frozenset[str]) -> None:
     if os.sep in simulation.calibration:
         outside.append(simulation.calibration)
     if outside:
-        raise _not_those("a whole case", outside, "files that are handed in with the case, by their names")
+        raise not_those("a whole case", outside, _BY_NAME)
 
 
-def _named(files: Sequence[tuple[str, bytes]], expected: str) -> dict[str, bytes]:
+def leading_out(table: Any, folder: Path, names: Collection[str]) -> list[str]:
+    """Return the texts of a file that lead from a folder to what is there but is none of its named files.
+
+    Whatever an entry means by its text: none of these is opened.
+    """
+    if isinstance(table, dict | list):
+        entries = table.values() if isinstance(table, dict) else table
+        return [text for entry in entries for text in leading_out(entry, folder, names)]
+    is_text = isinstance(table, str) and table not in ("", *names) and "\0" not in table
+    return [table] if is_text and len(table) < _LONGEST and os.path.lexists(folder / table) else []
+
+
+def named_files(files: Sequence[tuple[str, bytes]], expected: str) -> dict[str, bytes]:
+    """Return files by name, each of its own; a name leads to no other folder."""
     contents = dict(files)
     if len(contents) < len(files) or not all(FILE_NAME.match(name) for name in contents):
-        raise _not_those("files with names of their own", [name for name, _ in files], expected)
+        raise not_those("files with names of their own", [name for name, _ in files], expected)
     return contents
 
 
@@ -180,7 +209,8 @@ def _places_of(folder: Path, stage: Path) -> Iterator[None]:
         raise
 
 
-def _not_those(noun: str, names: Sequence[str] | Mapping[str, bytes], expected: str) -> ConfigError:
+def not_those(noun: str, names: Sequence[str] | Mapping[str, bytes], expected: str) -> ConfigError:
+    """Return the error of files that are none of what was asked for."""
     return ConfigError(
         f"the files are not {noun}", where="files", got=", ".join(names) or "no file", expected=expected,
         next_step="choose them again; nothing was written", rule="usage",

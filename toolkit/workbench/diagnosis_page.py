@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse
 
 from toolkit.errors import ToolkitError
+from toolkit.lab.built_case import is_open, kinds
 from toolkit.lab.holdings import CASE, holding_id
 from toolkit.lab.jobs import start_job
 from toolkit.lab.seen_diagnosis import read_diagnosis
@@ -30,13 +31,14 @@ DIAGNOSES = "diagnoses"
 
 def diagnoses(request: Request) -> Response:
     """Return the list's page: nothing is looked through before it stands."""
-    return _diagnoses(request)
+    return diagnoses_page(request)
 
 
-def _diagnoses(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
+def diagnoses_page(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
+    """Return the list's page, with what was refused of a case that somebody handed in or built."""
     bench: Bench = request.app.state.bench
     return page(
-        request, "diagnoses", status=status, own=bench.is_own,
+        request, "diagnoses", status=status, own=bench.is_own, kinds=kinds(),
         refused=None if refused is None else refused.as_dict(),
     )  # fmt: skip
 
@@ -50,14 +52,19 @@ def take(request: Request) -> Response:
     try:
         place_of = hand_in_case(bench.home, uploads)
     except ToolkitError as error:
-        return _diagnoses(request, status=400, refused=error)
+        return diagnoses_page(request, status=400, refused=error)
     return RedirectResponse(f"{bench.keys.place}/diagnoses#{holding_id(place_of)}", 303)
 
 
 def diagnosis_list(request: Request) -> Response:
     """Return the answers that the home keeps, and the cases that can be diagnosed."""
-    places = request.app.state.bench.holdings(again=True).places
-    return page(request, "part_diagnoses", answers=places["diagnosis"], cases=places["case"])
+    bench: Bench = request.app.state.bench
+    holdings = bench.holdings(again=True)
+    cases = holdings.places["case"]
+    return page(
+        request, "part_diagnoses", answers=holdings.places["diagnosis"], cases=cases,
+        open={case_id for case_id in cases if bench.is_own and is_open(holdings.home, cases[case_id])},
+    )  # fmt: skip
 
 
 def diagnosis(request: Request) -> Response:

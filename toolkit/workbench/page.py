@@ -41,7 +41,8 @@ def templates(language: str) -> Environment:
     drawn = environment(TEMPLATES)
     drawn.add_extension("jinja2.ext.i18n")
     drawn.install_gettext_translations(translations(language), newstyle=False)  # type: ignore[attr-defined]
-    drawn.globals |= {"language": language, "number": _number, "measured": _measured}
+    drawn.globals |= {"language": language, "point": decimal_sign(language)}
+    drawn.globals |= {"number": _number, "measured": _measured}
     drawn.filters |= {"chart": _chart, "one_line": one_line, "holding_id": holding_id}
     return drawn
 
@@ -80,11 +81,16 @@ def is_part(request: Request) -> bool:
 
 
 @pass_context
-def _number(context: Context, value: float | None, form: str = ".4g", unit: str = "") -> str:
-    """Return a number with its unit; the element's ``value`` is the number itself, as the JSON has it."""
+def _number(
+    context: Context, value: float | None, form: str = ".4g", unit: str = "", *, times: int = 1
+) -> str:
+    """Return a number with its unit; the element's ``value`` is the number itself, as the JSON has it.
+
+    ``times``: what is read is a multiple of it, such as per cent of a share.
+    """
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "–"
-    digits = _printed(context, format(value, form))
+    digits = _printed(context, format(times * value, form))
     text = f"{digits}\u00a0{unit}" if unit else digits
     return data(json.dumps(value), text)
 

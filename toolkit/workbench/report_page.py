@@ -20,10 +20,13 @@ from toolkit.lab.previews import (
     template_findings,
     templates_of,
 )
+from toolkit.lab.template_pages import template_pages, template_print
 from toolkit.lab.uploads import hand_in_template
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from starlette.requests import Request
 
     from toolkit.workbench.bench import Bench
@@ -116,11 +119,38 @@ def take(request: Request) -> Response:
 
 def check(request: Request) -> Response:
     """Return what `template check` says of a template."""
+    _, template = _template(request)
+    return page(
+        request, "part_template", template_id=request.path_params["template"],
+        findings=template_findings(template),
+    )  # fmt: skip
+
+
+def template_sheets(request: Request) -> Response:
+    """Return the pages of a template, with each finding at its place."""
+    bench, template = _template(request)
+    return page(
+        request, "part_template_pages", template_id=request.path_params["template"],
+        printed=template_pages(bench.home, template),
+    )  # fmt: skip
+
+
+def template_picture(request: Request) -> Response:
+    """Return a page of a template as a picture."""
+    from toolkit.report.word.preview import page_picture
+
+    bench, template = _template(request)
+    with _DRAWING:
+        picture = page_picture(template_print(bench.home, template), max(1, request.path_params["number"]))
+    return Response(picture, media_type="image/png")
+
+
+def _template(request: Request) -> tuple[Bench, Path]:
     bench: Bench = request.app.state.bench
     name = templates_of(bench.home).get(request.path_params["template"])
     if name is None:
         raise HTTPException(404)
-    return page(request, "part_template", findings=template_findings(bench.home / TEMPLATES / name))
+    return bench, bench.home / TEMPLATES / name
 
 
 def _asked(request: Request) -> tuple[Bench, str, str]:
@@ -139,4 +169,6 @@ ROUTES: Routes = (
     ("GET", "/templates", templates),
     ("POST", "/templates", take),
     ("GET", "/template/{template}/check", check),
+    ("GET", "/template/{template}/pages", template_sheets),
+    ("GET", "/template/{template}/page/{number:int}.png", template_picture),
 )

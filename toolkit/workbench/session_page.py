@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
+from toolkit.calibration.session.session_file import SessionFile
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab import drafts
 from toolkit.lab.decisions import Order
@@ -99,7 +100,7 @@ def session_page(
     bench: Bench = request.app.state.bench
     return page(
         request, "session", status=status, draft=(draft := drafts.open_draft(bench.home, draft_id)),
-        groups=statement_groups(draft.session), oob=False,
+        groups=statement_groups(draft.session, SessionFile), oob=False,
         people=bench.registry.people().history.now is not None,
         refused=None if refused is None else refused.as_dict(), **waiting(bench, draft_id),
     )  # fmt: skip
@@ -118,7 +119,10 @@ def state(request: Request) -> Response:
     form = dict(request.state.form)
     if waiting(bench, draft_id)["pending"] is None:
         form["session"] = with_statement(
-            form.get("session", "").replace("\r\n", "\n"), form.get("key", ""), form.get("value", "")
+            form.get("session", "").replace("\r\n", "\n"),
+            SessionFile,
+            form.get("key", ""),
+            form.get("value", ""),
         )
         _save(bench, draft_id, form)
     answer = page(
@@ -164,8 +168,8 @@ def _restated(request: Request, draft: drafts.Draft, before: str) -> str:
     if draft.session == before:
         return ""
     return fragment(
-        request, "part_statements", draft=draft, groups=statement_groups(draft.session), oob=True,
-        pending=None,
+        request, "part_statements", draft=draft, groups=statement_groups(draft.session, SessionFile),
+        oob=True, pending=None,
     )  # fmt: skip
 
 

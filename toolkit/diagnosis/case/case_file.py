@@ -19,11 +19,12 @@ from toolkit.diagnosis.case.simulation import (
 )
 from toolkit.units import unit
 
-_CONDITIONS = {
+CONDITIONS = {
     "rotation": ("forward", "reverse"),
     "mounting": ("normal", "turned"),
     "phase": ("tare", "test"),
 }
+"""What is known of a run's conditions, and their words."""
 # A recording has whatever conditions its laboratory knows.
 _Runs = tuple[Mapping[str, Any], ...]
 
@@ -106,7 +107,7 @@ def _faults_of_run(run: Mapping[str, Any], key: tuple[str, int]) -> Iterator[Fau
     file = run.get("file")
     if not isinstance(file, str) or not file or "\0" in file:
         yield Fault(key=(*key, "file"), got=file, expected='file = "run01.csv"', what="a run has no file")
-    for name, words in _CONDITIONS.items():
+    for name, words in CONDITIONS.items():
         if name in run and run[name] not in words:
             near = nearest(str(run[name]), words)
             what = "unknown condition" + (f", did you mean {near!r}?" if near else "")

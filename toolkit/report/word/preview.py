@@ -17,6 +17,9 @@ _WORD = re.compile(
 )
 _DPI = 110
 
+Word = tuple[str, float, float, float, float]
+"""A word of a page: its text, and left, top, right and bottom [pt]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenPage:
@@ -35,23 +38,42 @@ def pages_of(pdf: Path, mark: str) -> tuple[SeenPage, ...]:
     RenderError
         poppler is not installed, or does not end
     """
-    listing = poppler(["pdftotext", "-bbox", str(pdf), "-"])
     wanted = mark.split()
     return tuple(
-        SeenPage(width=float(width), height=float(height), holes=tuple(_places(words, wanted)))
-        for width, height, words in _PAGE.findall(listing)
+        SeenPage(width=width, height=height, holes=tuple(_places(words, wanted)))
+        for width, height, words in words_of(pdf)
     )
 
 
-def _places(text: str, wanted: list[str]) -> list[tuple[float, float, float, float]]:
-    rows = _WORD.findall(text)
-    words = [html.unescape(row[4]) for row in rows]
+def words_of(pdf: Path) -> list[tuple[float, float, list[Word]]]:
+    """Return the pages of a PDF: width, height [pt] and words.
+
+    Raises
+    ------
+    RenderError
+        poppler is not installed, or does not end
+    """
+    listing = poppler(["pdftotext", "-bbox", str(pdf), "-"])
+    return [
+        (
+            float(width),
+            float(height),
+            [
+                (html.unescape(text), float(left), float(top), float(right), float(bottom))
+                for left, top, right, bottom, text in _WORD.findall(words)
+            ],
+        )
+        for width, height, words in _PAGE.findall(listing)
+    ]
+
+
+def _places(words: list[Word], wanted: list[str]) -> list[tuple[float, float, float, float]]:
     places = []
     for at in range(len(words)):
-        if wanted and words[at : at + len(wanted)] == wanted:
-            boxes = [tuple(map(float, row[:4])) for row in rows[at : at + len(wanted)]]
-            left, top = min(box[0] for box in boxes), min(box[1] for box in boxes)
-            right, bottom = max(box[2] for box in boxes), max(box[3] for box in boxes)
+        group = words[at : at + len(wanted)]
+        if wanted and [word[0] for word in group] == wanted:
+            left, top = min(word[1] for word in group), min(word[2] for word in group)
+            right, bottom = max(word[3] for word in group), max(word[4] for word in group)
             places.append((left, top, right - left, bottom - top))
     return places
 

@@ -1,0 +1,120 @@
+"""A case that is put together in the browser: recordings, a kind of simulation, and its statements as fields.
+
+Its code reads what the server's user reads: like a case that is handed in, it comes from this computer alone.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse, Response
+
+from toolkit.errors import ToolkitError
+from toolkit.lab import built_case
+from toolkit.lab.holdings import holding_id
+from toolkit.workbench.diagnosis_page import diagnoses_page
+from toolkit.workbench.page import page
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from starlette.requests import Request
+
+    from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
+
+_ANSWERING = threading.Lock()  # one simulation at a time
+
+
+def begin(request: Request) -> Response:
+    """Begin a case from recordings and a kind of simulation."""
+    bench: Bench = request.app.state.bench
+    if not bench.is_own:
+        raise HTTPException(404)
+    recordings, own = (
+        [(upload.name, upload.data) for upload in request.state.files.get(field, ())]
+        for field in ("recordings", "own")
+    )
+    try:
+        place_of = built_case.begin_case(bench.home, request.state.form.get("kind", ""), recordings, own)
+    except ToolkitError as error:
+        return diagnoses_page(request, status=400, refused=error)
+    bench.holdings(again=True)
+    return _to(bench, holding_id(place_of))
+
+
+def case(request: Request) -> Response:
+    """Return the page: the statements of the case, its files, and a place for what its simulation says."""
+    return _case(request)
+
+
+def _case(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
+    bench, case_id, folder = _asked(request)
+    return page(
+        request, "case", status=status, case_id=case_id, built=built_case.open_case(folder),
+        place_of=bench.holdings().places["case"][case_id],
+        refused=None if refused is None else refused.as_dict(),
+    )  # fmt: skip
+
+
+def state(request: Request) -> Response:
+    """Keep a statement as its field has it, and say nothing but that it is kept."""
+    _, _, folder = _asked(request)
+    form = request.state.form
+    is_other = built_case.state_entry(folder, form.get("key", ""), form.get("value", ""))
+    return Response("", headers={"hx-refresh": "true"} if is_other else {"hx-trigger": "stated"})
+
+
+def change(request: Request) -> Response:
+    """Add a channel, a run or a parameter, leave one out, or put files beside the case."""
+    bench, case_id, folder = _asked(request)
+    form = request.state.form
+    try:
+        match request.path_params["step"]:
+            case "add":
+                built_case.add_entry(folder, form.get("table", ""), form.get("name", ""))
+            case "drop":
+                built_case.drop_entry(folder, form.get("table", ""))
+            case "files":
+                uploads = request.state.files.get("files", ())
+                built_case.add_files(folder, [(upload.name, upload.data) for upload in uploads])
+            case _:
+                raise HTTPException(404)
+    except ToolkitError as error:
+        return _case(request, status=400, refused=error)
+    return _to(bench, case_id, form.get("table", ""))
+
+
+def trial(request: Request) -> Response:
+    """Return what the simulation says as it is declared, beside the recordings."""
+    bench, _, folder = _asked(request)
+    with _ANSWERING:
+        answer = built_case.trial_of(folder, bench.home)
+    return page(request, "part_trial", answer=answer)
+
+
+def _asked(request: Request) -> tuple[Bench, str, Path]:
+    bench: Bench = request.app.state.bench
+    case_id = request.path_params["case"]
+    folder = bench.path_of("case", case_id)
+    if not bench.is_own or folder is None:
+        raise HTTPException(404)
+    if not built_case.is_open(bench.home, bench.holdings().places["case"][case_id]):
+        raise HTTPException(404)
+    return bench, case_id, folder
+
+
+def _to(bench: Bench, case_id: str, table: str = "") -> Response:
+    return RedirectResponse(f"{bench.keys.place}/case/{case_id}#{quote(table)}", 303)
+
+
+ROUTES: Routes = (
+    ("POST", "/case", begin),
+    ("GET", "/case/{case}", case),
+    ("POST", "/case/{case}/state", state),
+    ("POST", "/case/{case}/trial", trial),
+    ("POST", "/case/{case}/change/{step}", change),
+)
