@@ -229,7 +229,7 @@ def ledger_file_state(path: Path) -> LedgerState:
     why = f"{len(ledger.entries)} entries, {signed} of them signed by people who were enrolled then"
     signature: Signature = "valid" if signed and registry.people().history.now else "unsigned"
     known = sorted((registry.folder.parent / "trust" / "witnessed").glob(f"{instrument}-*{SUFFIX}"))
-    lines = raw_lines(registry, instrument)
+    lines = raw_lines(registry, instrument) if known else []
     continuity: Continuity = "unknown"
     for file in known:
         comparison = compare(lines, parse_checkpoint(read_regular(file).decode(errors="replace"), where=file))
