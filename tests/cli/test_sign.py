@@ -16,6 +16,8 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import run as run_toolkit
 from toolkit.errors import TrustError
 from toolkit.lab.home import packaged_home
+from toolkit.report.certificate.collect import collect
+from toolkit.report.style import Style
 from toolkit.trust.keys import make_key
 
 Run = Callable[..., tuple[int, str, str]]
@@ -102,6 +104,8 @@ def test_who_enters_and_who_approves_is_said_at_once(run: Run) -> None:
     code, out, error = run("calibration", "approve", "m15-virtual-r2", *who, "--reason", "a new session")
     assert (code, ", approved by Dora Example on " in out) == (0, True), out + error
     assert entered in out
+    certificate = collect(Registry(Path("calibrations")), "m15-virtual-r2", Style())
+    assert certificate.checked_by == "Dora Example (dora)", "an id alone tells a customer nothing"
 
 
 def test_a_policy_of_two_takes_two_people_from_two_computers(run: Run) -> None:

@@ -176,6 +176,7 @@ def _job(
         details=details_of(test, options.details),
         comparison=comparison,
         diagnosis=options.diagnosis[0] if options.diagnosis else None,
+        titled=str if options.issuing is None else options.issuing.registry.people().history.titled,
     )
     issue = None
     if options.issuing is not None:
