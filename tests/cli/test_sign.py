@@ -108,6 +108,34 @@ def test_who_enters_and_who_approves_is_said_at_once(run: Run) -> None:
     assert certificate.checked_by == "Dora Example (dora)", "an id alone tells a customer nothing"
 
 
+@pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+def test_a_certificate_is_issued_by_a_key_elsewhere(run: Run, tmp_path: Path) -> None:
+    shutil.copytree(packaged_home() / "report_templates", "report_templates")
+    words = ("calibration", "certificate", RECORD, "--out", "../issued", "--known-at", "2026-11-23")
+    before = _entries()
+    code, _, error = run(*words, "--request", "../r.json", "--issued-by", "dora")
+    assert code == 0, error
+    (shown,) = (tmp_path / "r.documents").glob("*.docx")
+    assert (_entries(), (tmp_path / "issued").exists()) == (before, False), "a request issues nothing"
+    code, _, error = run("sign", "../r.json", "--key", "../keys/anna", "--yes")
+    assert (code, "it names Dora Example, and anna is another person" in error) == (2, True)
+    assert run("sign", "../r.json", "--key", "../keys/dora", "--yes")[0] == 0
+    code, _, error = run(*words[:-1], "2026-11-22", "--answer", "../r.dora.json")
+    assert (code, "decides something else than what was signed" in error) == (2, True)
+    assert (_entries(), (tmp_path / "issued").exists()) == (before, False), "another document is not issued"
+    code, out, error = run(*words, "--answer", "../r.dora.json")
+    assert (code, "document issued by Dora Example" in out) == (1, True), error
+    (issued,) = (tmp_path / "issued").glob("*.docx")
+    assert issued.read_bytes() == shown.read_bytes(), "what was read is what was issued"
+    code, out, _ = run("verify", issued)
+    assert (code, "VALID" in out) == (0, True)
+    code, out, _ = run("ledger", "check", "--against", next((tmp_path / "issued").glob("*.pdf")))
+    assert (code, out.startswith("continues")) == (0, True)
+
+
 def test_a_policy_of_two_takes_two_people_from_two_computers(run: Run) -> None:
     assert run(*DECISION, "--request", "../r.json")[0] == 0
     for name, words in (("carl", "operator"), ("dora", "checker")):

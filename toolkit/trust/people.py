@@ -34,6 +34,7 @@ MEANINGS: Mapping[Action, str] = {
 
 STATED: Mapping[Action, tuple[str, ...]] = {
     "approve": ("by", "approved_by"), "withdraw": ("by",), "discard": ("by",), "enrol": ("by",),
+    "issue": ("by",),
 }  # fmt: skip
 """The entries of a decision that name people: each of them signs it."""
 
