@@ -61,8 +61,9 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.
     return call
 
 
-def keygen(path: Path, passphrase: str = "") -> None:
-    command = ["ssh-keygen", "-q", "-t", "ed25519", "-N", passphrase, "-C", path.name, "-f", str(path)]
+def keygen(path: Path, passphrase: str = "", kind: str = "ed25519") -> None:
+    command = ["ssh-keygen", "-q", "-t", kind, "-N", passphrase, "-C", path.name, "-f", str(path)]
+    command += ["-b", "3072"] if kind == "rsa" else []
     subprocess.run(command, check=True)
 
 
@@ -134,6 +135,32 @@ def test_a_certificate_is_issued_by_a_key_elsewhere(run: Run, tmp_path: Path) ->
     assert (code, "VALID" in out) == (0, True)
     code, out, _ = run("ledger", "check", "--against", next((tmp_path / "issued").glob("*.pdf")))
     assert (code, out.startswith("continues")) == (0, True)
+
+
+@pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+def test_whose_key_no_checkpoint_can_bear_issues_too(run: Run) -> None:
+    """Tokens hold RSA keys, a checkpoint (C2SP) takes Ed25519: the entry was there and its document not."""
+    keygen(Path("../keys/rosa"), kind="rsa")
+    words = (
+        "--name",
+        "Rosa Example",
+        "--role",
+        "head",
+        "--key",
+        "../keys/rosa.pub",
+        "--sign",
+        "../keys/anna",
+    )
+    assert run("person", "enrol", "rosa", *words)[0] == 0
+    shutil.copytree(packaged_home() / "report_templates", "report_templates")
+    code, out, error = run(
+        "calibration", "certificate", RECORD, "--out", "../issued", "--sign", "../keys/rosa"
+    )
+    assert (code, "document issued by Rosa Example" in out) == (1, True), error
+    assert run("verify", next(Path("../issued").glob("*.docx")))[0] == 0
 
 
 def test_a_policy_of_two_takes_two_people_from_two_computers(run: Run) -> None:

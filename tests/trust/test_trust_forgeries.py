@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.trust.forgeries import anchors, documents, keys, ledger, requests
+from tests.trust.forgeries import anchors, documents, elsewhere, keys, ledger, requests
 from tests.trust.forgeries.changes import Forgery
 from tests.trust.forgeries.laboratory import KEYS, believed, forget, laboratory
 from tests.trust.seal.seal_factory import sealed_pdf, sealed_xml, trust
@@ -17,7 +17,7 @@ from toolkit.trust.seal.xml import check_xml
 
 TABLES = {
     "ledger": (ledger, 900), "keys": (keys, 80), "anchors": (anchors, 100), "requests": (requests, 150),
-    "documents": (documents, 100),
+    "documents": (documents, 100), "elsewhere": (elsewhere, 60),
 }  # fmt: skip
 """Each table, and the least number of forgeries in it: a generator that went silent would prove nothing."""
 

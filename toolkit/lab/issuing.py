@@ -105,10 +105,13 @@ class Issuing:
         from toolkit.calibration.registry.registry import instrument_of
         from toolkit.lab.people import checkpoint_of, lines_of
         from toolkit.trust.anchor import anchor_of
+        from toolkit.trust.ssh import ED25519
 
         seq = issue(self.registry, record_id, document, decided=decided, named=self.named)
         instrument = instrument_of(record_id)
-        checkpoint = checkpoint_of(self.registry, instrument)
+        # The entry is what people sign, by whatever key; of the checkpoint only Ed25519 is a signature.
+        signers = [signer for signer in self.registry.signers if signer.public.kind == ED25519]
+        checkpoint = checkpoint_of(self.registry, instrument, signers)
         return anchor_of(lines_of(self.registry, instrument), seq - 1, checkpoint)
 
     def _digital(self, file: Path, ledger: Mapping[str, Any]) -> bytes:

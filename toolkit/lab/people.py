@@ -146,13 +146,19 @@ def people_answer(log: PeopleLog) -> tuple[PeopleAnswer, str]:
     return payload, text + "\n\n" + table(["to", "takes", "of"], takes, align="<><")
 
 
-def checkpoint_of(registry: Registry, instrument: str) -> Checkpoint:
-    """Return the checkpoint of an instrument's ledger as it stands, signed by the keys at hand."""
+def checkpoint_of(registry: Registry, instrument: str, signers: Sequence[Signer] | None = None) -> Checkpoint:
+    """Return the checkpoint of an instrument's ledger as it stands, signed by ``signers``: the keys at hand.
+
+    Raises
+    ------
+    TrustError
+        ``weak-key``: a key that is not Ed25519; ``not-allowed``: one of nobody who is enrolled
+    """
     texts = lines_of(registry, instrument)
     root = root_of([leaf_hash(text.encode()) for text in texts])
     checkpoint = Checkpoint(origin=f"{ORIGIN}{instrument}", size=len(texts), root=root)
     version = registry.people().history.now
-    for signer in registry.signers:
+    for signer in registry.signers if signers is None else signers:
         person = None if version is None else version.people.owner(signer.public)
         if person is None:
             raise TrustError(
