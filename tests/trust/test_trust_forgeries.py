@@ -12,6 +12,7 @@ from tests.trust.forgeries import anchors, documents, elsewhere, keys, ledger, r
 from tests.trust.forgeries.changes import Forgery
 from tests.trust.forgeries.laboratory import KEYS, believed, forget, laboratory
 from tests.trust.seal.seal_factory import sealed_pdf, sealed_xml, trust
+from toolkit.trust.people import NAMESPACE
 from toolkit.trust.seal.pdf import check_pdf
 from toolkit.trust.seal.xml import check_xml
 
@@ -51,3 +52,5 @@ def test_what_is_honest_is_accepted() -> None:
     assert check_pdf(sealed_pdf(), trust()).signature == "valid"
     assert check_xml(sealed_xml(), trust()).signature == "valid"
     assert documents._dcc_taken({})
+    assert elsewhere._enrolled_as("zoe", "Zoe Example")
+    assert elsewhere._of_purpose(NAMESPACE, stated=True)

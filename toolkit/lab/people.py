@@ -15,7 +15,7 @@ from toolkit.calibration.registry.people_log import PeopleLog, enrol
 from toolkit.errors import RegistryError, ToolkitError, TrustError
 from toolkit.files import write_atomic
 from toolkit.inputs import PDF_FILE, read_regular
-from toolkit.lab.proofs import ORIGIN, anchor_in, raw_lines
+from toolkit.lab.proofs import ORIGIN, anchor_in, ledgers_of, raw_lines
 from toolkit.publication import check_file
 from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
@@ -190,21 +190,26 @@ def anchor_document(registry: Registry, instrument: str, seq: int | None, checkp
 
 
 def lines_of(registry: Registry, instrument: str) -> list[str]:
-    """Return the lines of an instrument's ledger.
+    """Return the lines of an instrument's ledger, or of the log of ``people``.
 
     Raises
     ------
     RegistryError
         ``missing``: there is no such instrument; the ledger is damaged
+    TrustError
+        ``people-log``
     """
     from toolkit.calibration.registry.settled import damaged
 
-    if instrument not in registry.instruments():
+    if instrument not in ledgers_of(registry):
         raise RegistryError(
             "there is no such instrument", where=registry.folder, got=instrument,
             expected=", ".join(registry.instruments()) or "an instrument with records: there is none yet",
             next_step="see 'toolkit calibration list'; nothing was changed", rule="missing",
         )  # fmt: skip
+    if instrument not in registry.instruments():
+        registry.people()  # every version of it is proved
+        return raw_lines(registry, instrument)
     ledger = registry.ledger(instrument)
     if ledger.damage is not None:
         raise damaged(registry.folder / instrument, ledger.damage)
@@ -233,7 +238,7 @@ def check_against(registry: Registry, instrument: str | None, document: Path) ->
     else:
         checkpoint = parse_checkpoint(data.decode(errors="replace"), where=document)
     named = checkpoint.origin.removeprefix(ORIGIN)
-    if named != (instrument or named) or named not in registry.instruments():
+    if named != (instrument or named) or named not in ledgers_of(registry):
         raise _without(document, f"a proof of the ledger {checkpoint.origin}")
     if anchor is not None and not anchor.proved:
         return named, Comparison("forked", "the document's own proof does not hold: it was changed")

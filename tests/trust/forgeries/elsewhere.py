@@ -48,7 +48,8 @@ def forgeries() -> Iterator[Forgery]:
     for purpose in ("file", "git", "toolkit-ledger@v2", "toolkit-ledger", "TOOLKIT-LEDGER@V1", ""):
         for stated in (True, False):
             yield Forgery(
-                kind="another purpose", what=f"signed for {purpose!r}, {'as it says' if stated else 'not told'}",
+                kind="another purpose",
+                what=f"signed for {purpose!r}, {'as it says' if stated else 'not told'}",
                 accepted=functools.partial(_of_purpose, purpose, stated=stated),
             )  # fmt: skip
     for number, (event, name, _) in enumerate(DECISIONS):
