@@ -111,8 +111,8 @@ CODE_FILE = Form(
 )
 RECORD_FILE = Form(
     title="a file of the registry",
-    limit=256 * MIB,
-    reason="the ledger of a hundred thousand records has a tenth of it",
+    limit=512 * MIB,
+    reason="a ledger of a million entries has three quarters of it",
 )
 NAMED_FILE = Form(
     title="a file that the case names",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.test_sign import keygen
+from toolkit.calibration.registry.ledger import head_bytes
 from toolkit.cli.main import run
 from toolkit.lab.home import packaged_home
 
@@ -72,6 +74,53 @@ def test_a_ledger_that_is_none_is_neither_witnessed_nor_proved(call: Call, name:
         assert "m15, m15-virtual" in said
     assert not Path("../north").exists()
     assert not Path("trust").exists()
+
+
+def test_a_witness_of_one_ledger_says_nothing_of_another(call: Call) -> None:
+    """m15-virtual-north is no checkpoint of m15, though its file's name begins so."""
+    keygen(Path("../keys/plain"))
+    for name in ("m15", "m15-virtual"):
+        witness = ("ledger", "witness", name, "../north", "--name", "north", "--key", "../keys/plain")
+        assert call(*witness)[0] == 0
+    for name in ("m15", "m15-virtual"):
+        _, said = call("verify", f"calibrations/{name}/ledger.jsonl")
+        assert "are those that were issued" in said
+        assert "rewritten" not in said
+        assert "removed" not in said
+
+
+def test_the_log_of_people_is_witnessed_as_a_ledger_is(call: Call) -> None:
+    """Who removes the newest version of the people gives a revoked key its power back."""
+    for name in ("plain", "anna", "ben"):
+        keygen(Path("../keys") / name)
+    words = ("--name", "Anna", "--role", "head", "--key", "../keys/anna.pub", "--sign", "../keys/anna")
+    witness = ("ledger", "witness", "people", "../north", "--name", "north", "--key", "../keys/plain")
+    code, said = call(*witness)
+    assert (code, "no such instrument" in said) == (2, True), "nobody is enrolled yet"
+    assert call("person", "enrol", "anna", *words, "--recovery", "../keys/ben")[0] == 0
+    revoke = ("person", "revoke", "recovery", "--from", "2026-01-01T00:00:00Z", "--reason", "lost")
+    code, said = call(*revoke, "--sign", "../keys/anna")
+    assert code == 0, said
+    code, said = call(*witness)
+    assert code == 0, said
+    code, proof = call("ledger", "prove", "people")
+    assert code == 0, proof
+    Path("../proof.json").write_text(proof)
+    assert call("ledger", "check", "--against", "../proof.json")[0] == 0
+    assert "continues" in call("verify", "../proof.json", "--json")[1]
+    code, said = call("verify", "people/ledger.jsonl")
+    assert (code, "are those that were issued" in said) == (0, True), said
+    lines = Path("people/ledger.jsonl").read_bytes().splitlines(keepends=True)
+    Path("people/ledger.jsonl").write_bytes(lines[0])
+    Path("people/head.json").write_bytes(head_bytes(1, json.loads(lines[0])["sha256"]))
+    Path("people/people-2.toml").unlink()
+    assert call("person", "list")[0] == 0, "the log by itself is in order"
+    code, said = call("ledger", "check", "--against", "../proof.json")
+    assert (code, said.startswith("rolled_back")) == (1, True), said
+    assert call("verify", "../proof.json")[0] == 1
+    code, said = call("verify", "people/ledger.jsonl")
+    assert (code, "entries were removed" in said) == (1, True), said
+    assert call(*witness)[0] == 2
 
 
 def test_a_key_without_room_for_its_public_half_is_none(call: Call) -> None:

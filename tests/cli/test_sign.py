@@ -16,6 +16,8 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import run as run_toolkit
 from toolkit.errors import TrustError
 from toolkit.lab.home import packaged_home
+from toolkit.report.certificate.collect import collect
+from toolkit.report.style import Style
 from toolkit.trust.keys import make_key
 
 Run = Callable[..., tuple[int, str, str]]
@@ -59,8 +61,9 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.
     return call
 
 
-def keygen(path: Path, passphrase: str = "") -> None:
-    command = ["ssh-keygen", "-q", "-t", "ed25519", "-N", passphrase, "-C", path.name, "-f", str(path)]
+def keygen(path: Path, passphrase: str = "", kind: str = "ed25519") -> None:
+    command = ["ssh-keygen", "-q", "-t", kind, "-N", passphrase, "-C", path.name, "-f", str(path)]
+    command += ["-b", "3072"] if kind == "rsa" else []
     subprocess.run(command, check=True)
 
 
@@ -102,6 +105,62 @@ def test_who_enters_and_who_approves_is_said_at_once(run: Run) -> None:
     code, out, error = run("calibration", "approve", "m15-virtual-r2", *who, "--reason", "a new session")
     assert (code, ", approved by Dora Example on " in out) == (0, True), out + error
     assert entered in out
+    certificate = collect(Registry(Path("calibrations")), "m15-virtual-r2", Style())
+    assert certificate.checked_by == "Dora Example (dora)", "an id alone tells a customer nothing"
+
+
+@pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+def test_a_certificate_is_issued_by_a_key_elsewhere(run: Run, tmp_path: Path) -> None:
+    shutil.copytree(packaged_home() / "report_templates", "report_templates")
+    words = ("calibration", "certificate", RECORD, "--out", "../issued", "--known-at", "2026-11-23")
+    before = _entries()
+    code, _, error = run(*words, "--request", "../r.json", "--issued-by", "dora")
+    assert code == 0, error
+    (shown,) = (tmp_path / "r.documents").glob("*.docx")
+    assert (_entries(), (tmp_path / "issued").exists()) == (before, False), "a request issues nothing"
+    code, _, error = run("sign", "../r.json", "--key", "../keys/anna", "--yes")
+    assert (code, "it names Dora Example, and anna is another person" in error) == (2, True)
+    assert run("sign", "../r.json", "--key", "../keys/dora", "--yes")[0] == 0
+    code, _, error = run(*words[:-1], "2026-11-22", "--answer", "../r.dora.json")
+    assert (code, "decides something else than what was signed" in error) == (2, True)
+    assert (_entries(), (tmp_path / "issued").exists()) == (before, False), "another document is not issued"
+    code, out, error = run(*words, "--answer", "../r.dora.json")
+    assert (code, "document issued by Dora Example" in out) == (1, True), error
+    (issued,) = (tmp_path / "issued").glob("*.docx")
+    assert issued.read_bytes() == shown.read_bytes(), "what was read is what was issued"
+    code, out, _ = run("verify", issued)
+    assert (code, "VALID" in out) == (0, True)
+    code, out, _ = run("ledger", "check", "--against", next((tmp_path / "issued").glob("*.pdf")))
+    assert (code, out.startswith("continues")) == (0, True)
+
+
+@pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+def test_whose_key_no_checkpoint_can_bear_issues_too(run: Run) -> None:
+    """Tokens hold RSA keys, a checkpoint (C2SP) takes Ed25519: the entry was there and its document not."""
+    keygen(Path("../keys/rosa"), kind="rsa")
+    words = (
+        "--name",
+        "Rosa Example",
+        "--role",
+        "head",
+        "--key",
+        "../keys/rosa.pub",
+        "--sign",
+        "../keys/anna",
+    )
+    assert run("person", "enrol", "rosa", *words)[0] == 0
+    shutil.copytree(packaged_home() / "report_templates", "report_templates")
+    code, out, error = run(
+        "calibration", "certificate", RECORD, "--out", "../issued", "--sign", "../keys/rosa"
+    )
+    assert (code, "document issued by Rosa Example" in out) == (1, True), error
+    assert run("verify", next(Path("../issued").glob("*.docx")))[0] == 0
 
 
 def test_a_policy_of_two_takes_two_people_from_two_computers(run: Run) -> None:

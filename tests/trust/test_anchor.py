@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -51,12 +52,38 @@ def test_a_rewritten_entry_is_a_fork_and_its_place_is_told(changed: int) -> None
     for index in range(11):
         comparison = compare(rewritten, checkpoint, anchor_of(LINES, index, checkpoint))
         assert comparison.continuity == "forked"
-        if index == changed:
-            assert f"entry {changed + 1} was rewritten" in comparison.why
-            continue
-        words = comparison.why.rpartition(": in ")[2].split()
-        first, last = int(words[0]), int(words[-1])
+        first, last = _place(comparison.why)
         assert first <= changed + 1 <= last, "the range that is named holds the rewritten entry"
+        if index == changed:
+            assert first == last
+
+
+@pytest.mark.parametrize("begin", range(11))
+@pytest.mark.parametrize("index", range(11))
+def test_of_a_fork_the_first_entry_that_differs_is_told(begin: int, index: int) -> None:
+    """A rewriter who keeps the chain whole changes every entry from one on: where that begins is asked."""
+    checkpoint = _checkpoint(LINES[:11])
+    forked = [*LINES[:begin], *(f'{{"seq":"{number}"}}' for number in range(begin, 13))]
+    comparison = compare(forked, checkpoint, anchor_of(LINES, index, checkpoint))
+    first, last = _place(comparison.why)
+    assert comparison.continuity == "forked"
+    assert first <= begin + 1 <= last
+    assert (", the document's own, differs too" in comparison.why) == (last <= index)
+    shorter = compare(forked[:10], checkpoint, anchor_of(LINES, index, checkpoint))
+    assert shorter.continuity == "rolled_back"
+    if last <= 8:  # a subtree that is there as a whole
+        assert _place(shorter.why) == (first, last)
+
+
+def test_a_fork_from_a_checkpoint_alone_has_no_narrower_place() -> None:
+    assert _place(compare(["{}", *LINES[1:]], _checkpoint(LINES[:7])).why) == (1, 7)
+
+
+def _place(why: str) -> tuple[int, int]:
+    """Return the first and the last of the entries of which one is the first that differs."""
+    match = re.search(r"differs from what was issued is (?:one of the entries (\d+) to|entry) (\d+)", why)
+    assert match is not None, why
+    return int(match[1] or match[2]), int(match[2])
 
 
 def test_a_dropped_and_a_moved_entry_are_forks() -> None:
@@ -91,7 +118,7 @@ def test_what_a_telephone_reads_is_the_same_proof_without_the_line(index: int) -
     assert (again.leaf, again.path, again.line) == (leaf_hash(LINES[index].encode()), anchor.path, None)
     assert compare(LINES, again.checkpoint, again).continuity == "continues"
     rewritten = [*LINES[:index], "{}", *LINES[index + 1 :]]
-    assert f"entry {index + 1} was rewritten" in compare(rewritten, again.checkpoint, again).why
+    assert _place(compare(rewritten, again.checkpoint, again).why) == (index + 1, index + 1)
 
 
 def test_the_proof_of_a_ledger_of_a_million_entries_signed_by_three_people_fits() -> None:

@@ -10,14 +10,17 @@ from typing import Annotated
 import typer
 
 from toolkit.cli.console import (
+    Answers,
     Calibrations,
     Draft,
     Home,
     Id,
+    IssuedBy,
     Json,
     KnownAt,
     LockFile,
     Quiet,
+    RequestFile,
     Seal,
     Sign,
     TimeStamp,
@@ -29,6 +32,7 @@ from toolkit.cli.console import (
     into_file,
     into_folder,
     open_signers,
+    open_travel,
     progress,
 )
 
@@ -162,6 +166,9 @@ def certificate(
         ),
     ] = False,
     sign: Sign = None,
+    request: RequestFile = None,
+    issued_by: IssuedBy = None,
+    answers: Answers = None,
     lock_file: LockFile = False,
     seal: Seal = None,
     time_stamp: TimeStamp = None,
@@ -189,14 +196,20 @@ def certificate(
 
     started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", home))
-    registry = open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))
+    registry = open_registry(
+        calibrations,
+        home,
+        lock_file=lock_file,
+        signers=open_signers(sign),
+        travel=open_travel(request, answers),
+    )
     sealing = open_sealing(seal, registry.folder.parent, ask=ask_passphrase, stamps=time_stamp, draft=draft)
     with progress(None, "certificate", show=not (json or quiet)) as step:
         issued, delivered = deliver_certificate(
             registry, record_id, opened,
             out or Path.cwd() / f"certificate-{record_id}", issued=day(known_at), draft=draft,
             replaces=replaces, amendment=amendment_reason, dcc=dcc, sealing=sealing, asked=issue,
-            keep=keep, step=step,
+            named=issued_by or (), keep=keep, step=step,
         )  # fmt: skip
     payload = certificate_payload(issued, delivered, sealing) | {
         "timing": {"seconds": time.perf_counter() - started}

@@ -109,6 +109,14 @@ RequestFile = Annotated[
         help="Write what is to be signed to FILE, for 'toolkit sign' on another computer; enter nothing.",
     ),
 ]
+IssuedBy = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--issued-by",
+        metavar="ID",
+        help="With --request: who will sign, whose name the document states; once for each person.",
+    ),
+]
 Answers = Annotated[
     list[Path] | None,
     typer.Option(

@@ -37,7 +37,7 @@ By = Annotated[
     str | None, typer.Option("--by", help="Who decides, by id; default: whose key signs or has answered.")
 ]
 Why = Annotated[str, typer.Option("--reason", help="Why; the log of people keeps it.")]
-Instrument = Annotated[str, typer.Argument(help="Instrument, such as m15.")]
+Instrument = Annotated[str, typer.Argument(help="Instrument, such as m15, or people: the log of people.")]
 
 
 @person.command()

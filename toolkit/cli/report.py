@@ -10,16 +10,19 @@ from typing import Annotated
 import typer
 
 from toolkit.cli.console import (
+    Answers,
     CalibrationId,
     Calibrations,
     Draft,
     Home,
+    IssuedBy,
     Json,
     KnownAt,
     LockFile,
     ProtocolFile,
     Quiet,
     Reader,
+    RequestFile,
     Seal,
     Sign,
     TimeStamp,
@@ -29,6 +32,7 @@ from toolkit.cli.console import (
     day,
     into_folder,
     open_signers,
+    open_travel,
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
@@ -107,6 +111,9 @@ def command(
         ),
     ] = False,
     sign: Sign = None,
+    request: RequestFile = None,
+    issued_by: IssuedBy = None,
+    answers: Answers = None,
     lock_file: LockFile = False,
     seal: Seal = None,
     time_stamp: TimeStamp = None,
@@ -139,16 +146,30 @@ def command(
     engine = choose_reader(reader)
     started = time.perf_counter()
     issuing = None
-    if issue or sign or seal is not None or time_stamp is not None or os.environ.get("TOOLKIT_SEAL_KEY"):
+    if (
+        issue
+        or sign
+        or request
+        or answers
+        or seal is not None
+        or time_stamp is not None
+        or os.environ.get("TOOLKIT_SEAL_KEY")
+    ):
         from toolkit.lab.home import open_registry
         from toolkit.lab.issuing import open_issuing
         from toolkit.lab.sealing import open_sealing
 
-        registry = open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign))
+        registry = open_registry(
+            calibrations,
+            home,
+            lock_file=lock_file,
+            signers=open_signers(sign),
+            travel=open_travel(request, answers),
+        )
         sealing = open_sealing(
             seal, registry.folder.parent, ask=ask_passphrase, stamps=time_stamp, draft=draft
         )
-        issuing = open_issuing(registry, sealing, asked=issue, draft=draft)
+        issuing = open_issuing(registry, sealing, asked=issue, draft=draft, named=issued_by or ())
     # LibreOffice and matplotlib take a second to start: beside all that is imported and read here.
     with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
         from toolkit.lab.answers import unit_choice

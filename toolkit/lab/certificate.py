@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from toolkit.lab.answers import delivered_keys, file_name, finding_lines
+from toolkit.trust.signing import HERE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from datetime import date
     from pathlib import Path
 
@@ -31,13 +32,15 @@ def deliver_certificate(
     dcc: bool,
     sealing: Sealing | None = None,
     asked: bool = False,
+    named: Sequence[str] = (),
     keep: bool,
     step: Callable[[str], None],
 ) -> tuple[Certificate, Delivered]:
     """Make a record's certificate, with ``dcc`` the XML beside it, and issue it.
 
     It is an entry of the ledger where people are enrolled, where it is sealed, or where that is ``asked``
-    for; a draft never is.
+    for; a draft never is. ``named`` are the people whom a request asks to sign. With answers the day of issue
+    is that of their request.
 
     Raises
     ------
@@ -51,6 +54,8 @@ def deliver_certificate(
     from toolkit.report.deliver import deliver
     from toolkit.report.style import read_style, style_file
 
+    if registry.travel.answers and issued is None:
+        issued = registry.today()
     style = read_style(style_file(opened.path))
     step("record")
     certificate = collect(
@@ -58,10 +63,10 @@ def deliver_certificate(
     )
     xml = build_dcc(certificate) if dcc else None
     content, issue = build_content(certificate, style), None
-    enrolled = registry.people().history.now is not None or bool(registry.signers)
+    enrolled = registry.people().history.now is not None or bool(registry.signers) or registry.travel != HERE
     issuing = open_issuing(
         registry, sealing, asked=asked or (enrolled and not certificate.draft),
-        draft=certificate.draft or (asked and draft),
+        draft=certificate.draft or (asked and draft), named=named,
     )  # fmt: skip
     if issuing is not None:
         content = issuing.content(content)

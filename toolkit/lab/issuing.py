@@ -18,14 +18,18 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
 from toolkit.files import sha256_file
-from toolkit.inputs import PDF_FILE, read_input
+from toolkit.inputs import PDF_FILE, read_input, read_regular
 from toolkit.lab.proofs import PROOF
+from toolkit.publication import publication
+from toolkit.trust.requested import Requested
+from toolkit.trust.signing import HERE
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.sealing import Sealing
     from toolkit.report.content import ReportContent
     from toolkit.trust.anchor import Anchor
+    from toolkit.trust.requests import Request
 
 Issue = Callable[[Path, Sequence[Path], int, str], Mapping[str, Any]]
 """Issues a PDF of so many pages in place, with the files that are handed over with it and the hash of what it
@@ -34,10 +38,14 @@ says; returns the ledger's proof."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Issuing:
-    """How the documents of a call are issued: over which registry, by its signers, with which seal."""
+    """How the documents of a call are issued: over which registry, by its signers, with which seal.
+
+    ``named`` are the people, by id, whom a request asks to sign.
+    """
 
     registry: Registry
     sealing: Sealing | None = None
+    named: tuple[str, ...] = ()
 
     def content(self, content: ReportContent) -> ReportContent:
         """Return the content of a document that is issued: its line of signatures, the place of its proof.
@@ -49,7 +57,7 @@ class Issuing:
         """
         from toolkit.calibration.registry.issuing import issuers
 
-        names = issuers(self.registry, content.calibrations[0].id)
+        names = issuers(self.registry, content.calibrations[0].id, self.named)
         return content.issued_by(" and ".join(names) or None)
 
     def issue(self, content: ReportContent, *, document: str, decided: str) -> Issue:
@@ -70,7 +78,11 @@ class Issuing:
         use = content.calibrations[0]
         place = place_of_symbol(pdf, pages, content)
         hashes = {file.name: _hash(file) for file in others}
-        anchor = self._anchor(use.id, {"name": document, "content": digest, **hashes}, decided)
+        try:
+            anchor = self._anchor(use.id, {"name": document, "content": digest, **hashes}, decided)
+        except Requested as outcome:
+            _show(outcome.request, others)
+            raise
         ledger = {"schema": 1, **anchor.as_dict()}
         for file in others:
             if file.suffix == ".xml":
@@ -93,10 +105,13 @@ class Issuing:
         from toolkit.calibration.registry.registry import instrument_of
         from toolkit.lab.people import checkpoint_of, lines_of
         from toolkit.trust.anchor import anchor_of
+        from toolkit.trust.ssh import ED25519
 
-        seq = issue(self.registry, record_id, document, decided=decided)
+        seq = issue(self.registry, record_id, document, decided=decided, named=self.named)
         instrument = instrument_of(record_id)
-        checkpoint = checkpoint_of(self.registry, instrument)
+        # The entry is what people sign, by whatever key; of the checkpoint only Ed25519 is a signature.
+        signers = [signer for signer in self.registry.signers if signer.public.kind == ED25519]
+        checkpoint = checkpoint_of(self.registry, instrument, signers)
         return anchor_of(lines_of(self.registry, instrument), seq - 1, checkpoint)
 
     def _digital(self, file: Path, ledger: Mapping[str, Any]) -> bytes:
@@ -107,8 +122,12 @@ class Issuing:
         return data if self.sealing is None else self.sealing.seal_xml(data)
 
 
-def open_issuing(registry: Registry, sealing: Sealing | None, *, asked: bool, draft: bool) -> Issuing | None:
+def open_issuing(
+    registry: Registry, sealing: Sealing | None, *, asked: bool, draft: bool, named: Sequence[str] = ()
+) -> Issuing | None:
     """Return how a document is issued where that, or a seal, was asked for; None where neither was.
+
+    ``named`` as of `Issuing`.
 
     Raises
     ------
@@ -121,14 +140,22 @@ def open_issuing(registry: Registry, sealing: Sealing | None, *, asked: bool, dr
             next_step="approve the record first, or leave out --issue; nothing was made", rule="usage",
         )  # fmt: skip
     if not asked and sealing is None:
-        if registry.signers:
+        if registry.signers or registry.travel != HERE:
             raise ConfigError(
-                "a signature belongs to an issue", where="--sign", got="no --issue",
+                "a signature belongs to an issue", where="--sign, --request, --answer", got="no --issue",
                 expected="--issue too: what is signed is the ledger's entry of the document",
-                next_step="add --issue, or leave out --sign; nothing was made", rule="usage",
+                next_step="add --issue, or leave these out; nothing was made", rule="usage",
             )  # fmt: skip
         return None
-    return Issuing(registry=registry, sealing=sealing)
+    return Issuing(registry=registry, sealing=sealing, named=tuple(named))
+
+
+def _show(request: Request, files: Sequence[Path]) -> None:
+    """Lay beside a request the files whose hashes it has: nobody should sign what cannot be read."""
+    if request.path is not None:
+        with publication(request.path.with_name(f"{request.path.stem}.documents")) as stage:
+            for file in files:
+                (stage / file.name).write_bytes(read_regular(file))
 
 
 def _hash(file: Path) -> str:

@@ -15,7 +15,7 @@ from toolkit.calibration.registry.people_log import PeopleLog, enrol
 from toolkit.errors import RegistryError, ToolkitError, TrustError
 from toolkit.files import write_atomic
 from toolkit.inputs import PDF_FILE, read_regular
-from toolkit.lab.proofs import ORIGIN, anchor_in, raw_lines
+from toolkit.lab.proofs import ORIGIN, anchor_in, ledgers_of, raw_lines
 from toolkit.publication import check_file
 from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
@@ -146,13 +146,19 @@ def people_answer(log: PeopleLog) -> tuple[PeopleAnswer, str]:
     return payload, text + "\n\n" + table(["to", "takes", "of"], takes, align="<><")
 
 
-def checkpoint_of(registry: Registry, instrument: str) -> Checkpoint:
-    """Return the checkpoint of an instrument's ledger as it stands, signed by the keys at hand."""
+def checkpoint_of(registry: Registry, instrument: str, signers: Sequence[Signer] | None = None) -> Checkpoint:
+    """Return the checkpoint of an instrument's ledger as it stands, signed by ``signers``: the keys at hand.
+
+    Raises
+    ------
+    TrustError
+        ``weak-key``: a key that is not Ed25519; ``not-allowed``: one of nobody who is enrolled
+    """
     texts = lines_of(registry, instrument)
     root = root_of([leaf_hash(text.encode()) for text in texts])
     checkpoint = Checkpoint(origin=f"{ORIGIN}{instrument}", size=len(texts), root=root)
     version = registry.people().history.now
-    for signer in registry.signers:
+    for signer in registry.signers if signers is None else signers:
         person = None if version is None else version.people.owner(signer.public)
         if person is None:
             raise TrustError(
@@ -184,21 +190,26 @@ def anchor_document(registry: Registry, instrument: str, seq: int | None, checkp
 
 
 def lines_of(registry: Registry, instrument: str) -> list[str]:
-    """Return the lines of an instrument's ledger.
+    """Return the lines of an instrument's ledger, or of the log of ``people``.
 
     Raises
     ------
     RegistryError
         ``missing``: there is no such instrument; the ledger is damaged
+    TrustError
+        ``people-log``
     """
     from toolkit.calibration.registry.settled import damaged
 
-    if instrument not in registry.instruments():
+    if instrument not in ledgers_of(registry):
         raise RegistryError(
             "there is no such instrument", where=registry.folder, got=instrument,
             expected=", ".join(registry.instruments()) or "an instrument with records: there is none yet",
             next_step="see 'toolkit calibration list'; nothing was changed", rule="missing",
         )  # fmt: skip
+    if instrument not in registry.instruments():
+        registry.people()  # every version of it is proved
+        return raw_lines(registry, instrument)
     ledger = registry.ledger(instrument)
     if ledger.damage is not None:
         raise damaged(registry.folder / instrument, ledger.damage)
@@ -227,7 +238,7 @@ def check_against(registry: Registry, instrument: str | None, document: Path) ->
     else:
         checkpoint = parse_checkpoint(data.decode(errors="replace"), where=document)
     named = checkpoint.origin.removeprefix(ORIGIN)
-    if named != (instrument or named) or named not in registry.instruments():
+    if named != (instrument or named) or named not in ledgers_of(registry):
         raise _without(document, f"a proof of the ledger {checkpoint.origin}")
     if anchor is not None and not anchor.proved:
         return named, Comparison("forked", "the document's own proof does not hold: it was changed")

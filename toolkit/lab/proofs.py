@@ -165,12 +165,16 @@ def _joined(states: Sequence[LedgerState], nothing: LedgerState) -> LedgerState:
 def _continuity(registry: Registry, anchor: Anchor) -> LedgerState:
     """Return how a registry's ledger stands to a proof, and who signed the entry where it has it."""
     instrument = anchor.checkpoint.origin.removeprefix(ORIGIN)
-    if instrument not in registry.instruments():
+    if instrument not in ledgers_of(registry):
         return LedgerState()
-    ledger = registry.ledger(instrument)
     comparison = compare(raw_lines(registry, instrument), anchor.checkpoint, anchor)
     if comparison.continuity != "continues":
         return LedgerState(ledger=comparison.continuity, why=f"the ledger of {instrument}: {comparison.why}")
+    if instrument not in registry.instruments():
+        registry.people()  # every version of it is proved
+        why = f"entry {anchor.index + 1} of the log of people"
+        return LedgerState(ledger="continues", why=why, signature="valid")
+    ledger = registry.ledger(instrument)
     if ledger.damage is not None:
         why = f"the ledger of {instrument} is damaged: {ledger.damage}"
         return LedgerState(ledger="continues", still_holds=False, why=why)
@@ -194,12 +198,25 @@ def _signed(registry: Registry, entry: Entry, void: frozenset[int]) -> LedgerSta
     )  # fmt: skip
 
 
+def ledgers_of(registry: Registry) -> tuple[str, ...]:
+    """Return the names of what can be witnessed and proved: the instruments, and the log of people."""
+    from toolkit.calibration.registry.people_log import place_of
+
+    people = place_of(registry.folder)
+    instruments = registry.instruments()
+    # Where an instrument is called so, it has the name: documents of it were issued under it.
+    return (*instruments, *([people.name] if people.is_dir() and people.name not in instruments else []))
+
+
 def raw_lines(registry: Registry, instrument: str) -> list[str]:
     """Return the lines of a ledger as they stand, whole or damaged: a proof tells where it was changed."""
     from toolkit.calibration.registry.ledger import LEDGER
+    from toolkit.calibration.registry.people_log import place_of
     from toolkit.calibration.registry.settled import content
 
-    data = content(registry.folder / instrument / LEDGER) or b""
+    own = instrument in registry.instruments() or instrument not in ledgers_of(registry)
+    folder = registry.folder / instrument if own else place_of(registry.folder)
+    data = content(folder / LEDGER) or b""
     return [line.decode(errors="replace") for line in data.split(b"\n") if line]
 
 
@@ -213,14 +230,15 @@ def ledger_file_state(path: Path) -> LedgerState:
     TrustError
         ``people-log``; a witness's checkpoint cannot be read
     """
-    from toolkit.calibration.registry.people_log import FOLDER, read_people
+    from toolkit.calibration.registry.people_log import FOLDER
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.settled import damaged
 
     folder = path.absolute().parent
     if folder.name == FOLDER and (folder / f"{FOLDER}-1.toml").is_file():
-        people = read_people(folder.parent / "calibrations").history
-        return LedgerState(signature="valid", why=f"{len(people.versions)} versions, each signed")
+        registry = Registry(folder.parent / "calibrations")
+        why = f"{len(registry.people().history.versions)} versions, each signed"
+        return _witnessed(registry, FOLDER, "valid", why)
     registry, instrument = Registry(folder.parent), folder.name
     ledger = registry.ledger(instrument)
     if ledger.damage is not None:
@@ -228,11 +246,19 @@ def ledger_file_state(path: Path) -> LedgerState:
     signed = sum(bool(entry.signatures) for entry in ledger.entries)
     why = f"{len(ledger.entries)} entries, {signed} of them signed by people who were enrolled then"
     signature: Signature = "valid" if signed and registry.people().history.now else "unsigned"
+    return _witnessed(registry, instrument, signature, why)
+
+
+def _witnessed(registry: Registry, instrument: str, signature: Signature, why: str) -> LedgerState:
+    """Return the state of a ledger whose lines hold, held against what witnesses have signed of it."""
     known = sorted((registry.folder.parent / "trust" / "witnessed").glob(f"{instrument}-*{SUFFIX}"))
-    lines = raw_lines(registry, instrument)
+    lines = raw_lines(registry, instrument) if known else []
     continuity: Continuity = "unknown"
     for file in known:
-        comparison = compare(lines, parse_checkpoint(read_regular(file).decode(errors="replace"), where=file))
+        checkpoint = parse_checkpoint(read_regular(file).decode(errors="replace"), where=file)
+        if checkpoint.origin != f"{ORIGIN}{instrument}":
+            continue  # of an instrument whose name begins with this one's
+        comparison = compare(lines, checkpoint)
         continuity, why = comparison.continuity, f"{why}; {file.name}: {comparison.why}"
         if continuity != "continues":
             break

@@ -80,10 +80,16 @@ def make_reports(
     ToolkitError
         the only test cannot be read, or its report is not delivered
     """
-    from toolkit.errors import ToolkitError
+    from toolkit.errors import ConfigError, ToolkitError
     from toolkit.lab.handover import diagnosis_findings
     from toolkit.report.deliver import deliver_all
+    from toolkit.trust.signing import HERE
 
+    if options.issuing is not None and options.issuing.registry.travel != HERE and len(tests) > 1:
+        raise ConfigError(
+            "a request is of one document", where="--request, --answer", got=f"{len(tests)} tests",
+            expected="one test", next_step="request each report by itself; nothing was made", rule="usage",
+        )  # fmt: skip
     resolved: list[Resolved | ToolkitError] = []
     jobs: list[Job] = []
     taken: set[Path] = set()
@@ -164,7 +170,9 @@ def _job(
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
     from toolkit.report.test.content import build_content
+    from toolkit.trust.signing import HERE
 
+    registry = None if options.issuing is None else options.issuing.registry
     style = read_style(style_file(options.template.path))
     if options.units is not None:
         style = style.in_units_of(options.units)
@@ -176,6 +184,8 @@ def _job(
         details=details_of(test, options.details),
         comparison=comparison,
         diagnosis=options.diagnosis[0] if options.diagnosis else None,
+        issued=None if registry is None or registry.travel == HERE else registry.today(),
+        titled=str if registry is None else registry.people().history.titled,
     )
     issue = None
     if options.issuing is not None:

@@ -147,33 +147,43 @@ class Comparison:
 def compare(lines: Sequence[str], checkpoint: Checkpoint, anchor: Anchor | None = None) -> Comparison:
     """Hold today's log against a checkpoint of earlier.
 
-    ``anchor``, of the document that carries the checkpoint, tells where the log was changed.
+    ``anchor``, of the document that carries the checkpoint, tells among which entries the first differs.
     """
-    if checkpoint.size > len(lines):
+    leaves = [leaf_hash(line.encode()) for line in lines[: checkpoint.size]]
+    issued, present = checkpoint.size, len(leaves)
+    differing = [] if anchor is None else _differing(leaves, anchor)
+    if present < issued:
+        place = f"; {_first(differing[0])}" if differing else ""
         return Comparison(
             "rolled_back",
-            f"{checkpoint.size} entries were issued and {len(lines)} are there: entries were removed",
+            f"{issued} entries were issued and {present} are there: entries were removed{place}",
         )
-    leaves = [leaf_hash(line.encode()) for line in lines[: checkpoint.size]]
     if root_of(leaves) == checkpoint.root:
-        later = len(lines) - checkpoint.size
         return Comparison(
-            "continues", f"its first {checkpoint.size} entries are those that were issued; {later} more"
+            "continues", f"its first {issued} entries are those that were issued; {len(lines) - issued} more"
         )
-    if anchor is not None and anchor.leaf != leaves[anchor.index]:
-        return Comparison("forked", f"entry {anchor.index + 1} was rewritten: the document has another")
-    place = "" if anchor is None else _changed(leaves, anchor)
-    return Comparison("forked", f"among the first {checkpoint.size} entries some were rewritten{place}")
+    why = _first(differing[0] if differing else (0, issued))
+    if anchor is not None and (anchor.index, anchor.index + 1) in differing[1:]:
+        why += f"; entry {anchor.index + 1}, the document's own, differs too"
+    return Comparison("forked", f"entries were rewritten: {why}")
 
 
-def _changed(leaves: Sequence[bytes], anchor: Anchor) -> str:
-    """Say which entries differ, by the subtrees beside the anchored line, whose roots the path states."""
-    ranges = [
-        f"{start + 1}" if stop == start + 1 else f"{start + 1} to {stop}"
-        for (start, stop), step in zip(_beside(len(leaves), anchor.index), reversed(anchor.path), strict=True)
-        if root_of(leaves[start:stop]) != step
+def _first(place: tuple[int, int]) -> str:
+    start, stop = place
+    entry = f"entry {stop}" if stop == start + 1 else f"one of the entries {start + 1} to {stop}"
+    return f"the first that differs from what was issued is {entry}"
+
+
+def _differing(leaves: Sequence[bytes], anchor: Anchor) -> list[tuple[int, int]]:
+    """Return the ranges of entries that differ, in order: the anchor's own, and those beside its way."""
+    beside = _beside(anchor.checkpoint.size, anchor.index)
+    roots = dict(zip(beside, reversed(anchor.path), strict=False))
+    roots[anchor.index, anchor.index + 1] = anchor.leaf
+    return [
+        (start, stop)
+        for (start, stop), root in sorted(roots.items())
+        if stop <= len(leaves) and root_of(leaves[start:stop]) != root
     ]
-    return f": in {' and '.join(ranges)}" if ranges else ""
 
 
 def _beside(size: int, index: int) -> list[tuple[int, int]]:

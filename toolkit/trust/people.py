@@ -34,6 +34,7 @@ MEANINGS: Mapping[Action, str] = {
 
 STATED: Mapping[Action, tuple[str, ...]] = {
     "approve": ("by", "approved_by"), "withdraw": ("by",), "discard": ("by",), "enrol": ("by",),
+    "issue": ("by",),
 }  # fmt: skip
 """The entries of a decision that name people: each of them signs it."""
 
@@ -269,6 +270,13 @@ class History:
         return next(
             (version for version in past[ended:] if version.sha256 == sha256), past[-1] if past else None
         )
+
+    def titled(self, text: str) -> str:
+        """Return a person's name, with the id by which a text names them; any other text as it is."""
+        key = name_key(text)
+        people = (version.people.of(key) for version in reversed(self.versions))
+        person = next((person for person in people if person is not None), None)
+        return text if person is None or key == name_key(person.name) else f"{person.name} ({person.id})"
 
     def before(self, number: int) -> History:
         """Return the versions by which version ``number`` (from 1) is judged; the first founds itself."""

@@ -21,7 +21,7 @@ from typing import Any
 from toolkit.errors import ConfigError, ToolkitError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import REQUEST_FILE, read_input
-from toolkit.trust.decisions import ACTIONS, action_of, signature_row, signer_of, statement, unsigned
+from toolkit.trust.decisions import ACTIONS, action_of, signature_row, signer_of, stated, statement, unsigned
 from toolkit.trust.keys import Signer
 from toolkit.trust.people import ROOT_HEADS, Action, Person, Version, inability, moment, version_of
 from toolkit.trust.ssh import BadSignatureError, PublicKey
@@ -117,6 +117,12 @@ class Request:
         reason = inability(version, self.action, self.time, signer.public, self.operators)
         person = version.people.owner(signer.public)
         before = self.keys(version)
+        named, demand = stated(self.body, self.action), version.people.policy.demand(self.action)
+        alone = demand.signatures == 1 and not (self.action == "enrol" and self.body["seq"] == 1)
+        if person is not None and named and alone and not any(map(person.is_named, named)):
+            reason = (
+                reason or f"it names {' and '.join(map(shown, named))}, and {person.id} is another person"
+            )
         if person is not None and person in map(version.people.owner, before):
             reason = f"{person.id} has signed it already"
         if reason is not None or person is None:

@@ -29,6 +29,10 @@ from toolkit.calibration.registry.issuing import issue, issuers
 from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError, RegistryError, TrustError
+from toolkit.trust.people import Demand, Policy
+from toolkit.trust.requested import Requested
+from toolkit.trust.requests import Request, read_request
+from toolkit.trust.signing import Travel
 
 __all__ = ["home"]
 
@@ -149,3 +153,70 @@ def test_proving_a_record_costs_less_than_five_milliseconds(home: Path) -> None:
     for _ in range(5):
         assert _registry(home).ledger("m15-virtual").damage is None
     assert 2 * (time.process_time() - started) / (5 * 20) < 0.005
+
+
+def _requested(home: Path, path: Path, *named: str, document: dict[str, str] = DOCUMENT) -> Request:
+    registry = Registry(home / "calibrations", travel=Travel(request=path))
+    with pytest.raises(Requested):
+        issue(registry, RECORD, document, decided=registry.ledger("m15-virtual").decided, named=named)
+    return read_request(path)
+
+
+def test_an_issue_travels_to_the_person_whom_the_document_names(home: Path, tmp_path: Path) -> None:
+    _found(home)
+    request = _requested(home, tmp_path / "r.json", "dora")
+    assert request.body["by"] == "Dora"
+    assert len(_registry(home).ledger("m15-virtual").entries) == 2, "a request enters nothing"
+    with pytest.raises(TrustError, match="names Dora, and anna is another person"):
+        request.signed(KEYS["anna"])
+    answer = request.signed(KEYS["dora"])[0]
+    registry = Registry(home / "calibrations", travel=Travel(answers=(answer,)))
+    assert issuers(registry, RECORD) == ("Dora",)
+    with pytest.raises(TrustError, match="decides something else"):
+        issue(
+            registry,
+            RECORD,
+            {**DOCUMENT, "content": "0" * 64},
+            decided=registry.ledger("m15-virtual").decided,
+        )
+    assert _issue(registry) == 3
+    with pytest.raises(TrustError, match="no longer the one"):
+        _issue(Registry(home / "calibrations", travel=Travel(answers=(answer,))))
+    assert _registry(home).ledger("m15-virtual").damage is None
+
+
+@pytest.mark.parametrize(
+    ("named", "rule"), [((), "person"), (("nobody",), "person"), (("carl",), "not-allowed")]
+)
+def test_a_request_of_an_issue_names_who_can_sign_it(
+    home: Path, tmp_path: Path, named: tuple[str, ...], rule: str
+) -> None:
+    _found(home)
+    registry = Registry(home / "calibrations", travel=Travel(request=tmp_path / "r.json"))
+    with pytest.raises(TrustError) as refusal:
+        issuers(registry, RECORD, named)
+    assert refusal.value.rule == rule
+    with pytest.raises(TrustError) as refusal:
+        issue(registry, RECORD, DOCUMENT, decided=registry.ledger("m15-virtual").decided, named=named)
+    assert refusal.value.rule == rule
+    assert not (tmp_path / "r.json").exists()
+
+
+def test_two_who_issue_answer_in_any_order(home: Path, tmp_path: Path) -> None:
+    _found(home, Policy(issue=Demand(roles=("head", "checker"), signatures=2)))
+    request = _requested(home, tmp_path / "r.json", "dora", "anna")
+    both = [request.signed(KEYS[name])[0] for name in ("dora", "anna")]
+    for answers in (both, both[::-1]):
+        assert issuers(Registry(home / "calibrations", travel=Travel(answers=tuple(answers))), RECORD) == (
+            "Anna",
+            "Dora",
+        )
+    with pytest.raises(TrustError, match="1 of 2 signatures"):
+        _issue(Registry(home / "calibrations", travel=Travel(answers=(both[0],))))
+    assert _issue(Registry(home / "calibrations", travel=Travel(answers=tuple(both)))) == 3
+
+
+def test_a_request_of_an_issue_is_nothing_where_nobody_is_enrolled(home: Path, tmp_path: Path) -> None:
+    registry = Registry(home / "calibrations", travel=Travel(request=tmp_path / "r.json"))
+    with pytest.raises(TrustError, match="nobody is enrolled"):
+        issuers(registry, RECORD, ("dora",))

@@ -35,7 +35,7 @@ def parsed(text: str) -> tuple[dict[str, Any], str] | None:
 
 def with_form(text: str, body: dict[str, Any]) -> tuple[dict[str, Any], str] | None:
     """The same by the form of a line."""
-    return LineForm(canonical(body)).parts(text, text.split('"'))
+    return LineForm(canonical(body)).parts(text)
 
 
 @pytest.mark.parametrize("body", [BODY, FLAT], ids=["deep", "flat"])

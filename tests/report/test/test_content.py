@@ -35,6 +35,16 @@ def test_title_page_values_of_the_source_document() -> None:
     assert values["calibration.FY.D51"] == 1.01234567
 
 
+def test_who_measured_and_who_authorises_are_titled() -> None:
+    style = Style(authorised_by="dora")
+    values = build_content(
+        make_result(), make_record(), style=style, titled=lambda text: f"the {text}"
+    ).values
+    plain = build_content(make_result(), make_record(), style=style).values
+    assert (plain["report.authorised_by"].value, values["report.authorised_by"].value) == ("dora", "the dora")
+    assert values["test.operator"].value == f"the {plain['test.operator'].value}"
+
+
 def test_every_value_and_table_is_in_the_catalogue_and_the_other_way_round() -> None:
     made, listed = content(), {one.path: one for one in REPORT.vocabulary.entries}
     assert all(REPORT.vocabulary.knows(path) for path in made.values)

@@ -52,7 +52,9 @@ def forgeries() -> Iterator[Forgery]:
     with laboratory() as home:
         request = request_of(home)
         answer = json.loads(request.signed(KEYS["dora"])[0].text)
-        other = json.loads(request_of(home, {**_EVENT, "reason": "other"}).signed(KEYS["ben"])[0].text)
+        other = json.loads(
+            request_of(home, {**_EVENT, "reason": "other", "by": "ben"}).signed(KEYS["ben"])[0].text
+        )
     for kind, place, forged in changed(answer, other):
         yield _forged(kind, place, forged)
     body, elsewhere = json.loads(answer["message"]), json.loads(other["message"])

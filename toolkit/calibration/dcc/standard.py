@@ -272,12 +272,16 @@ def _sealed(document: bytes, place: str, standards: Standards | None) -> SealChe
         ) from error  # fmt: skip
     if check.signature == "valid" or (standards is None and check.signature == "untrusted"):
         return check
+    # Nobody is told to trust the signer of a file that has no seal, or was changed.
+    next_step = "ask its issuer for the sealed file, as it was issued"
+    if check.signature == "untrusted":
+        place_of_trust = "trust/certificates of the home"
+        next_step = f"put the issuer's certificate into {place_of_trust} once you have it from the issuer"
     signer = f" ({check.issued_by}, certificate {check.certificate})" if check.issued_by else ""
     raise _refused(
         "the seal of the digital certificate does not hold", place, f"{check.signature}: {check.why}{signer}",
         "a seal by a certificate that the laboratory trusts",
-        "put the issuer's certificate into trust/certificates of the home once you have it from the issuer",
-        "dcc-seal",
+        next_step, "dcc-seal",
     )  # fmt: skip
 
 

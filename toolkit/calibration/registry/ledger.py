@@ -3,10 +3,10 @@
 ``ledger.jsonl`` only ever grows. ``head.json`` repeats the number of lines and the last hash, and
 certificates and reports print that hash: a chain by itself cannot see that its end was cut off.
 
-The text of a line is taken apart at its quotation marks where an earlier line had its form. Canonical JSON
-says each thing in one way. Of a line with nothing to escape, what stands between the texts is its skeleton;
-where skeleton and names are those of a line that was parsed, written again and compared, this one would be
-written the same. Any other line is parsed. Both ways refuse the same lines.
+Canonical JSON says each thing in one way, so the form of a line is a pattern: what its texts and its number
+may be, and everything else as it stands. A line that was parsed, written again and compared gives a form; one
+that matches a form would be written the same, and is taken apart by it. Any other line is parsed. Both ways
+refuse the same lines.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import gc
 import hashlib
 import itertools
 import json
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from datetime import date
 from functools import cached_property
-from operator import itemgetter
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
@@ -32,6 +32,9 @@ from toolkit.trust.decisions import SIGNATURE
 _MOST = 32  # forms: a ledger has some ten
 _DECODE = json.JSONDecoder().raw_decode
 _NUMBER, _TAKEN = "seq", "sha256"
+_BEFORE, _BEHIND = len(f'"{_TAKEN}":"'), len('",')  # around the hash: an entry has a time, so a comma follows
+_TEXT = r'[^"\\\x00-\x1f]*+'  # with nothing that JSON escapes
+_INTEGER = "(0|[1-9][0-9]*+)"
 
 Parts = tuple[dict[str, Any], str]
 """The entries of a line, and its text without the entry ``sha256``: what that is the hash of."""
@@ -41,35 +44,43 @@ class LineForm:
     """The lines that differ from one of them in the number ``seq`` and in texts that are no names."""
 
     def __init__(self, text: str) -> None:
-        pieces = text.split('"')
         body: dict[str, Any] = json.loads(text)
-        self._skeleton = pieces[::2]
-        texts = {name: value for name, value in body.items() if type(value) is str}
-        self._rest = {name: value for name, value in body.items() if name not in (*texts, _NUMBER)}
-        self._is_deep = any(self._rest.values())
-        # A text is a name where a colon follows it: no text of a skeleton is anything else.
-        keys = [at for at in range(1, len(pieces), 2) if pieces[at + 1].startswith(":")]
-        (place,) = [at + 1 for at in keys if pieces[at : at + 2] == [_NUMBER, f":{body[_NUMBER]},"]]
-        self._number = place // 2
-        self._names_of = itemgetter(*keys)
-        self._names = self._names_of(pieces)
-        self._texts = tuple(map(sys.intern, texts))
-        self._texts_of = itemgetter(*(at + 2 for at in keys if pieces[at + 1] == ":"))
+        rows = []
+        for name, value in body.items():
+            part = f'"({_TEXT})"' if type(value) is str else f"({_form_of(value)})"
+            rows.append(f"{re.escape(canonical(name))}:{_INTEGER if name == _NUMBER else part}")
+        self._match = re.compile(rf"\{{{','.join(rows)}\}}").fullmatch
+        self._names = tuple(map(sys.intern, body))
+        self._taken = 1 + self._names.index(_TAKEN)
+        others = {name: body[name] for name in body if name != _NUMBER and type(body[name]) is not str}
+        self._empty = {name: value for name, value in others.items() if not value}
+        self._deep = [name for name, value in others.items() if value]
 
-    def parts(self, text: str, pieces: list[str]) -> Parts | None:
-        """Return the parts of a line that is split at its quotation marks; None where it has another form."""
-        if len(pieces) != 2 * len(self._skeleton) - 1 or self._names_of(pieces) != self._names:
+    def parts(self, text: str) -> Parts | None:
+        """Return the parts of a line; None where it has another form."""
+        match = self._match(text)
+        if match is None:
             return None
-        skeleton = pieces[::2]
-        stated = skeleton[self._number]
-        number = stated[1:-1]
-        skeleton[self._number] = self._skeleton[self._number]
-        if skeleton != self._skeleton or not number.isdecimal() or stated != f":{int(number)},":
-            return None
-        if self._is_deep:
-            return _cut(text, _DECODE(text)[0])
-        body = dict(zip(self._texts, self._texts_of(pieces), strict=True))
-        return _cut(text, {**body, _NUMBER: int(number), **self._rest})
+        body: dict[str, Any] = dict(zip(self._names, match.groups(), strict=False))  # a group for each name
+        body[_NUMBER] = int(body[_NUMBER])
+        body.update(self._empty)
+        for name in self._deep:
+            body[name] = json.loads(body[name])
+        start, end = match.span(self._taken)
+        return body, text[: start - _BEFORE] + text[end + _BEHIND :]
+
+
+def _form_of(value: object) -> str:
+    """Return the pattern of a value within a line: its texts are free, its names are not."""
+    if isinstance(value, dict):
+        return (
+            r"\{"
+            + ",".join(f"{re.escape(canonical(name))}:{_form_of(value[name])}" for name in value)
+            + r"\}"
+        )
+    if isinstance(value, list):
+        return r"\[" + ",".join(map(_form_of, value)) + r"\]"
+    return f'"{_TEXT}"' if isinstance(value, str) else re.escape(canonical(value))
 
 
 class LineForms:
@@ -86,11 +97,9 @@ class LineForms:
         ValueError, KeyError, RecursionError
             it is no canonical JSON object, or has no ``sha256``
         """
-        if _is_plain(text):
-            pieces = text.split('"')
-            for form in self._forms:
-                if (parts := form.parts(text, pieces)) is not None:
-                    return parts, True
+        for form in self._forms:
+            if (parts := form.parts(text)) is not None:
+                return parts, True
         body, end = _DECODE(text)
         if end != len(text) or type(body) is not dict:
             raise ValueError("it is no JSON object")
@@ -100,14 +109,8 @@ class LineForms:
 
     def add(self, text: str) -> None:
         """Remember the form of a line that `read` has read and that was an entry."""
-        if len(self._forms) < _MOST and _is_plain(text):
-            with contextlib.suppress(ValueError):  # a table within the line has a number of this name too
-                self._forms = (*self._forms, LineForm(text))
-
-
-def _is_plain(text: str) -> bool:
-    """Tell whether a text has nothing that JSON escapes, but for the quotation marks around its texts."""
-    return "\\" not in text and text.isprintable()
+        if len(self._forms) < _MOST:
+            self._forms = (*self._forms, LineForm(text))
 
 
 def _cut(text: str, body: dict[str, Any]) -> Parts:
@@ -314,6 +317,8 @@ def _uncollected() -> Iterator[None]:
     try:
         yield
     finally:
+        gc.freeze()  # both together: what is there counts as old, and is not looked through next
+        gc.unfreeze()
         if active:
             gc.enable()
 
@@ -334,6 +339,7 @@ def _entry(line: bytes, number: int, prev: str) -> Entry:
         Entry(**body)
         _FORMS.add(text)
     moment(body["time"])
+    body["prev"] = prev  # the same text once in memory, not twice
     for key in _DAYS:
         if body.get(key) is not None:
             body[key] = date.fromisoformat(body[key])

@@ -123,7 +123,8 @@ def _check_root(people: People, publics: Sequence[PublicKey]) -> None:
             "the first enrolment takes two heads, or one and a recovery key", where=FILE,
             got=f"signed by {', '.join(sorted(heads)) or 'nobody'}",
             expected=f"{ROOT_HEADS} keys of different heads",
-            next_step="sign with both, --sign KEY --sign KEY, or make a recovery key with --recovery FILE",
+            next_step="sign with both, --sign KEY --sign KEY, or by one and a key kept apart, "
+            "--recovery FILE: toolkit person key FILE makes one",
             rule="not-allowed",
         )  # fmt: skip
 

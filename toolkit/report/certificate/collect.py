@@ -87,6 +87,7 @@ def collect(
     )
     gaps = gaps_of(record, statements, stated)
     ledger = registry.ledger(record.instrument)
+    titled = registry.people().history.titled
     return Certificate(
         id=_identity(record, stated, replaces, amendment),
         issued=day,
@@ -125,9 +126,9 @@ def collect(
         rule=stated.rule,
         interval=stated.interval,
         opinions=stated.get("opinions"),
-        entered_by=record.entered_by,
-        checked_by=None if reasons else status.checked_by,
-        approved_by=None if reasons else status.approved_by,
+        entered_by=titled(record.entered_by),
+        checked_by=None if reasons or status.checked_by is None else titled(status.checked_by),
+        approved_by=None if reasons or status.approved_by is None else titled(status.approved_by),
         status=later.state,
         record=record.id,
         record_sha256=record.sha256,

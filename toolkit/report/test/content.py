@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
@@ -40,6 +40,7 @@ class ReportedTest:
     details: ReportDetails
     comparison: Comparison | None = None
     diagnosis: Told | None = None
+    titled: Callable[[str], str] = str
 
     @property
     def info(self) -> TestInfo:
@@ -84,6 +85,7 @@ def build_content(
     details: ReportDetails | None = None,
     comparison: Comparison | None = None,
     diagnosis: Told | None = None,
+    titled: Callable[[str], str] = str,
 ) -> ReportContent:
     """Return what a template can ask for.
 
@@ -97,6 +99,7 @@ def build_content(
     details : what the report says beyond the measurement: customer, item, method, opinions
     comparison : tire models fitted to the test; None leaves their table and figures out
     diagnosis : the answer of a diagnosis and who releases it; None leaves its chapter out
+    titled : writes a person's name beside the id by which a text names them
     """
     from toolkit.recording.details import ReportDetails
 
@@ -111,6 +114,7 @@ def build_content(
         details=details or ReportDetails(),
         comparison=comparison,
         diagnosis=diagnosis,
+        titled=titled,
     )
     content = REPORT.content(
         report,
@@ -131,7 +135,8 @@ def _people(report: ReportedTest) -> frozenset[str]:
     opinions = (text for opinion in report.details.opinions for text in (opinion.statement, opinion.basis))
     parts = (report.info, report.details)
     stated = (getattr(part, field.name) for part in parts for field in fields(part))
-    return frozenset(text for text in (*stated, *opinions) if isinstance(text, str))
+    texts = [text for text in (*stated, *opinions) if isinstance(text, str)]
+    return frozenset((*texts, *map(report.titled, texts)))
 
 
 def report_id(result: TestResult, details: ReportDetails | None = None) -> str:

@@ -90,7 +90,7 @@ def _unit(name: str, description: str, unit: str) -> DeclaredValue[ReportedTest]
 _text, _number, _date = REPORT.text, REPORT.number, REPORT.date
 VALUES = (
     _text("test.name", "name of the test", lambda t, _: t.info.name),
-    _text("test.operator", "operator", lambda t, _: t.info.operator),
+    _text("test.operator", "operator", lambda t, _: t.info.operator and t.titled(t.info.operator)),
     _text("test.requestor", "requestor (customer)", lambda t, _: t.info.requestor),
     _text("test.special", "what is special about the test", lambda t, _: t.info.special),
     _text("test.surface", "surface of the road", lambda t, _: t.info.surface),
@@ -164,7 +164,7 @@ VALUES = (
     _text(
         "report.authorised_by",
         "who authorises the report: of [report], else of the style file",
-        lambda t, style: t.details.authorised_by or style.authorised_by,
+        lambda t, style: t.titled(t.details.authorised_by or style.authorised_by or "") or None,
     ),
     _text(
         "report.authorised_function",

@@ -31,7 +31,7 @@ from toolkit.report.word.controls import (
 )
 from toolkit.report.word.filled import Entry, Filled
 from toolkit.report.word.numbering import levelled, number_captions
-from toolkit.report.word.package import Template, open_package
+from toolkit.report.word.package import Template, open_package, undated
 from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark_pages, set_properties
 from toolkit.report.word.pictures import Ids, free_height, insert_at_mark, picture_run
 from toolkit.report.word.rows import fill_table
@@ -181,7 +181,7 @@ class _Filler:
         stream = io.BytesIO()
         self.package.save(stream)
         return Filled(
-            docx=self.bulk.written(stream.getvalue()),
+            docx=undated(self.bulk.written(stream.getvalue())),
             manifest=tuple(self.log.manifest),
             figures=tuple(self.log.figures),
             cells=cells,

@@ -1,0 +1,34 @@
+"""A package without times: its parts are as they were, and the day on which it was written is nowhere."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+
+import pytest
+
+from toolkit.report.word.package import undated
+
+
+def _package(year: int, method: int) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", method) as archive:
+        for name, data in (("[Content_Types].xml", b"<a/>"), ("word/document.xml", b"<b/>" * 999)):
+            part = zipfile.ZipInfo(name, date_time=(year, 5, 17, 12, 34, 56))
+            part.extra, part.comment = b"\x99\x99\x02\x00xy", b"a comment"
+            archive.writestr(part, data, method)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_the_same_content_is_the_same_bytes(method: int) -> None:
+    first, second = _package(1999, method), _package(2026, method)
+    assert first != second
+    assert undated(first) == undated(second)
+    with zipfile.ZipFile(io.BytesIO(undated(first))) as archive:
+        assert archive.testzip() is None
+        assert archive.read("word/document.xml") == b"<b/>" * 999
+        assert {part.date_time for part in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert {(part.extra, part.comment) for part in archive.infolist()} == {
+            (b"\x99\x99\x02\x00xy", b"a comment")
+        }
