@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -134,6 +135,27 @@ def test_the_next_run_is_written_with_what_each_member_predicts(run, diagnosed, 
     predicted = (tmp_path / "n" / "predictions.csv").read_text().splitlines()[0]
     assert set(predicted.split(",")) == {"t", "F_channel_delay_on_F", "F_filter_lag_on_F"}
     assert re.search(r"times as fast", (tmp_path / "n" / "operator.txt").read_text())
+
+
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_the_sheet_of_the_next_run_draws_what_each_member_predicts(run, diagnosed, tmp_path):
+    template = ROOT / "report_templates" / "plan.docx"
+    planned = run("plan", "next", diagnosed, "--out", "n", "--template", template, "--json")
+    assert planned.return_value == 0, planned
+    document = json.loads(planned.stdout)["document"]
+    assert [figure["tag"] for figure in document["figures"]] == ["tk:figure.plan_figure_1"]
+    assert "filter_lag on F" in document["figures"][0]["alt"]
+    assert (tmp_path / "n" / "plan.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_the_sheet_of_a_test_stands_beside_its_protocol(run, quick, tmp_path):
+    template = ROOT / "report_templates" / "plan.docx"
+    planned = run("plan", "test", "--u", "conicity", "--out", "p", "--template", template, "--json")
+    assert planned.return_value == 0, planned
+    assert json.loads(planned.stdout)["document"]["warnings"] == []
+    names = {"plan.docx", "plan.pdf", "plan.toml", "protocol.toml"}
+    assert {path.name for path in (tmp_path / "p").iterdir()} == names
 
 
 def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):

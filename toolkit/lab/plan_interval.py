@@ -11,14 +11,24 @@ from toolkit.findings import Finding
 from toolkit.lab.answers import findings_text, table
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from toolkit.calibration.registry.registry import Registry
     from toolkit.planning.interval import IntervalPlan
+    from toolkit.report.word.package import Template
 
 
 def interval_plan_answer(
-    registry: Registry, instrument: str, *, reliability: float, tests_a_year: float | None, load: str | None
+    registry: Registry,
+    instrument: str,
+    *,
+    reliability: float,
+    tests_a_year: float | None,
+    load: str | None,
+    out: Path | None = None,
+    template: Template | None = None,
 ) -> tuple[dict[str, Any], str, list[Finding]]:
-    """Return the interval of an instrument as JSON and as text, with its findings.
+    """Return the interval of an instrument as JSON and as text, with its findings; its sheet into ``out``.
 
     Raises
     ------
@@ -28,6 +38,7 @@ def interval_plan_answer(
     from toolkit.calibration.control.chart import control_chart
     from toolkit.calibration.control.recall import due_of
     from toolkit.declared import answer
+    from toolkit.lab.plan_sheets import interval_sheet, sheet_text, write_plan
     from toolkit.planning.interval import paths_of, plan_interval
 
     if not 0.5 <= reliability < 1:
@@ -46,7 +57,10 @@ def interval_plan_answer(
         "method_2_days": due.recommendation.days, "findings": [finding.as_dict() for finding in findings],
     }  # fmt: skip
     payload["next"] = None if next_date is None else next_date.isoformat()
-    return payload, _text(plan, payload, findings), findings
+    if out is not None:
+        sheet = interval_sheet(plan, instrument, due.record, findings, registry.today())
+        payload |= write_plan({}, out, sheet, template)
+    return payload, _text(plan, payload, findings) + sheet_text(payload), findings
 
 
 def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
@@ -67,6 +81,8 @@ def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
 
 
 def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) -> str:
+    from toolkit.planning.interval import ASSUMPTIONS
+
     head = (
         f"{payload['instrument']}: {plan.days} days, next by {payload['next']}"
         if plan.days
@@ -90,8 +106,7 @@ def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) 
             align=">>>>",
         ),
         "",
-        "it assumes: a steady trend and a random walk go on as they did; a session finds what is beyond, and",
-        "all tests since the session before are then recalled; nothing breaks at once",
+        "it assumes:", *(f"  {text}" for text in ASSUMPTIONS),
     ]  # fmt: skip
     found = findings_text(findings)
     return "\n".join([*lines, *([found] if found else [])])
