@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,18 @@ def test_the_sheet_draws_the_risk_over_the_days(tmp_path: Path) -> None:
         in (document["figures"][0]["alt"])
     )
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"plan.docx", "plan.pdf"}
+
+
+def test_a_reliability_that_no_interval_keeps_names_the_nearest_that_one_does(tmp_path: Path) -> None:
+    """Sessions scatter by a tolerance, without a trend: not even 30 days keep 99.9 %."""
+    home = home_of(tmp_path / "home", [1.0, 1.001, 1.0, 1.001, 1.0, 1.001, 1.0])
+    with pytest.raises(ToolkitError) as refused:
+        run(home, "--reliability", "0.999", "--out", tmp_path / "out")
+    assert (refused.value.rule, refused.value.exit_code) == ("plan-infeasible", 2)
+    assert not (tmp_path / "out").exists()
+    nearest = re.search(r"--reliability ([^\s,]+)", str(refused.value.next_step))
+    assert nearest is not None
+    assert run(home, "--reliability", nearest[1])[1]["days"] >= 30
 
 
 def test_what_cannot_be_planned_is_an_error(tmp_path: Path) -> None:

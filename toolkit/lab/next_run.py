@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -50,7 +52,8 @@ def plan_next(
     Raises
     ------
     ConfigError
-        ``plan-next``: no class, a case that is another one, no run that can be made
+        ``plan-next``: no class, a case that is another one, no run that can be made;
+        ``plan-infeasible``: no run stays within the limits, with the nearest limits that one keeps
     """
     from datetime import date
 
@@ -89,7 +92,12 @@ def plan_next(
             learn=(lambda _runs: None) if code is None else code.learn,
         )  # fmt: skip
         best = search.best()
-        chosen, repeat = search.judge(best), search.judge(Change(run=best.run))
+        chosen = search.judge(best)
+        if chosen is None and reach:
+            raise _infeasible(problem, reach)
+        # A repeat was made once: limits of the next run are none of it.
+        recorded = dataclasses.replace(search, limits={}, judged={}, runs={}) if reach else search
+        repeat = recorded.judge(Change(run=best.run))
     if chosen is None or repeat is None:
         raise _wrong("no run can be simulated", read.path, best.run, "a run of the case",
                      "look at the case's simulation")  # fmt: skip
@@ -267,6 +275,26 @@ def plan_text(plan: NextRunPlan, files: Sequence[str]) -> str:
 
 def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in conditions.items() if key != "file"}
+
+
+def _infeasible(problem: Problem, limits: Mapping[str, tuple[float, float]]) -> ConfigError:
+    """Return the error of limits that no change of a recording keeps, with the nearest."""
+    from toolkit.planning.next_run import nearest_limits
+
+    run, nearest = nearest_limits(problem, limits)
+    # Rounded outward: the recording itself lies on the limit.
+    wide = " ".join(f"--limit {name}={_ends(*span)}" for name, span in nearest.items())
+    return ConfigError(
+        "no run stays within the limits", where="--limit",
+        got=" ".join(f"{name}={low:g}..{high:g}" for name, (low, high) in limits.items()),
+        expected=f"nearest: what was recorded in {run}", next_step=f"ask with {wide}; nothing was written",
+        rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def _ends(low: float, high: float) -> str:
+    step = 10.0 ** (math.floor(math.log10(high - low)) - 3)
+    return f"{math.floor(low / step) * step:.6g}..{math.ceil(high / step) * step:.6g}"
 
 
 def _wrong(problem: str, where: object, actual: object, expected: str, next_step: str) -> ConfigError:

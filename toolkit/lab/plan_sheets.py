@@ -176,7 +176,7 @@ def interval_sheet(
         kind="interval",
         subject=instrument,
         basis=f"{record}: {plan.readings} readings of {plan.limiting}",
-        size=f"{plan.days} days" if plan.days else f"no interval keeps {100 * plan.reliability:g} %",
+        size=f"{plan.days} days",
         summary=f"After {plan.chosen.days} days inside the tolerance with a chance of {inside}; asked for: "
         f"{100 * plan.reliability:g} %. {plan.limiting} drifts most.",
         issued=issued,

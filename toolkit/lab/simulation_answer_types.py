@@ -264,7 +264,7 @@ class _IntervalKeys(_Sheet):
     instrument: str
     record: str
     in_use: Annotated[str | None, "interval, as its approval states it"]
-    next: Annotated[str | None, "day of the next session"]
+    next: Annotated[str, "day of the next session"]
     method_2_days: Annotated[int | None, "what drift alone recommends"]
     findings: list[FindingEntry]
 
