@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -136,6 +137,27 @@ def test_the_next_run_is_written_with_what_each_member_predicts(run, diagnosed, 
     assert re.search(r"times as fast", (tmp_path / "n" / "operator.txt").read_text())
 
 
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_the_sheet_of_the_next_run_draws_what_each_member_predicts(run, diagnosed, tmp_path):
+    template = ROOT / "report_templates" / "plan.docx"
+    planned = run("plan", "next", diagnosed, "--out", "n", "--template", template, "--json")
+    assert planned.return_value == 0, planned
+    document = json.loads(planned.stdout)["document"]
+    assert [figure["tag"] for figure in document["figures"]] == ["tk:figure.plan_figure_1"]
+    assert "filter_lag on F" in document["figures"][0]["alt"]
+    assert (tmp_path / "n" / "plan.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_the_sheet_of_a_test_stands_beside_its_protocol(run, quick, tmp_path):
+    template = ROOT / "report_templates" / "plan.docx"
+    planned = run("plan", "test", "--u", "conicity", "--out", "p", "--template", template, "--json")
+    assert planned.return_value == 0, planned
+    assert json.loads(planned.stdout)["document"]["warnings"] == []
+    names = {"plan.docx", "plan.pdf", "plan.toml", "protocol.toml"}
+    assert {path.name for path in (tmp_path / "p").iterdir()} == names
+
+
 def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
     shown = run("plan", "next", diagnosed)
     assert shown.return_value == 0, shown
@@ -175,3 +197,26 @@ def test_a_file_that_is_no_answer(run, tmp_path):
     (tmp_path / "diagnosis.json").write_text("{}", encoding="utf-8")
     failed = run("plan", "next", tmp_path / "diagnosis.json")
     assert failed.exception.rule == "not-a-diagnosis"
+
+
+def test_a_limit_below_what_was_recorded_is_kept_and_the_repeat_is_still_that_of_the_recording(
+    run, diagnosed, tmp_path
+):
+    planned = run("plan", "next", diagnosed, "--limit", "u=-1.2..1.2", "--out", "n", "--json")
+    assert planned.return_value == 0, planned
+    inputs = [float(row.split(",")[1]) for row in (tmp_path / "n" / "next.csv").read_text().splitlines()[1:]]
+    assert -1.2 <= min(inputs) < max(inputs) <= 1.2
+    free = json.loads(run("plan", "next", diagnosed, "--json").stdout)
+    assert json.loads(planned.stdout)["power_of_repeat"] == pytest.approx(free["power_of_repeat"], abs=0.2)
+
+
+def test_limits_that_no_run_keeps_name_the_nearest_that_one_does(run, diagnosed, tmp_path):
+    failed = run("plan", "next", diagnosed, "--limit", "u=5..6", "--out", "n")
+    error = failed.exception
+    assert isinstance(error, ConfigError)
+    assert (error.rule, error.exit_code) == ("plan-infeasible", 2)
+    assert "r1.csv" in str(error.expected)
+    assert not (tmp_path / "n").exists()
+    limit = re.search(r"--limit ([^\s;]+)", str(error.next_step))
+    assert limit is not None
+    assert run("plan", "next", diagnosed, "--limit", limit[1]).return_value == 0

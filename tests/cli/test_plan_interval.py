@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +50,32 @@ def test_a_faster_drift_is_due_sooner(tmp_path: Path) -> None:
     assert fast["chosen"]["recalled_a_year"] == pytest.approx(100 * fast["chosen"]["beyond"])
     assert slow["next"] == (dt.date(2024, 3, 1) + dt.timedelta(days=slow["days"])).isoformat()
     assert slow["in_use"] == "12 months"
+
+
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_the_sheet_draws_the_risk_over_the_days(tmp_path: Path) -> None:
+    home = home_of(tmp_path / "home", [1 + 0.0005 * i for i in range(7)])
+    _, answer = run(home, "--out", tmp_path / "out")
+    document = answer["document"]
+    assert document["warnings"] == []
+    assert [figure["tag"] for figure in document["figures"]] == ["tk:figure.plan_figure_1"]
+    assert (
+        f"{answer['chosen']['days']}: {100 * answer['chosen']['beyond']:.1f} %"
+        in (document["figures"][0]["alt"])
+    )
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"plan.docx", "plan.pdf"}
+
+
+def test_a_reliability_that_no_interval_keeps_names_the_nearest_that_one_does(tmp_path: Path) -> None:
+    """Sessions scatter by a tolerance, without a trend: not even 30 days keep 99.9 %."""
+    home = home_of(tmp_path / "home", [1.0, 1.001, 1.0, 1.001, 1.0, 1.001, 1.0])
+    with pytest.raises(ToolkitError) as refused:
+        run(home, "--reliability", "0.999", "--out", tmp_path / "out")
+    assert (refused.value.rule, refused.value.exit_code) == ("plan-infeasible", 2)
+    assert not (tmp_path / "out").exists()
+    nearest = re.search(r"--reliability ([^\s,]+)", str(refused.value.next_step))
+    assert nearest is not None
+    assert run(home, "--reliability", nearest[1])[1]["days"] >= 30
 
 
 def test_what_cannot_be_planned_is_an_error(tmp_path: Path) -> None:

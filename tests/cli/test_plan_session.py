@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -116,6 +117,28 @@ def test_a_plan_never_overwrites_readings(planned: tuple[Path, dict[str, Any]], 
     refused = toolkit("plan", "session", "m15-virtual", "--out", out, "--home", home, code=2)
     assert "the folder has a plan" in refused.stderr
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_a_template_makes_the_sheet_of_the_same_steps(home: Path, tmp_path: Path) -> None:
+    out = tmp_path / "next"
+    said = toolkit(
+        "plan", "session", "m15-virtual", "--loads", 30, "--out", out, "--home", home, "--json",
+        "--template", CALIBRATIONS.parent / "report_templates" / "plan.docx",
+    )  # fmt: skip
+    document = json.loads(said.stdout)["document"]
+    assert document["warnings"] == []
+    assert {Path(document[kind]).name for kind in ("docx", "pdf")} == {"plan.docx", "plan.pdf"}
+    with zipfile.ZipFile(out / "plan.docx") as package:
+        text = package.read("word/document.xml").decode()
+    with (out / "sheet.csv").open(newline="") as file:
+        steps = [row["what to do"].strip() for row in csv.DictReader(file)]
+    assert all(f">{step}<" in text for step in steps)
+
+
+def test_a_template_without_a_folder_is_an_error_before_the_search(home: Path) -> None:
+    refused = toolkit("plan", "session", "m15-virtual", "--home", home, "--template", "x.docx", code=2)
+    assert "add --out DIR" in refused.stderr
 
 
 def test_a_session_file_serves_in_place_of_the_record(home: Path, tmp_path: Path) -> None:

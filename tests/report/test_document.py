@@ -25,6 +25,7 @@ KINDS = {
     "pruefbericht": "report",
     "summary": "report",
     "audit": "audit",
+    "plan": "plan",
     "certificate": "certificate",
     "comparison": "comparison",
     "diagnosis": "diagnosis",

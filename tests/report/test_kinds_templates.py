@@ -23,6 +23,7 @@ from tests.report.certificate.test_certificate import STYLE, registry_of
 from tests.report.comparison.test_comparison_document import content as compared
 from tests.report.comparison.test_comparison_document import pair
 from tests.report.diagnosis.test_answer import ANSWER
+from tests.report.plan.plan_factory import sheet
 from tests.report.report_factory import make_record, make_result
 from tests.report.template_factory import FOLDER
 from toolkit.audit.archive import audit_archive
@@ -40,6 +41,7 @@ from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.kinds import check as check_template
+from toolkit.report.plan.content import build_plan_content
 from toolkit.report.style import Style, read_style, replace_terms, style_file
 from toolkit.report.test.content import build_content, report_id
 from toolkit.report.word.contents_pages import pdf_outline, pdf_text
@@ -90,6 +92,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Delivered]:
         ),
         "certificate": certified(collect(registry_of(work), "pair-r1", STYLE, issued=CALIBRATED), STYLE),
         "comparison": compared(pair()),
+        "plan": build_plan_content(sheet(), Style()),
         "diagnosis": build_diagnosis_content(
             read_case(write_case(tmp_path_factory.mktemp("case"), HEAD + TWO, **recordings)),
             Result(diagnosis=ANSWER, search=None),

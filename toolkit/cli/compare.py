@@ -130,8 +130,9 @@ def command(
     """
     from toolkit.comparison.compare import compare
     from toolkit.lab.answers import delivered_keys, unit_choice
-    from toolkit.lab.compare import comparison_template, read_entries, write_comparison
+    from toolkit.lab.compare import read_entries, write_comparison
     from toolkit.lab.compare_answer import comparison_payload, comparison_text
+    from toolkit.lab.home import document_template
 
     if laboratories is not None:
         return _laboratories(laboratories, sources, reference, sigma, figures, out, json=json, quiet=quiet)
@@ -145,7 +146,7 @@ def command(
     engine = choose_reader(reader)
     style = unit_choice(units or "SI")
     started = time.perf_counter()
-    opened = comparison_template(template, out, home)
+    opened = document_template(template, out, default="comparison.docx", home=home)
     with progress(None, "reading", show=not (json or quiet)) as step:
         entries, findings = read_entries(
             sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -28,6 +29,10 @@ app = typer.Typer(help="Plans: what to measure next: sessions, tests, runs, inte
 Out = Annotated[
     Path | None,
     typer.Option("--out", callback=into_folder, help="Folder for the plan's files; none of them may exist."),
+]
+SheetTemplate = Annotated[
+    Path | None,
+    typer.Option("--template", help="Word template of the plan's sheet, plan.docx and plan.pdf in --out."),
 ]
 
 
@@ -71,6 +76,7 @@ def session(
         ),
     ] = None,
     out: Out = None,
+    template: SheetTemplate = None,
     known_at: KnownAt = None,
     calibrations: Calibrations = None,
     home: Home = None,
@@ -85,11 +91,11 @@ def session(
     tolerances.
 
     --out gets SESSION.toml, loads.csv and check.csv, which 'toolkit calibrate' reads once the readings are
-    filled in, and the operator's sheet.
+    filled in, and the operator's sheet; with --template as Word and PDF too.
 
     Example: toolkit plan session m15-virtual --u "FY=1.2 N" --out next
     """
-    from toolkit.lab.home import open_registry
+    from toolkit.lab.home import document_template, open_registry
     from toolkit.lab.plan_session import PlanOrder, session_plan_answer
     from toolkit.planning.row_exchange import CRITERIA
 
@@ -102,12 +108,17 @@ def session(
     order = PlanOrder(
         instrument=instrument, session=session_file, fixtures=fixtures, demands=tuple(demands or ()),
         minutes=minutes, loads=loads, criterion=criterion, seed=seed, on=day(on),
-        known_at=day(known_at), out=out,
+        known_at=day(known_at), out=out, template=document_template(template, out),
     )  # fmt: skip
     payload, text, findings = session_plan_answer(open_registry(calibrations, home), order)
     payload["timing"] = {"seconds": time.perf_counter() - started}
     answer(payload, text, as_json=json, quiet=quiet)
-    return exit_code(findings)
+    return max(sheet_code(payload), exit_code(findings))
+
+
+def sheet_code(payload: Mapping[str, Any]) -> int:
+    """Return 1 where a delivered sheet has warnings."""
+    return int(bool(payload.get("document", {}).get("warnings")))
 
 
 @app.command("interval")
@@ -123,6 +134,14 @@ def interval(
         float | None, typer.Option("--tests", help="Tests a year, for how many of them are put at risk.")
     ] = None,
     load: Annotated[str | None, typer.Option("--load", help="By the errors of this load only.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", callback=into_folder, help="Folder for its sheet, plan.docx and plan.pdf."),
+    ] = None,
+    template: Annotated[
+        Path | None,
+        typer.Option("--template", help="Word template of --out; default: report_templates/plan.docx."),
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -136,13 +155,14 @@ def interval(
 
     Example: toolkit plan interval m15-virtual --reliability 0.95 --tests 200
     """
-    from toolkit.lab.home import open_registry
+    from toolkit.lab.home import document_template, open_registry
     from toolkit.lab.plan_interval import interval_plan_answer
 
     started = time.perf_counter()
     payload, text, findings = interval_plan_answer(
-        open_registry(calibrations, home), instrument, reliability=reliability, tests_a_year=tests, load=load
-    )
+        open_registry(calibrations, home), instrument, reliability=reliability, tests_a_year=tests, load=load,
+        out=out, template=document_template(template, out, default="plan.docx", home=home),
+    )  # fmt: skip
     payload["timing"] = {"seconds": time.perf_counter() - started}
     answer(payload, text, as_json=json, quiet=quiet)
-    return exit_code(findings)
+    return max(sheet_code(payload), exit_code(findings))

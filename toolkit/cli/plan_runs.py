@@ -24,7 +24,7 @@ from toolkit.cli.console import (
     into_folder,
     progress,
 )
-from toolkit.cli.plan import app
+from toolkit.cli.plan import SheetTemplate, app, sheet_code
 
 
 @app.command("test")
@@ -69,6 +69,7 @@ def protocol(
             help="Folder for protocol.toml and the plan.toml of `toolkit simulate`.",
         ),
     ] = None,
+    template: SheetTemplate = None,
     calibration: CalibrationId = None,
     draft: Draft = False,
     calibrations: Calibrations = None,
@@ -83,6 +84,7 @@ def protocol(
 
     Example: toolkit plan test --like tests/2019-06-04 --u "conicity=2 N" --load "833 lbf" --out plan
     """
+    from toolkit.lab.home import document_template
     from toolkit.lab.protocol_plan import ProtocolOrder, plan_test
 
     started = time.perf_counter()
@@ -91,11 +93,12 @@ def protocol(
         between_files_s=between_files, calibration=calibration, calibrations=calibrations, home=home,
         draft=draft,
     )  # fmt: skip
+    opened = document_template(template, out)
     with progress(None, "planning", show=not (json or quiet)) as step:
-        payload, text = plan_test(order, out, tell=step)
+        payload, text = plan_test(order, out, template=opened, tell=step)
     payload["timing"] = {"seconds": time.perf_counter() - started}
     answer(payload, text, as_json=json, quiet=quiet)
-    return 0
+    return sheet_code(payload)
 
 
 @app.command("next")
@@ -125,6 +128,7 @@ def following(
             help="Folder for the inputs, what each member predicts, and the steps.",
         ),
     ] = None,
+    template: SheetTemplate = None,
     isolated: Isolated = False,
     memory: Memory = None,
     processes: Processes = None,
@@ -142,15 +146,17 @@ def following(
     Example: toolkit plan next answer --out next
     """
     from toolkit.lab.diagnosis import worker_limits
+    from toolkit.lab.home import document_template
     from toolkit.lab.next_run import plan_next
 
     started = time.perf_counter()
+    opened = document_template(template, out)
     with progress(None, "planning", show=not (json or quiet)) as step:
         payload, text = plan_next(
             source, out, case=case, limits=tuple(limit or ()), budget_s=budget, calibrations=calibrations,
             home=home, worker=worker_limits(isolated=isolated, memory_GB=memory, processes=processes),
-            tell=step,
+            template=opened, tell=step,
         )  # fmt: skip
     payload["timing"] = {"seconds": time.perf_counter() - started}
     answer(payload, text, as_json=json, quiet=quiet)
-    return 0
+    return sheet_code(payload)

@@ -17,22 +17,6 @@ if TYPE_CHECKING:
     from toolkit.report.word.package import Template
 
 
-def comparison_template(template: Path | None, out: Path | None, home: Path | None) -> Template | None:
-    """Return the template of a comparison's document, judged before anything is read; None without one."""
-    from toolkit.errors import ConfigError
-    from toolkit.lab.home import home_template
-    from toolkit.report.word.package import read_template
-
-    if out is None:
-        if template is not None:
-            raise ConfigError(
-                "a template needs a folder for what it makes", where="--template", got=template,
-                expected="--out DIR beside it", next_step="add --out DIR", rule="template-without-out",
-            )  # fmt: skip
-        return None
-    return read_template(template or home_template("comparison.docx", home))
-
-
 def write_comparison(
     comparison: Comparison,
     style: Style,

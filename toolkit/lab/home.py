@@ -14,6 +14,7 @@ from toolkit.publication import check_folder, publication
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.report.word.package import Template
     from toolkit.trust.keys import Signer
     from toolkit.trust.signing import Travel
 
@@ -121,6 +122,30 @@ def registry_if_any(calibrations: Path | None = None, home: Path | None = None) 
         if calibrations is not None or home is not None:
             raise
         return None
+
+
+def document_template(
+    template: Path | None, out: Path | None, *, default: str | None = None, home: Path | None = None
+) -> Template | None:
+    """Return the template of a document in ``out``, judged before anything is read; None without one.
+
+    ``default`` is the home's template where none is named; None: there is then no document.
+
+    Raises
+    ------
+    ConfigError
+        ``template-without-out``; TemplateError: the file is no template
+    """
+    from toolkit.report.word.package import read_template
+
+    if out is None and template is not None:
+        raise ConfigError(
+            "a template needs a folder for what it makes", where="--template", got=template,
+            expected="--out DIR beside it", next_step="add --out DIR", rule="template-without-out",
+        )  # fmt: skip
+    if out is None or (template is None and default is None):
+        return None
+    return read_template(template or home_template(str(default), home))
 
 
 def home_template(name: str, home: Path | None = None) -> Path:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from toolkit.declared import Entry
 from toolkit.errors import ConfigError
+from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
@@ -18,46 +19,10 @@ if TYPE_CHECKING:
     from toolkit.planning.members import Member
     from toolkit.planning.next_run import NextRun
     from toolkit.report.content import Plot
+    from toolkit.report.word.package import Template
     from toolkit.worker.posix import Limits
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PartedPair:
-    """Two members, of which the first is true."""
-
-    true: Annotated[str, Entry("the member that is true")]
-    other: Annotated[str, Entry("the member that it is held against")]
-    recorded: Annotated[float, Entry("by how much the recordings prefer the true one, log-likelihood")]
-    repeat: Annotated[float, Entry("expected log-evidence of a repeat of the best recording")]
-    expected: Annotated[float, Entry("expected log-evidence of the run that is proposed")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NextRunPlan:
-    """The answer of ``toolkit plan next``."""
-
-    case_sha256: Annotated[str, Entry("of the case that the answer is of")]
-    members: Annotated[tuple[str, ...], Entry("of the class, the likeliest first")]
-    lost: Annotated[tuple[str, ...], Entry("members of the answer that could not be fitted")]
-    steps: Annotated[tuple[str, ...], Entry("what the operator does")]
-    conditions: Annotated[dict[str, str], Entry("of the run")]
-    seconds: Annotated[float, Entry("how long it takes")]
-    pairs: Annotated[tuple[PartedPair, ...], Entry("what the run parts")]
-    power: Annotated[float, Entry("chance that the run alone puts the true member ahead of all others")]
-    power_of_repeat: Annotated[float, Entry("the same of a repeat")]
-    together: Annotated[tuple[tuple[str, str], ...], Entry("pairs that it does not part")]
-    judged: Annotated[int, Entry("runs that were tried")]
-    complete: Annotated[bool, Entry("whether the search ended by itself")]
-    assumptions: Annotated[tuple[str, ...], Entry("what it rests on")]
-
-
-ASSUMPTIONS = (
-    "the true cause is a member of the class, with parameters near those fitted",
-    "the noise of the run is that of the recordings",
-    "inputs stay within what was recorded, or the limits that were given",
-)
 
 
 def plan_next(
@@ -70,6 +35,7 @@ def plan_next(
     calibrations: Path | None = None,
     home: Path | None = None,
     worker: Limits | None = None,
+    template: Template | None = None,
     tell: Callable[[str], None] = lambda _text: None,
 ) -> tuple[dict[str, Any], str]:
     """Return the JSON answer and the text of the run that parts an answer's class; write its files.
@@ -81,12 +47,16 @@ def plan_next(
     limits : ``NAME=LOW..HIGH`` in the channel's unit
     budget_s : seconds of the search over runs
     worker : limits of the case's own code; None runs it in this process
+    template : of the sheet that stands in ``out`` beside the other files; None for none
 
     Raises
     ------
     ConfigError
-        ``plan-next``: no class, a case that is another one, no run that can be made
+        ``plan-next``: no class, a case that is another one, no run that can be made;
+        ``plan-infeasible``: no run stays within the limits, with the nearest limits that one keeps
     """
+    from datetime import date
+
     from toolkit.declared import answer
     from toolkit.diagnosis.answer.reader import read_answer
     from toolkit.diagnosis.case.reader import read_case
@@ -94,6 +64,7 @@ def plan_next(
     from toolkit.diagnosis.simulators.build_simulator import model_of
     from toolkit.diagnosis.simulators.case_code import running
     from toolkit.lab.diagnosis import machine_registry
+    from toolkit.lab.plan_sheets import next_sheet, sheet_text, write_plan
     from toolkit.planning.members import class_of, members_of
     from toolkit.planning.next_run import Change, RunSearch
 
@@ -121,16 +92,25 @@ def plan_next(
             learn=(lambda _runs: None) if code is None else code.learn,
         )  # fmt: skip
         best = search.best()
-        chosen, repeat = search.judge(best), search.judge(Change(run=best.run))
+        chosen = search.judge(best)
+        if chosen is None and reach:
+            raise _infeasible(problem, reach)
+        # A repeat was made once: limits of the next run are none of it.
+        recorded = dataclasses.replace(search, limits={}, judged={}, runs={}) if reach else search
+        repeat = recorded.judge(Change(run=best.run))
     if chosen is None or repeat is None:
         raise _wrong("no run can be simulated", read.path, best.run, "a run of the case",
                      "look at the case's simulation")  # fmt: skip
     plan = _plan(
         read, diagnosis.effects, members, chosen, repeat, len(search.judged), time.monotonic() < ends
     )
-    files = [] if out is None else _write(problem, members, chosen, plan, out)
-    payload = answer(plan) | {"out": out, "files": files, "findings": []}
-    return payload, plan_text(plan, files)
+    payload: dict[str, Any] = answer(plan) | {"out": out, "files": [], "findings": []}
+    if out is not None:
+        figures = plots(problem, members, chosen)
+        files = _files(problem, members, chosen, plan, figures)
+        sheet = next_sheet(plan, figures, date.today())  # noqa: DTZ011
+        payload |= write_plan(files, out, sheet, template) | {"files": list(files)}
+    return payload, plan_text(plan, payload["files"]) + sheet_text(payload)
 
 
 def _case_of(file: Path) -> Path:
@@ -203,12 +183,15 @@ def _plan(
     )  # fmt: skip
 
 
-def _write(
-    problem: Problem, members: Sequence[Member], chosen: NextRun, plan: NextRunPlan, out: Path
-) -> list[str]:
-    """Write inputs, predictions, figures and the operator's steps; return their names."""
+def _files(
+    problem: Problem,
+    members: Sequence[Member],
+    chosen: NextRun,
+    plan: NextRunPlan,
+    figures: Sequence[Plot],
+) -> dict[str, bytes]:
+    """Return inputs, predictions, figures and the operator's steps by the names of their files."""
     from toolkit.diagnosis.fit.predict import csv_of
-    from toolkit.publication import publication
     from toolkit.report.figures import draw
 
     run, case = chosen.run, problem.case
@@ -220,17 +203,12 @@ def _write(
         for name in problem.names
         for member, predicted in zip(members, chosen.predicted, strict=True)
     }
-    files: dict[str, bytes] = {
+    files = {
         INPUTS: csv_of(columns).encode(),
         PREDICTIONS: csv_of(clock | said).encode(),
         STEPS: ("\n".join(_operator(plan)) + "\n").encode(),
     }
-    for plot in plots(problem, members, chosen):
-        files[f"{plot.name}.png"] = draw(plot).png
-    with publication(out) as stage:
-        for name, content in files.items():
-            (stage / name).write_bytes(content)
-    return list(files)
+    return files | {f"{plot.name}.png": draw(plot).png for plot in figures}
 
 
 def _operator(plan: NextRunPlan) -> list[str]:
@@ -297,6 +275,26 @@ def plan_text(plan: NextRunPlan, files: Sequence[str]) -> str:
 
 def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in conditions.items() if key != "file"}
+
+
+def _infeasible(problem: Problem, limits: Mapping[str, tuple[float, float]]) -> ConfigError:
+    """Return the error of limits that no change of a recording keeps, with the nearest."""
+    from toolkit.planning.next_run import nearest_limits
+
+    run, nearest = nearest_limits(problem, limits)
+    # Rounded outward: the recording itself lies on the limit.
+    wide = " ".join(f"--limit {name}={_ends(*span)}" for name, span in nearest.items())
+    return ConfigError(
+        "no run stays within the limits", where="--limit",
+        got=" ".join(f"{name}={low:g}..{high:g}" for name, (low, high) in limits.items()),
+        expected=f"nearest: what was recorded in {run}", next_step=f"ask with {wide}; nothing was written",
+        rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def _ends(low: float, high: float) -> str:
+    step = 10.0 ** (math.floor(math.log10(high - low)) - 3)
+    return f"{math.floor(low / step) * step:.6g}..{math.ceil(high / step) * step:.6g}"
 
 
 def _wrong(problem: str, where: object, actual: object, expected: str, next_step: str) -> ConfigError:

@@ -11,27 +11,42 @@ from toolkit.findings import Finding
 from toolkit.lab.answers import findings_text, table
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from toolkit.calibration.registry.registry import Registry
     from toolkit.planning.interval import IntervalPlan
+    from toolkit.report.word.package import Template
+
+LEAST = 0.5
+"""Reliability below which an interval is none."""
 
 
 def interval_plan_answer(
-    registry: Registry, instrument: str, *, reliability: float, tests_a_year: float | None, load: str | None
+    registry: Registry,
+    instrument: str,
+    *,
+    reliability: float,
+    tests_a_year: float | None,
+    load: str | None,
+    out: Path | None = None,
+    template: Template | None = None,
 ) -> tuple[dict[str, Any], str, list[Finding]]:
-    """Return the interval of an instrument as JSON and as text, with its findings.
+    """Return the interval of an instrument as JSON and as text, with its findings; its sheet into ``out``.
 
     Raises
     ------
     ToolkitError
-        no such instrument, a reliability or a number that cannot be used, too short a history
+        no such instrument, a reliability or a number that cannot be used, too short a history;
+        ``plan-infeasible``: no interval keeps the reliability
     """
     from toolkit.calibration.control.chart import control_chart
     from toolkit.calibration.control.recall import due_of
     from toolkit.declared import answer
+    from toolkit.lab.plan_sheets import interval_sheet, sheet_text, write_plan
     from toolkit.planning.interval import paths_of, plan_interval
 
-    if not 0.5 <= reliability < 1:
-        raise _wrong("--reliability", reliability, "a share from 0.5 to below 1, such as 0.95")
+    if not LEAST <= reliability < 1:
+        raise _wrong("--reliability", reliability, f"a share from {LEAST:g} to below 1, such as 0.95")
     if tests_a_year is not None and not (math.isfinite(tests_a_year) and tests_a_year >= 0):
         raise _wrong("--tests", tests_a_year, "tests a year, 0 or more")
     due = due_of(registry, instrument, registry.today())
@@ -39,25 +54,34 @@ def interval_plan_answer(
     records = {point.record for series in chart.series for point in series.points}
     dates = {record: dt.date.fromisoformat(registry.load(record).date) for record in sorted(records)}
     plan = plan_interval(paths_of(chart, dates), reliability=reliability, tests_a_year=tests_a_year)
+    if not plan.days:
+        raise _infeasible(plan)
     findings = _findings(plan, instrument)
-    next_date = None if not plan.days else due.session_date + dt.timedelta(days=plan.days)
     payload = answer(plan) | {
-        "instrument": instrument, "record": due.record, "in_use": due.recall, "next": next_date,
+        "instrument": instrument, "record": due.record, "in_use": due.recall,
+        "next": (due.session_date + dt.timedelta(days=plan.days)).isoformat(),
         "method_2_days": due.recommendation.days, "findings": [finding.as_dict() for finding in findings],
     }  # fmt: skip
-    payload["next"] = None if next_date is None else next_date.isoformat()
-    return payload, _text(plan, payload, findings), findings
+    if out is not None:
+        sheet = interval_sheet(plan, instrument, due.record, findings, registry.today())
+        payload |= write_plan({}, out, sheet, template)
+    return payload, _text(plan, payload, findings) + sheet_text(payload), findings
+
+
+def _infeasible(plan: IntervalPlan) -> ConfigError:
+    """Return the error of a reliability that not even the shortest interval keeps, with the nearest."""
+    reached = math.floor(1e4 * (1 - plan.chosen.beyond)) / 1e4
+    step = f"ask with --reliability {reached:g}, or look for" if reached >= LEAST else "look for"
+    return ConfigError(
+        "no interval keeps the reliability", where="--reliability", got=plan.reliability,
+        expected=f"nearest: {plan.chosen.days} days, which keep {reached:g}; {plan.limiting} limits them",
+        next_step=f"{step} what drifts or scatters; nothing was written", rule="plan-infeasible",
+    )  # fmt: skip
 
 
 def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
-    from toolkit.planning.interval import SHORTEST, STEP
+    from toolkit.planning.interval import STEP
 
-    if not plan.days:
-        message = (
-            f"after {SHORTEST} days {plan.limiting} is beyond its tolerance with a chance of "
-            f"{100 * plan.chosen.beyond:.1f} %: no interval keeps {100 * plan.reliability:g} %"
-        )
-        return [Finding(rule="plan-interval", where=instrument, message=message)]
     if plan.capped:
         message = (
             f"kept at {STEP:g} times the longest gap of {plan.seen_days} days: beyond it nothing was seen"
@@ -67,13 +91,10 @@ def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
 
 
 def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) -> str:
-    head = (
-        f"{payload['instrument']}: {plan.days} days, next by {payload['next']}"
-        if plan.days
-        else f"{payload['instrument']}: no interval keeps {100 * plan.reliability:g} %"
-    )
+    from toolkit.planning.interval import ASSUMPTIONS
+
     lines = [
-        head,
+        f"{payload['instrument']}: {plan.days} days, next by {payload['next']}",
         f"at its end inside the tolerance with {100 * (1 - plan.chosen.beyond):.1f} %; asked for: "
         f"{100 * plan.reliability:g} %; in use: {payload['in_use'] or 'none'}; ILAC-G24 method 2: "
         f"{payload['method_2_days'] or '-'} days",
@@ -90,8 +111,7 @@ def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) 
             align=">>>>",
         ),
         "",
-        "it assumes: a steady trend and a random walk go on as they did; a session finds what is beyond, and",
-        "all tests since the session before are then recalled; nothing breaks at once",
+        "it assumes:", *(f"  {text}" for text in ASSUMPTIONS),
     ]  # fmt: skip
     found = findings_text(findings)
     return "\n".join([*lines, *([found] if found else [])])

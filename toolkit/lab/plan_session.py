@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.planning.row_exchange import Criterion
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
+    from toolkit.report.word.package import Template
 
-FILES = ("SESSION.toml", "loads.csv", "check.csv", "sheet.csv", "plan.txt")
+FILES = ("SESSION.toml", "loads.csv", "check.csv", "sheet.csv", "plan.txt", "plan.docx", "plan.pdf")
 _DEMAND = re.compile(r"\s*(\w+)\s*=\s*([-+0-9.eE]+)\s*(\S.*)?")
 
 
@@ -43,6 +44,7 @@ class PlanOrder:
     on: date | None = None
     known_at: date | None = None
     out: Path | None = None
+    template: Template | None = None
 
 
 def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str, Any], str, list[Finding]]:
@@ -54,6 +56,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
         nothing applies, fixtures or demands cannot be used, no plan keeps them; nothing is written
     """
     from toolkit.declared import answer
+    from toolkit.lab.plan_sheets import session_sheet, sheet_text, write_plan
     from toolkit.planning.session_plan import plan_session
     from toolkit.planning.session_search import Demand
 
@@ -73,8 +76,12 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
     people = plan_text(plan, record)
     payload = answer(plan) | {"fixtures_refused": feasible.refused, "files": []}
     if order.out is not None:
-        payload["files"] = [str(path) for path in _write(plan, record, text, people, order.out)]
+        files = _files(plan, record, text, people)
+        sheet = session_sheet(plan, record, order.known_at or registry.today())
+        payload |= write_plan(files, order.out, sheet, order.template)
+        payload["files"] = [str(order.out / name) for name in files]
         people += "\n\n" + "\n".join(f"written: {one_line(path)}" for path in payload["files"])
+        people += sheet_text(payload)
     return payload, people, list(plan.findings)
 
 
@@ -204,22 +211,14 @@ def _row(number: int, row: PlannedLoad) -> list[str]:
     return [str(number), str(row.run), row.mount, row.label, row.direction, *(f"{v:.5g}" for v in row.loads)]
 
 
-def _write(
-    plan: SessionPlan, record: CalibrationRecord, session: bytes, people: str, out: Path
-) -> list[Path]:
-    from toolkit.publication import publication
-
-    with publication(out) as stage:
-        texts = {
-            "SESSION.toml": _session_text(session, plan),
-            "loads.csv": _data_text(record, plan.rows, runs=True),
-            "check.csv": _data_text(record, plan.check, runs=False),
-            "sheet.csv": _sheet_text(record, plan),
-            "plan.txt": people + "\n",
-        }
-        for name, text in texts.items():
-            (stage / name).write_text(text, encoding="utf-8")
-    return [out / name for name in texts]
+def _files(plan: SessionPlan, record: CalibrationRecord, session: bytes, people: str) -> dict[str, str]:
+    return {
+        "SESSION.toml": _session_text(session, plan),
+        "loads.csv": _data_text(record, plan.rows, runs=True),
+        "check.csv": _data_text(record, plan.check, runs=False),
+        "sheet.csv": _sheet_text(record, plan),
+        "plan.txt": people + "\n",
+    }
 
 
 def _session_text(session: bytes, plan: SessionPlan) -> str:
@@ -257,6 +256,8 @@ def _data_text(record: CalibrationRecord, rows: Sequence[PlannedLoad], *, runs: 
 
 def _sheet_text(record: CalibrationRecord, plan: SessionPlan) -> str:
     """Return the operator's sheet: every step in its order, with room for the readings."""
+    from toolkit.lab.plan_sheets import operator_steps
+
     cells = [f"{cell.name} [{cell.column_unit or cell.unit}]" for cell in record.cells]
     head = [
         "step",
@@ -266,24 +267,10 @@ def _sheet_text(record: CalibrationRecord, plan: SessionPlan) -> str:
         *cells,
         "time",
     ]
-    lines: list[list[str]] = []
-
-    def step(run: str, what: str, row: PlannedLoad | None = None) -> None:
+    lines = []
+    for number, (run, action, row) in enumerate(operator_steps(plan), start=1):
         loads = [""] * len(record.loads) if row is None else [_number(value) for value in row.loads]
-        lines.append([str(len(lines) + 1), run, what, *loads, *("" for _ in cells), ""])
-
-    run, mount = 0, ""
-    for row in (*plan.rows, *plan.check):
-        name = str(row.run) if row.run <= plan.runs else "check"
-        if row.run != run:
-            step(name, "preload to the largest load and back; rest; read the zeros")
-            run, mount = row.run, ""
-        if row.mount and row.mount != mount:
-            step(name, f"mount: {row.mount}")
-            mount = row.mount
-        way = "from below" if row.direction == "up" else "from above"
-        step(name, f"{row.label}, {way}" if row.mount else f"no load, {way}", row)
-    step("check", "read the zeros")
+        lines.append([str(number), run, action, *loads, *("" for _ in cells), ""])
     return _csv([head, *lines])
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from toolkit.machine import Machine
     from toolkit.planning.expectation import EarlierTest
     from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
+    from toolkit.report.word.package import Template
     from toolkit.simulation.plan import Plan
 
 PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
@@ -47,9 +48,14 @@ class ProtocolOrder:
 
 
 def plan_test(
-    order: ProtocolOrder, out: Path | None = None, *, tell: Callable[[str], None] = lambda _text: None
+    order: ProtocolOrder,
+    out: Path | None = None,
+    *,
+    template: Template | None = None,
+    tell: Callable[[str], None] = lambda _text: None,
 ) -> tuple[dict[str, Any], str]:
-    """Return the JSON answer of a plan and its text; write the files of a plan into ``out``.
+    """Return the JSON answer of a plan and its text; write the files of a plan into ``out``, its
+    sheet by a template too.
 
     Raises
     ------
@@ -57,7 +63,10 @@ def plan_test(
         ``plan-demand``, ``plan-load``, ``plan-like``; ``plan-infeasible`` with the nearest plan that is
         feasible: then nothing is written; ToolkitError: the earlier test cannot be used
     """
+    from datetime import date
+
     from toolkit.declared import answer
+    from toolkit.lab.plan_sheets import protocol_sheet, sheet_text, write_plan
     from toolkit.machine import load_machine
     from toolkit.planning.demands import parse_demand
     from toolkit.planning.design import pace_of
@@ -75,9 +84,12 @@ def plan_test(
     )  # fmt: skip
     if not plan.feasible:
         raise _infeasible(plan, order.minutes)
-    files = {} if out is None else _write(plan, own, tire, out)
-    payload = answer(plan) | {"out": out, "files": files, "findings": []}
-    return payload, plan_text(plan, files)
+    payload: dict[str, Any] = answer(plan) | {"out": out, "files": {}, "findings": []}
+    if out is not None:
+        payload["files"] = {"protocol": PROTOCOL, "simulation": SIMULATION}
+        sheet = protocol_sheet(plan, date.today())  # noqa: DTZ011
+        payload |= write_plan(_files(plan, own, tire, out), out, sheet, template)
+    return payload, plan_text(plan, payload["files"]) + sheet_text(payload)
 
 
 def _refuse_doubled(labels: Sequence[str]) -> None:
@@ -242,21 +254,18 @@ def _largest(sources: Sequence[tuple[str, float]]) -> str:
     return f"mostly {max(sources, key=lambda source: source[1])[0]}"
 
 
-def _write(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> dict[str, str]:
-    """Write the protocol, and what the virtual machine runs of it; return their names by what they are."""
+def _files(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> dict[str, str]:
+    """Return the protocol, and what the virtual machine runs of it, by the names of their files."""
     from datetime import date
 
     from toolkit.planning.protocol_plan import protocol_text, simulation_text
-    from toolkit.publication import publication
 
     twin = own.name if own.simulated else VIRTUAL
     own_tire = None if tire is None else Path(os.path.relpath(real_path(tire), real_path(out))).as_posix()
-    files = {"protocol": PROTOCOL, "simulation": SIMULATION}
-    with publication(out) as stage:
-        (stage / PROTOCOL).write_text(protocol_text(plan, own.protocol), encoding="utf-8")
-        text = simulation_text(plan, machine=twin, on=date(2026, 3, 17), tire=own_tire)
-        (stage / SIMULATION).write_text(text, encoding="utf-8")
-    return files
+    return {
+        PROTOCOL: protocol_text(plan, own.protocol),
+        SIMULATION: simulation_text(plan, machine=twin, on=date(2026, 3, 17), tire=own_tire),
+    }
 
 
 def plan_text(plan: ProtocolPlan, files: dict[str, str]) -> str:

@@ -9,9 +9,9 @@ from typing import Annotated, Any, NotRequired, TypedDict
 from toolkit.declared.answers import merged
 from toolkit.findings import FindingEntry
 from toolkit.lab.document_answer_types import DeliveredDocument, Timed
-from toolkit.lab.next_run import NextRunPlan
 from toolkit.lab.tire_answer_types import DraftKeys
 from toolkit.planning.interval import IntervalPlan
+from toolkit.planning.next_run_plan import NextRunPlan
 from toolkit.planning.protocol_plan import ProtocolPlan
 from toolkit.planning.session_plan import SessionPlan
 
@@ -301,27 +301,31 @@ class DiagnoseAnswer(DraftKeys, Timed):
     out: str
 
 
-class _SessionFiles(Timed):
+class _Sheet(Timed):
+    document: NotRequired[DeliveredDocument]
+
+
+class _SessionFiles(_Sheet):
     fixtures_refused: Annotated[Any, "fixtures that cannot be used, and why"]
     files: list[str]
 
 
-class _IntervalKeys(Timed):
+class _IntervalKeys(_Sheet):
     instrument: str
     record: str
     in_use: Annotated[str | None, "interval, as its approval states it"]
-    next: Annotated[str | None, "day of the next session"]
+    next: Annotated[str, "day of the next session"]
     method_2_days: Annotated[int | None, "what drift alone recommends"]
     findings: list[FindingEntry]
 
 
-class _RunFiles(Timed):
+class _RunFiles(_Sheet):
     out: Path | None
     files: list[Path]
     findings: list[FindingEntry]
 
 
-class _ProtocolFiles(Timed):
+class _ProtocolFiles(_Sheet):
     out: Path | None
     files: Annotated[Mapping[str, Path], "by what they are for"]
     findings: list[FindingEntry]

@@ -40,6 +40,11 @@ FEWEST = 4
 SHORTEST, LONGEST = 30, 1826  # days
 STEP = 1.5
 """An interval grows to this times the longest gap between sessions at most: beyond it nothing was seen."""
+ASSUMPTIONS = (
+    "a steady trend and a random walk go on as they did",
+    "a session finds what is beyond, and all tests since the session before are then recalled",
+    "nothing breaks at once",
+)
 _WALK = np.linspace(0.0, 1.5, 31)  # standard deviation of w after a year [tolerances]
 _NOISE = np.linspace(0.01, 0.6, 30)  # standard deviation of e [tolerances]
 

@@ -172,7 +172,10 @@ class RunSearch:
 
     def judge(self, change: Change) -> NextRun | None:
         """Return a changed run with what it parts; None where it cannot be simulated."""
+        new = change not in self.runs
         run = self._run(change)
+        if new and run is not None:
+            self.learn([run])
         predictions = None if run is None else self._predictions(run)
         if run is None or predictions is None:
             return None
@@ -287,3 +290,23 @@ def reach(problem: Problem, name: str) -> tuple[float, float]:
     """Return the smallest and largest recorded value of a channel."""
     columns = [run.columns[name] for run in problem.case.runs if name in run.columns]
     return min(float(np.nanmin(c)) for c in columns), max(float(np.nanmax(c)) for c in columns)
+
+
+def nearest_limits(problem: Problem, limits: Limits) -> tuple[str, dict[str, tuple[float, float]]]:
+    """Return the recording that leaves the limits least, and the limits widened as far as it goes.
+
+    The farthest of its inputs counts, in widths of that input's limits.
+    """
+    excess: dict[str, float] = {}
+    widened: dict[str, dict[str, tuple[float, float]]] = {}
+    for run in problem.runs:
+        wide = {}
+        for name, (low, high) in limits.items():
+            column = run.columns[name]
+            wide[name] = min(low, float(np.min(column))), max(high, float(np.max(column)))
+        widened[run.name] = wide
+        excess[run.name] = max(
+            (high - low) / (limits[name][1] - limits[name][0]) for name, (low, high) in wide.items()
+        )
+    nearest = min(excess, key=lambda name: excess[name])
+    return nearest, widened[nearest]

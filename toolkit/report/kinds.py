@@ -26,6 +26,7 @@ TITLES = {
     "comparison": "A comparison",
     "diagnosis": "A diagnosis",
     "audit": "An audit's summary",
+    "plan": "The sheet of a plan",
 }
 
 
@@ -117,6 +118,7 @@ _DOCUMENTS = {
     "comparison": "comparison.content.COMPARISON",
     "diagnosis": "diagnosis.answer.DIAGNOSIS",
     "audit": "audit.content.AUDIT",
+    "plan": "plan.content.PLAN",
 }
 
 

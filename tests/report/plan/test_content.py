@@ -1,0 +1,49 @@
+"""A plan's sheet: what its document holds, in every language, and what names it."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime as dt
+
+import pytest
+
+from tests.report.plan.plan_factory import sheet
+from toolkit.report.plan.content import build_plan_content
+from toolkit.report.style import Style
+
+
+def test_steps_are_numbered_with_room_for_a_mark() -> None:
+    rows = build_plan_content(sheet(), Style()).tables["plan_steps"].rows
+    assert [row[0] for row in rows] == ["1", "2"]
+    assert all(row[-1] == "" for row in rows)
+
+
+def test_a_table_without_rows_is_no_condition() -> None:
+    content = build_plan_content(sheet(pairs=(), risks=(), plots=()), Style())
+    assert not content.conditions["plan_pairs"]
+    assert not content.conditions["plan_risks"]
+    assert not content.conditions["plan_figure_1"]
+    assert content.conditions["plan_steps"]
+
+
+def test_the_same_plan_has_the_same_name_on_any_day_and_another_plan_another() -> None:
+    plan = sheet()
+    assert plan.id == dataclasses.replace(plan, issued=dt.date(2027, 1, 1)).id
+    assert plan.id != sheet(steps=plan.steps[:1]).id
+    assert plan.id != sheet(kind="test").id
+
+
+@pytest.mark.parametrize(
+    ("language", "title", "step", "assumed"),
+    [
+        ("de", "Plan einer Kalibrierung: hub", "montieren: +FY", "nichts bricht plötzlich"),
+        ("fr", "Plan d'un étalonnage: hub", "monter : +FY", "rien ne casse soudainement"),
+    ],
+)
+def test_a_sheet_speaks_the_language_of_its_style(language: str, title: str, step: str, assumed: str) -> None:
+    content = build_plan_content(sheet(), Style(language=language, decimal_comma=True))
+    assert content.values["plan.title"].value == title
+    assert content.tables["plan_steps"].rows[0][2] == step
+    assert content.tables["plan_assumptions"].rows == ((assumed,),)
+    assert content.tables["plan_uncertainties"].rows[0][3:6] == ("0,25", "0,3", "0,27")
+    assert "1393,8" in str(content.tables["plan_steps"].rows[1][3])
