@@ -282,6 +282,8 @@ class _Laws:
     judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
     moved: float = _set(1.0, "prior sd", "a parameter that goes farther is what the law may be taken for")
+    points: int = _set(41, "points of a curve", "that is drawn of a law over what was recorded")
+    step: float = _set(1e-4, "of a parameter", "by which the band of a curve is differentiated")
     knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
     times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")

@@ -32,9 +32,10 @@ class Diagnosed:
         """Return the model file for a folder; None where nothing is named that could go back into use."""
         from toolkit.diagnosis.answer.model_text import model_text
 
-        if self.result.search is None:
+        result = self.result
+        if result.search is None:
             return None
-        return model_text(self.case, self.result.search, self.result.laws, self.result.diagnosis, folder)
+        return model_text(self.case, result.search, result.diagnosis, folder, result.laws)
 
 
 def diagnose_case(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import FoundLaw, FoundParameter, LawCurve
-from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.policy import LAWS, VERDICT
 from toolkit.effects.formula import formula
 
 if TYPE_CHECKING:
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.law.learn import Law, Laws
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
-
-_POINTS = 41  # of a curve
-_STEP = 1e-4  # of a parameter, by which a curve's band is drawn
 
 
 def with_laws(search: Search, laws: Laws) -> Search:
@@ -121,16 +118,16 @@ def _curve(
     signal = trial.signals[0]
     curve = formula(trial.shape.text.replace(signal.written, "{x}").format(x="[x]"))
     low, high = float(signal.values.min()), float(signal.values.max())
-    x = np.linspace(low, high, _POINTS)
+    x = np.linspace(low, high, LAWS.points)
 
     def at(values: dict[str, float]) -> NDArray[np.float64]:
         with np.errstate(all="ignore"):
-            return np.broadcast_to(curve({"x": x}, values), _POINTS).astype(float)
+            return np.broadcast_to(curve({"x": x}, values), LAWS.points).astype(float)
 
     values = dict(fitted.values)
     y, slopes = at(values), []
     for name, sd in zip(fitted.effect.names, np.sqrt(np.clip(np.diag(covariance), 0, None)), strict=True):
-        step = _STEP * (abs(values[name]) or float(sd) or 1.0)
+        step = LAWS.step * (abs(values[name]) or float(sd) or 1.0)
         slopes.append((at({**values, name: values[name] + step}) - y) / step)
     J = np.stack(slopes, axis=1)
     half = quantile * np.sqrt(np.clip(np.einsum("ij,jk,ik->i", J, covariance, J), 0.0, None))

@@ -31,13 +31,14 @@ _INTERNAL = ("_size_", "_half_")
 
 
 def model_text(
-    case: Case, search: Search, laws: Laws | None, diagnosis: Diagnosis, folder: Path
+    case: Case, search: Search, diagnosis: Diagnosis, folder: Path, laws: Laws | None = None
 ) -> str | None:
     """Return the model file of an answer, None where it names nothing that could go back into use.
 
     Parameters
     ----------
     folder : where the file will lie; the simulation's own files are named relative to it
+    laws : of what has no name, which go into the model as effects do
     """
     if laws is not None and laws.listed:
         search = with_laws(search, laws)

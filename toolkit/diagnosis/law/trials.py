@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     Stacked = dict[str, Array]
 
 
+_LARGEST = 1e100  # of a response: the squares of larger ones are no numbers any more
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Signal:
     """What a law may depend on: how a formula writes it, its channel, its unit, and its recorded values.
@@ -147,7 +150,7 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
         return
     for channel, of in term_places(problem.model.places).items():
         sizes = motion.sizes(channel, lambda _: 1.0)
-        force, speed, position = motion.units(channel)
+        force, speed, position = map(reduced, motion.units(channel))
         grid = np.linspace(-sizes.fastest, sizes.fastest, 41) if of == "velocity" else None
         own = Signal(
             written=f"[{ITSELF}]", name=channel, unit=speed,
@@ -233,7 +236,8 @@ def all_responses(problem: Problem, base: Fit, trials: Sequence[Trial]) -> list[
 
 def _usable(problem: Problem, directions: Stacked) -> Stacked | None:
     counted = np.concatenate([directions[name][problem.kept[name]] for name in problem.names])
-    if not np.isfinite(counted).all() or not np.abs(counted).max(initial=0.0) > 0:
+    largest = float(np.abs(counted).max(initial=0.0))
+    if not 0 < largest < _LARGEST:  # nor what is no number
         return None
     return {name: np.nan_to_num(columns) for name, columns in directions.items()}
 
