@@ -211,27 +211,30 @@ def curve_trial(problem: Problem, trial: Trial) -> Trial | None:
 
 def responses(problem: Problem, base: Fit, trial: Trial) -> Stacked | None:
     """Return the responses of all outputs to a law, one column for each amplitude; None where it has none."""
-    return all_responses(problem, base, [trial])[0]
+    return next(all_responses(problem, base, [trial]))
 
 
-def all_responses(problem: Problem, base: Fit, trials: Sequence[Trial]) -> list[Stacked | None]:
-    """Return the responses to several laws; those in the equation of one state are propagated together."""
-    found: list[Stacked | None] = [None] * len(trials)
+def all_responses(problem: Problem, base: Fit, trials: Sequence[Trial]) -> Iterator[Stacked | None]:
+    """Give the responses to several laws, one after the other: of long recordings all are too much to hold.
+
+    Those in the equation of one state are propagated together.
+    """
     entering: dict[str, list[int]] = {}
     for i, trial in enumerate(trials):
         if trial.acts == "enters":
             entering.setdefault(str(trial.applied.channel), []).append(i)
+    pushed: dict[int, Stacked] = {}
+    for listed in entering.values():
+        pushed |= zip(listed, _pushed(problem, base, [trials[i] for i in listed]), strict=True)
+    for i, trial in enumerate(trials):
+        if i in pushed:
+            yield _usable(problem, pushed.pop(i))
             continue
         columns = _evaluated(problem, base, trial)
         none = np.zeros_like(columns)
-        found[i] = _usable(
+        yield _usable(
             problem, {name: columns if name == trial.applied.channel else none for name in problem.names}
         )
-    for listed in entering.values():
-        pushed = _pushed(problem, base, [trials[i] for i in listed])
-        for i, directions in zip(listed, pushed, strict=True):
-            found[i] = _usable(problem, directions)
-    return found
 
 
 def _usable(problem: Problem, directions: Stacked) -> Stacked | None:
