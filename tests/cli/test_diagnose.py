@@ -61,8 +61,11 @@ def test_what_was_left_out_is_named_shown_and_predicted(run, tmp_path):
     assert drag["value"] == pytest.approx(800.0, abs=60.0)
     (one,) = made["fit"]["held_out"]
     assert set(one) == {
-        "channel", "unit", "nominal_rmse", "refitted_rmse", "augmented_rmse", "noise_floor", "noise",
+        "channel", "unit", "nominal_rmse", "refitted_rmse", "augmented_rmse", "noise_floor",
+        "with_laws_rmse", "noise",
     }  # fmt: skip
+    assert one["with_laws_rmse"] is None
+    assert made["laws"] == []
     # White noise of 2 N: third differences of 160 rows know it to some 15 %.
     assert set(one["noise"]) == {"sensor_sd", "process_sd", "how"}
     assert (one["noise"]["sensor_sd"], one["noise"]["how"]) == (pytest.approx(2.0, rel=0.3), "differences")

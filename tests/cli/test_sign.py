@@ -117,6 +117,10 @@ def test_a_certificate_is_issued_by_a_key_elsewhere(run: Run, tmp_path: Path) ->
     shutil.copytree(packaged_home() / "report_templates", "report_templates")
     words = ("calibration", "certificate", RECORD, "--out", "../issued", "--known-at", "2026-11-23")
     before = _entries()
+    for named in ((), ("--issued-by", "nobody-enrolled")):
+        code, _, error = run(*words, "--request", "../r.json", *named)
+        assert (code, "the document states the name" in error) == (2, True)
+        assert not (tmp_path / "r.json").exists()
     code, _, error = run(*words, "--request", "../r.json", "--issued-by", "dora")
     assert code == 0, error
     (shown,) = (tmp_path / "r.documents").glob("*.docx")

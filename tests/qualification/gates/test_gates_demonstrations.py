@@ -36,6 +36,7 @@ NO_GATE = {
     "not-signed": "a decision without a key where people are: tests/calibration/registry/test_signatures.py",
     "not-allowed": "people who may not decide: tests/calibration/registry/test_signatures.py",
     "people-log": "a forged log of people: tests/calibration/registry/test_signatures.py",
+    "person": "an issue that names nobody who is enrolled: tests/cli/test_sign.py",
     "request": "a signing request: tests/trust/forgeries",
     "locked": "another writer, or the lock file of one that ended",
     "no-locks": "a file system that keeps no writers apart",
