@@ -82,6 +82,7 @@ def command(
     say(f"The whole test in one file: {out / 'test.xlsx'}")
     say("Everything here is simulated, except Figure 4.4 in step 1.")
     say(f"Took {time.perf_counter() - started:.0f} s.")
+    say(f"In a browser: toolkit open {out / 'home'}")
     names = ("report.docx", "report.pdf", "test.xlsx", "tire.tir")
     payload = {
         "out": out,
