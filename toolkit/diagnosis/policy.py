@@ -287,6 +287,10 @@ class _Laws:
     knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
     times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")
+    ends: int = _set(13, "times of a run", "between which an event in an equation may begin and end")
+    columns: int = _set(
+        4_000_000, "numbers of a response", "of laws in an equation that are propagated together"
+    )
     cuts: int = _set(120, "stretches of a run", "on whose ends an event may begin and end")
     event_rows: int = _set(40, "values of a run", "fewer do not tell an event from a few outliers")
     event_least: int = _set(5, "rows", "fewer are single values far off, not an event")

@@ -17,6 +17,8 @@ Values = Mapping[str, float]
 Channels = Mapping[str, "NDArray[np.float64]"]
 # (position, velocity, parameters) -> force-like term against the motion, of the arrays' shape or scalars
 ForceHook = Callable[[Any, Any, Values], Any]
+# (signals by name, parameters) -> force-like term against the motion, of the signals' shape or scalars
+LawHook = Callable[[Mapping[str, Any], Values], Any]
 # (time, velocity, parameters) -> the same term along a recorded motion, of a force that has a memory
 RecordedHook = Callable[["NDArray[np.float64]", "NDArray[np.float64]", Values], "NDArray[np.float64]"]
 # (state, its spread, parameters) -> share of a rising rate that is left, of the arrays' shape or scalars
@@ -73,7 +75,8 @@ class ChannelFacts:
 class Term:
     """A term of an equation of motion, and what is declared of it.
 
-    ``of`` is what it depends on. ``on_place`` says of a term of the position that it may also enter the
+    ``of`` is what it depends on. ``law`` is a term of any states, inputs and the time, which ``reads`` names.
+    ``on_place`` says of a term of the position that it may also enter the
     equation of a state that is a place itself. ``drives`` says that it is told as it stands in the equation
     of its own output, and not as a resistance. ``shares`` are those of its usual size at which the response
     of an integrated motion is taken: a motion answers a small force in proportion; one that is as large as it
@@ -82,6 +85,8 @@ class Term:
 
     of: Literal["nothing", "velocity", "position", "state"]
     force: ForceHook | None = None
+    law: LawHook | None = None
+    reads: tuple[str, ...] = ()
     recorded: RecordedHook | None = None
     limit: LimitHook | None = None
     bristle: BristleHook | None = None

@@ -46,15 +46,31 @@ def _between(x: Array, low: float, high: float) -> Array:
 
 
 def _spline(x: Any, *points: float) -> Any:
-    """Return a natural cubic spline through (x1, y1, x2, y2, ...), straight beyond its ends."""
+    """Return a natural cubic spline through (x1, y1, x2, y2, ...), constant beyond its ends.
+
+    Nothing was recorded there, and a curve that goes on rising can drive an equation out of all bounds.
+    """
     from scipy.interpolate import CubicSpline
 
-    curve = CubicSpline(points[0::2], points[1::2], bc_type="natural")
     inside = np.clip(x, points[0], points[-2])
-    return curve(inside) + (x - inside) * curve(inside, 1)
+    heights = np.stack(np.broadcast_arrays(*points[1::2]))
+    if heights.ndim == 1:
+        return CubicSpline(points[0::2], heights, bc_type="natural")(inside)
+    # Columns of several sets of parameters: a curve for each of the sets.
+    sets, of = np.unique(heights, axis=1, return_inverse=True)
+    inside, of = np.broadcast_arrays(inside, of.ravel())
+    values = np.empty(inside.shape)
+    for k in range(sets.shape[1]):
+        values[of == k] = CubicSpline(points[0::2], sets[:, k], bc_type="natural")(inside[of == k])
+    return values
 
 
-_STATIC |= {"between": _between, "spline": _spline}
+def _pulse(x: Any, start: Any, end: Any, edge: Any) -> Any:
+    """Return one from ``start`` to ``end`` and zero elsewhere, with edges that an integrator can follow."""
+    return 0.5 * (np.tanh((x - start) / edge) - np.tanh((x - end) / edge))
+
+
+_STATIC |= {"between": _between, "spline": _spline, "pulse": _pulse}
 
 
 def _rate(t: Array, x: Array) -> Array:
@@ -89,13 +105,18 @@ def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
     return np.asarray(np.interp(t, even, (w**2 / (first - second) * answered).real))
 
 
+def _way(t: Array, x: Array) -> Array:
+    """Return the integral of a signal over the time from the first row on: the way of a speed."""
+    return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (x[1:] + x[:-1]))])
+
+
 def _loop(_: Array, x: Array, reach: float) -> Array:
     """Return the stop operator over its height: -1 to 1, turned round within ``reach`` to either side."""
     return (x - play(x, 2 * reach)) / reach
 
 
 _WITH_MEMORY: dict[str, Callable[..., Any]] = {
-    "lag": lag, "rate": _rate, "mode": _mode, "loop": _loop,
+    "lag": lag, "rate": _rate, "mode": _mode, "loop": _loop, "way": _way,
 }  # fmt: skip
 
 
@@ -112,7 +133,7 @@ class Formula:
     @property
     def in_time(self) -> bool:
         """Tell whether time passes in it."""
-        return "time" in self.signals or bool(self.functions & {"lag", "rate", "mode"})
+        return "time" in self.signals or bool(self.functions & {"lag", "rate", "mode", "way"})
 
     @property
     def has_memory(self) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import numpy as np
 
@@ -29,6 +29,8 @@ ITSELF = "itself"
 """The signal that is the channel or the state that a law acts on."""
 POSITION = "position"
 """The signal, in an equation, of which the state that a law acts on is the rate."""
+TIME = "time"
+"""The signal that is the time of the run [s]."""
 _NAME = re.compile(rf"law ({'|'.join(get_args(Acts))}): (.+)", re.DOTALL)
 _POSITIVE = ("s", "w", "reach", "period", "tau", "frequency", "damping")
 
@@ -76,10 +78,10 @@ def law_effect(name: str) -> Effect:
         ``law-formula``: its formula cannot be read, or remembers where it enters an equation
     """
     acts, law = parts_of(name)
-    if acts == "enters" and (law.has_memory or set(law.signals) - {ITSELF, POSITION}):
+    if acts == "enters" and law.has_memory:
         raise ConfigError(
             "a law cannot enter an equation", where=name[:200], got=law.plain(),
-            expected=f"a formula of [{ITSELF}] and [{POSITION}] without memory",
+            expected="a formula of states, inputs and the time without memory",
             next_step="take the law as a diagnosis has written it", rule="law-formula",
         )  # fmt: skip
 
@@ -87,9 +89,6 @@ def law_effect(name: str) -> Effect:
         with np.errstate(all="ignore"):  # what is no number is told by whoever simulates
             change = np.asarray(law(_signals(law, y, values, setting), values, setting.t), dtype=np.float64)
         return y * (1 + change) if acts == "multiplies" else y + change
-
-    def entering(position: Any, velocity: Any, values: Values) -> Any:
-        return law({ITSELF: velocity, POSITION: position}, values)
 
     return Effect(
         name=name,
@@ -106,7 +105,7 @@ def law_effect(name: str) -> Effect:
         on_channel=None
         if acts == "enters"
         else ChannelFacts(where=("output",), tare="own", by_value=ITSELF in law.signals),
-        term=Term(of="state", force=entering) if acts == "enters" else None,
+        term=Term(of="state", law=law, reads=law.signals) if acts == "enters" else None,
     )
 
 
@@ -133,7 +132,7 @@ def _parameter(name: str) -> EffectParameter:
 def _signals(
     law: Formula, y: NDArray[np.float64], values: Values, setting: Setting
 ) -> dict[str, NDArray[np.float64]]:
-    signals = {ITSELF: y, "time": setting.t}
+    signals = {ITSELF: y, TIME: setting.t}
     for name in law.signals:
         if name in signals:
             continue

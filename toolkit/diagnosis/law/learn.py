@@ -15,17 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
-from toolkit.diagnosis.law.trials import (
-    Trial,
-    amplitudes,
-    curve_trial,
-    p_value,
-    ranked,
-    responses,
-    terms_of,
-    trials_of,
-    unlocked_tone,
-)
+from toolkit.diagnosis.law.ranking import p_value, ranked, responses
+from toolkit.diagnosis.law.terms import terms_of
+from toolkit.diagnosis.law.trial import Trial, amplitudes
+from toolkit.diagnosis.law.trials import curve_trial, trials_of, unlocked_tone
 from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, best_of
@@ -150,10 +143,13 @@ def _next(
             if 0.5 * trial.gain - weight * trial.cost > best
         ]
         fitted += _fitted(problem, base, curves, weight)
-    for _, trial, made in _simplest_first(fitted)[: LAWS.judged]:
-        law = _judged(search, base, held_out, trial, made, looked)
-        if law is not None:
-            return law
+    # What was met once explains and does not predict: it is asked where nothing that predicts stands.
+    for events in (False, True):
+        entries = [entry for entry in fitted if (entry[1].form == "event") is events]
+        for _, trial, made in _simplest_first(entries)[: LAWS.judged]:
+            law = _judged(search, base, held_out, trial, made, looked)
+            if law is not None:
+                return law
     return None
 
 

@@ -131,6 +131,11 @@ TWO: tuple[Shape, ...] = (
     _static("a*{x}**2*{z}", a="{y}/({x}^2*{z})"),
     _static("a*{x}*{z}**2", a="{y}/({x}*{z}^2)"),
 )
+ALIKE: tuple[Shape, ...] = (
+    _static("a*({x} - {z})", a="{y}/{x}"),
+    _static("a*({x} - {z})*abs({x} - {z})", a="{y}/{x}^2"),
+)
+"""Shapes of two signals in one unit: an exchange between them."""
 MODE = Shape(
     form="mode", text="a*mode({x}, frequency, damping)", starts=_modes,
     units={"a": "{y}/{x}", "frequency": "Hz", "damping": "1"},
@@ -145,6 +150,25 @@ TONE = Shape(
     form="tone", units={"a1": "{y}", "a2": "{y}", "frequency": "Hz"},
     text=f"a1*sin({_TURN}*frequency*[time]) + a2*cos({_TURN}*frequency*[time])",
 )  # fmt: skip
+
+
+def pulse(row: float) -> Shape:
+    """Return an event in an equation: an input that is there for a while, with edges as long as a row [s]."""
+    return Shape(
+        form="event", text=f"a*pulse([time], start, end, {row:.4g})",
+        units={"a": "{y}", "start": "s", "end": "s"}, starts=_stretches, enters=True,
+    )  # fmt: skip
+
+
+def _stretches(t: Array, _: Array) -> list[dict[str, float]]:
+    ends = np.linspace(t[0], t[-1], LAWS.ends)
+    longest = LAWS.event_most * (t[-1] - t[0])
+    return [
+        {"start": start, "end": end}
+        for start, end in itertools.combinations(ends.tolist(), 2)
+        if end - start <= longest
+    ]
+
 
 UNLOCKED = Shape(
     form="tone", units={"a": "{y}", "frequency": "Hz", "phase": "rad"},

@@ -12,6 +12,7 @@ from toolkit.diagnosis.simulators.columnwise import columnwise
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import OFF
 from toolkit.diagnosis.simulators.user_code import silenced
+from toolkit.effects.law import TIME
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -115,8 +116,9 @@ class Equation:
 
         def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
             rate = np.zeros(len(x))
-            rate[:own] = plain(t, x[:own], u(t), p)
-            forces.add(x, rate, own)
+            inputs = u(t)
+            rate[:own] = plain(t, x[:own], dict(inputs), p)
+            forces.add(x, rate, own, {**inputs, TIME: t})
             return rate
 
         return rhs
@@ -157,7 +159,7 @@ class Equation:
             sets = {name: np.full(len(t), value) for name, value in p.items()}
             assert columns is not None  # noqa: S101  else by row
             rates[:own] = columns(t, x[:own].copy(), u, sets)
-            ForcesTogether([forces], own).on(np.zeros(len(t), dtype=np.intp)).add(x, rates)
+            ForcesTogether([forces], own).on(np.zeros(len(t), dtype=np.intp)).add(x, rates, {**u, TIME: t})
             return rates
 
         return by_row if columns is None else at_once

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.diagnosis.simulators.sliding_friction import Bristles, Slide, SlideColumns
 from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.law import ITSELF, POSITION, TIME
+from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]
+    Seen = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +37,7 @@ class Force:
 
     ``bristle`` is its bend's place among the added states, ``way`` that of its body's way where no state of
     the equation is it; ``scale`` is the size of the velocity state (of the state itself, where it has no
-    position).
+    position). ``reads`` are the signals of a law by name, with the place of those that are states.
     """
 
     velocity: int
@@ -43,6 +46,7 @@ class Force:
     way: int | None
     scale: float
     active: AppliedEffect
+    reads: tuple[tuple[str, int | None], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +62,15 @@ class Forces:
         states: Sequence[str],
         derivative_of: Mapping[int, int],
         scale: Mapping[str, tuple[float, float]],
+        inputs: Sequence[str] = (),
     ) -> Forces:
-        """Return the forces of effects on an equation's states."""
+        """Return the forces of effects on an equation's states, which see its inputs too.
+
+        Raises
+        ------
+        ConfigError
+            ``model-place``: a law reads what is neither a state nor an input
+        """
         made, added = [], 0
         for one in active:
             at = states.index(str(one.channel))
@@ -76,6 +87,7 @@ class Forces:
                     way=way,
                     scale=scale[states[at]][1],
                     active=one,
+                    reads=_reads(one, states, at, derivative_of.get(at, at), inputs),
                 )
             )
         return Forces(tuple(made), added)
@@ -102,13 +114,34 @@ class Forces:
                 made[one.way] = _reach(one.active)
         return tuple(made)
 
-    def add(self, x: Array, rate: Array, own: int) -> None:
-        """Add the forces to the rates of ``own`` states, and set those of the added ones, in place."""
+    def add(self, x: Array, rate: Array, own: int, seen: Seen) -> None:
+        """Add the forces to the rates of ``own`` states, and set those of the added ones, in place.
+
+        Parameters
+        ----------
+        seen : the inputs and the time
+        """
         for one in self.listed:
-            _add(one, x, rate, own)
+            _add(one, x, rate, own, seen)
 
 
-def _add(force: Force, x: Array, rate: Array, own: int) -> None:
+def _reads(
+    one: AppliedEffect, states: Sequence[str], at: int, position: int, inputs: Sequence[str]
+) -> tuple[tuple[str, int | None], ...]:
+    term = one.effect.term
+    places: dict[str, int | None] = dict.fromkeys((*inputs, TIME))
+    places |= {name: i for i, name in enumerate(states)} | {ITSELF: at, POSITION: position}
+    unknown = [name for name in (term.reads if term is not None else ()) if name not in places]
+    if unknown:
+        raise ConfigError(
+            "a law in an equation reads what the equation does not have", where=one.key.label,
+            got=", ".join(unknown), expected=", ".join((*states, *inputs, TIME)),
+            next_step="give the model the simulation and the inputs that it was made for", rule="model-place",
+        )  # fmt: skip
+    return tuple((name, places[name]) for name in (term.reads if term is not None else ()))
+
+
+def _add(force: Force, x: Array, rate: Array, own: int, seen: Seen) -> None:
     """Add one force in place; ``x`` and ``rate`` (states,) or (states, columns)."""
     i, values = force.velocity, force.active.values
     term = force.active.effect.term
@@ -123,6 +156,9 @@ def _add(force: Force, x: Array, rate: Array, own: int) -> None:
         rate[own + force.bristle] = (v - abs(v) * bend) / reach
         if force.way is not None:
             rate[own + force.way] = v
+    elif term.law is not None:
+        signals = {name: seen[name] if at is None else x[at] for name, at in force.reads}
+        rate[i] -= term.law(signals, values)
     elif term.force is not None:
         rate[i] -= term.force(x[force.position], x[i], values)
 
@@ -183,11 +219,17 @@ class Acting:
         """Tell whether there are any."""
         return bool(self._listed)
 
-    def add(self, x: Array, rate: Array) -> None:
-        """Add the forces to the rates of the states, in place; both (states, columns)."""
+    def add(self, x: Array, rate: Array, seen: Seen) -> None:
+        """Add the forces to the rates of the states, in place; both (states, columns).
+
+        Parameters
+        ----------
+        seen : the inputs and the time, each (columns,)
+        """
         for force, at in self._listed:
             part = rate[:, at]
-            _add(force, x[:, at], part, self._own)
+            there = {name: seen[name][at] for name, place in force.reads if place is None}
+            _add(force, x[:, at], part, self._own, there)
             rate[:, at] = part
 
 

@@ -23,6 +23,7 @@ from toolkit.diagnosis.simulators.simulator import Moving
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.forward import resisting
+from toolkit.effects.law import ITSELF, POSITION
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.units import unit
 
@@ -114,7 +115,7 @@ class Motion:
         x = simulated.get(str(self.position), run.columns.get(str(self.position)))
         if x is None:
             return {}
-        pushes = pattern(x, np.zeros(len(x)))  # what follows the rate is simulated
+        pushes = pattern({POSITION: x, ITSELF: np.zeros(len(x))})  # what follows the rate is simulated
         if self.kind != "force":
             pushes = integrated(run.t, pushes)
             if self.kind == "position":
@@ -210,7 +211,7 @@ class AlongMotion(ABC):
 
         return Moving(
             integrates=False, sizes=sizes, units=lambda _: motion.units(), way=lambda _: motion.way(),
-            position=lambda _: motion.position, pushed=pushed,
+            position=lambda _: motion.position, states=(), pushed=pushed,
         )  # fmt: skip
 
 

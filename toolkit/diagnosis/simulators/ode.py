@@ -18,14 +18,14 @@ from toolkit.diagnosis.simulators.ode_apart import OdeApart, handlers_of
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output
+from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange
 from toolkit.diagnosis.simulators.states import dimensions, fitting, term_places
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.filters import STRAIGHT
-from toolkit.effects.law import is_law
+from toolkit.effects.law import ITSELF, POSITION, TIME, is_law
 from toolkit.effects.signals import Setting
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import ConfigError, FitError
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 _FINER = 4
 _MISSED = 3  # times in turn: an equation that is not smooth enough
+_LEVELS = 41  # quantiles of a state
 _MOST_HELD = 200_000_000  # bytes of simulations to remember
 
 
@@ -106,7 +107,8 @@ class OdeModel:
             together=self._prepare,
             motion=Moving(
                 integrates=True, sizes=self._motion_sizes, units=self._motion_units, way=self._way,
-                position=lambda channel: self.position_of(str(channel)), pushed=self._pushed,
+                position=lambda channel: self.position_of(str(channel)), states=self._ranges(),
+                pushed=self._pushed,
             ),
         )  # fmt: skip
 
@@ -132,6 +134,7 @@ class OdeModel:
             )
             for i, name in enumerate(self.states)
         }
+        self._levels = np.quantile(x, np.linspace(0, 1, _LEVELS), axis=1).T
         self._largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
         farthest = np.abs(x).max(axis=1)
         self._reach = {
@@ -171,6 +174,22 @@ class OdeModel:
         speed, position = of(state, reduced(f"{rate}*s")), self.position_of(state)
         return force, speed, speed if position is None else of(position, f"{speed}*s")
 
+    def _ranges(self) -> tuple[StateRange, ...]:
+        """Return the states; one whose unit neither the recording nor a rate of it tells has none."""
+        recorded = {channel.name: channel.unit for channel in self.case.channels}
+        implied: dict[str, str] = {}
+        for name in self.force_units:
+            _, speed, position = self._motion_units(name)
+            implied[name] = speed
+            implied.setdefault(self.position_of(name) or name, position)
+        return tuple(
+            StateRange(
+                name=name, unit=reduced(implied.get(name) or recorded.get(name, "1")),
+                quantiles=tuple(levels.tolist()),
+            )
+            for name, levels in zip(self.states, self._levels, strict=True)
+        )  # fmt: skip
+
     def _way(self, channel: str | None) -> tuple[float, float]:
         position = self.position_of(str(channel))
         return (0.0, 0.0) if position is None else self._ways[position]
@@ -202,7 +221,7 @@ class OdeModel:
             with silenced():
                 moved = propagated(
                     rates_at, self._finer(run).t, fine,
-                    pattern(fine[self._derivative_of.get(at, at)], fine[at]), at=at, sizes=sizes,
+                    pattern(self._signals(run, fine, at)), at=at, sizes=sizes,
                 )[::_FINER]  # fmt: skip
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
@@ -216,6 +235,15 @@ class OdeModel:
                 column += ((there[name] - outputs[name]) / (1e-6 * sizes[i]))[:, None] * moved[:, i]
         shown = slopes(outputs, active, run, self.setting(run), run.columns)
         return {name: shown[name][:, None] * column for name, column in responses.items()}
+
+    def _signals(self, run: Run, fine: NDArray[np.float64], at: int) -> dict[str, NDArray[np.float64]]:
+        """Return what a term in the equation of a state may read, between the rows too."""
+        finer = self._finer(run)
+        inputs = {name: finer.columns[name] for name in self._drivers}
+        return {
+            **inputs, **dict(zip(self.states, fine, strict=False)), TIME: finer.t,
+            ITSELF: fine[at], POSITION: fine[self._derivative_of.get(at, at)],
+        }  # fmt: skip
 
     def position_of(self, name: str) -> str | None:
         """Return the state whose rate is this state, None where there is none."""
@@ -404,7 +432,7 @@ class OdeModel:
         )
 
     def _forces(self, active: Sequence[AppliedEffect]) -> Forces:
-        return Forces.of(active, self.states, self._derivative_of, self.scale)
+        return Forces.of(active, self.states, self._derivative_of, self.scale, self._drivers)
 
     def _made(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.diagnosis.simulators.channels import channel_places
-from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, TermPattern
+from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange, TermPattern
 from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effect as named_effect
@@ -45,7 +46,7 @@ class OdeApart:
             Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
         )
         # Asked once and at the start: what an answer needs is then there, whatever has become of the worker.
-        self._places, self._motions = _facts_of(code.value("facts"))
+        self._places, self._motions, states = _facts_of(code.value("facts"))
         self._prepared: dict[Run, dict[Any, Arrays]] = {}
         self.capability = Capability(
             nominal_load_N=None,
@@ -60,6 +61,7 @@ class OdeApart:
                 units=lambda channel: self._motions[str(channel)].units,
                 way=lambda channel: self._motions[str(channel)].way,
                 position=lambda channel: self._motions[str(channel)].position,
+                states=states,
                 pushed=self._pushed,
             ),
         )
@@ -123,7 +125,7 @@ class OdeApart:
         if run.rows < 2:
             return {}
         assert isinstance(pattern, TermPattern)  # noqa: S101  no other crosses
-        forces = pattern(np.zeros(1), np.zeros(1)).shape[1]
+        forces = pattern(defaultdict(lambda: np.zeros(1))).shape[1]
         shapes = {output.name: (run.rows, forces) for output in self.outputs}
         terms = [(effect.name, tuple(map(dict, starts))) for effect, starts in pattern.terms]
         return self._code.arrays("pushed", run, p, shapes, _crossing(active), channel, terms)
@@ -153,7 +155,8 @@ def handlers_of(case: Case, model: Model) -> Handlers:
                 [float(length) for length in moving.way(channel)],
                 moving.position(channel),
             ]
-        return [places, motions]
+        ranges = [[state.name, state.unit, list(state.quantiles)] for state in moving.states]
+        return [places, motions, ranges]
 
     def prepared(
         _: int,
@@ -204,8 +207,8 @@ class _Motion:
     position: str | None
 
 
-def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion]]:
-    """Return the places of every effect in an equation and the motion at each of them.
+def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion], tuple[StateRange, ...]]:
+    """Return the places of every effect in an equation, the motion at each of them, and the states.
 
     Raises
     ------
@@ -213,17 +216,21 @@ def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion]]:
         the worker did not answer them: what its code left of it tells nothing
     """
     try:
-        listed, moving = facts
+        listed, moving, ranges = facts
         places: dict[str, list[Place]] = {}
         for name in (name for name, effect in effects().items() if effect.term is not None):
             places[name] = [(_text(channel), _text(source)) for channel, source in listed[name]]
         motions = {str(channel): _motion(*parts) for channel, parts in moving.items()}
+        states = tuple(
+            StateRange(name=str(name), unit=str(text), quantiles=tuple(map(float, quantiles)))
+            for name, text, quantiles in ranges
+        )
         missing = {str(channel) for pairs in places.values() for channel, _ in pairs} - set(motions)
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         raise _unfit("places and motion of the effects") from error
     if missing:
         raise _unfit(f"motion of {', '.join(sorted(missing))}")
-    return places, motions
+    return places, motions, states
 
 
 def _motion(sizes: Sequence[float], units: Sequence[str], way: Sequence[float], rate_of: object) -> _Motion:

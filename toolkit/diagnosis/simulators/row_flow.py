@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.simulators.integrate import RTOL, A, B, C, E
+from toolkit.effects.law import TIME
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -122,7 +123,7 @@ class RowFlow:
                 return self._rhs(t + w * step, y.copy(), inputs, columns.p)
             rate = np.zeros_like(y)
             rate[:own] = self._rhs(t + w * step, y[:own].copy(), inputs, columns.p)
-            acting.add(y, rate)
+            acting.add(y, rate, {**inputs, TIME: t + w * step})
             return rate
 
         return rates

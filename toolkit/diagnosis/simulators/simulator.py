@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
+from toolkit.effects.law import ITSELF, POSITION
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from toolkit.simulation.case_plan import CaseParameter
 
     Arrays = dict[str, NDArray[np.float64]]
-    # Positions and rates of shape (n,) to force-like terms of shape (n, forces): a `TermPattern`
-    Pattern = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+    # Signals of an equation, (n,) by name, to force-like terms of shape (n, forces): a `TermPattern`
+    Pattern = Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
     Parameters = Mapping[str, float]
     # A channel's name to its largest recorded magnitude over the runs that are judged
     Largest = Callable[[str | None], float]
@@ -41,10 +42,11 @@ class TermPattern:
 
     terms: tuple[tuple[Effect, tuple[Mapping[str, float], ...]], ...]
 
-    def __call__(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the forces at positions and their rates, (n, forces)."""
+    def __call__(self, signals: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the forces, (n, forces), at what moves (`ITSELF`), its position and what laws read."""
         import numpy as np
 
+        x, v = signals[POSITION], signals[ITSELF]
         columns = []
         for effect, starts in self.terms:
             term = effect.term
@@ -52,8 +54,12 @@ class TermPattern:
             if term.pattern is not None:
                 columns.append(term.pattern(x, starts))
                 continue
-            assert term.force is not None  # noqa: S101
-            listed = [np.broadcast_to(term.force(x, v, values), x.shape) for values in starts]
+            if term.law is not None:
+                made = [term.law(signals, values) for values in starts]
+            else:
+                assert term.force is not None  # noqa: S101
+                made = [term.force(x, v, values) for values in starts]
+            listed = [np.broadcast_to(column, x.shape) for column in made]
             columns.append(np.stack(listed, axis=1))
         return np.nan_to_num(np.hstack(columns))
 
@@ -68,6 +74,15 @@ class Output:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StateRange:
+    """A state of an equation: name, unit, and quantiles of its values in the simulation as declared."""
+
+    name: str
+    unit: str
+    quantiles: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Moving:
     """What moves in a simulation, and what forces do to it; channels are those that a force may act on.
 
@@ -78,6 +93,7 @@ class Moving:
     way : channel -> the longest way of a run [position's unit] and the usual one from row to row, zero where
         it stands in the rows themselves
     position : channel -> the state or channel of which it is the rate, None where there is none
+    states : what a law in an equation may read beside the inputs and the time; none where none is integrated
     pushed : (run, parameters, effects, channel, pattern) -> linear responses of every output to small forces
         of a pattern over the position, (rows, forces); none where none move
     """
@@ -87,6 +103,7 @@ class Moving:
     units: Callable[[str | None], tuple[str, str, str]]
     way: Callable[[str | None], tuple[float, float]]
     position: Callable[[str | None], str | None]
+    states: tuple[StateRange, ...]
     pushed: Callable[[Run, Parameters, Sequence[AppliedEffect], str | None, Pattern], Arrays]
 
 
