@@ -16,6 +16,7 @@ from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, with
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.law.imitations import without_imitations
 from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Search, search
@@ -106,6 +107,7 @@ def _diagnosed(
             with budget.limited():
                 outcome = search(problem, seed=seed, budget=budget)
                 laws = learned(outcome, withdrawn=mostly_unknown(outcome), budget=budget)
+                outcome, laws = without_imitations(outcome, laws, budget)
             answer = answer_of(case, outcome, laws, findings)
     except BudgetSpentError as error:
         answer = _too_late(case, problem, declared, findings, str(error))

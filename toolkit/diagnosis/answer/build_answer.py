@@ -52,9 +52,10 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
     unknown = mostly_unknown(search)
     effects = () if unknown else tuple(_effect(search, step) for step in search.steps)
     nominal = _nominal(search, before_effects=unknown)
-    verdict = _verdict(search, effects, nominal, unknown=unknown)
+    left = bool(search.structure or laws.listed)
+    verdict = _verdict(search, effects, nominal, unknown=unknown or left)
     # A search that did not come to its end has not shown that nothing is left.
-    remaining = "unknown" if search.structure or search.skipped else "nothing"
+    remaining = "unknown" if left or search.skipped else "nothing"
     names = {effect.name for effect in effects} | {
         name for effect in effects for name in effect.equivalent_to
     }
@@ -169,7 +170,7 @@ def _verdict(
 ) -> Verdict:
     if effects:
         return "equivalent" if any(effect.equivalent_to for effect in effects) else "named"
-    if unknown or search.structure:
+    if unknown:
         return "unknown"
     if search.skipped or any(abs(parameter.shift_in_sd or 0.0) > PRIORS.far for parameter in nominal):
         return "untestable"

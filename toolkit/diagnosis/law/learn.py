@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
 from toolkit.diagnosis.law.ranking import p_value, ranked, responses
-from toolkit.diagnosis.law.terms import terms_of
+from toolkit.diagnosis.law.terms import terms_of, with_ends
 from toolkit.diagnosis.law.trial import Trial, amplitudes
 from toolkit.diagnosis.law.trials import curve_trial, trials_of, unlocked_tone
-from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE, VERDICT
+from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, best_of
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -78,7 +79,7 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
         (search.refitted, search.held_refitted) if withdrawn else (search.augmented, search.held_augmented)
     )
     structure = search.structure_before if withdrawn and search.steps else search.structure
-    outputs = _outputs(search.problem, structure)
+    outputs = _outputs(search.problem, base, structure)
     listed: list[Law] = []
     complete = not search.skipped
     try:
@@ -109,9 +110,11 @@ def _unlocked(problem: Problem, base: Fit, outputs: Sequence[str], before: Seque
     ]  # fmt: skip
 
 
-def _outputs(problem: Problem, structure: Sequence[StructureFound]) -> tuple[str, ...]:
-    shown = {each.output for each in structure if each.is_lawful}
-    return tuple(name for name in problem.names if name in shown)
+def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -> tuple[str, ...]:
+    """Return the outputs that ask for a law: all of them where a parameter has absorbed what was left out."""
+    strained = any(abs(off) > PRIORS.far for off in problem.off_priors(base.p))
+    shown = {each.output for each in structure if each.is_lawful or each.is_too_large}
+    return tuple(name for name in problem.names if strained or name in shown)
 
 
 def _next(
@@ -158,7 +161,7 @@ def _fitted(
 ) -> list[tuple[float, Trial, Fit]]:
     """Return joint fits with their log-posterior less their parameters' cost, the best first."""
     fitted = []
-    for trial in trials:
+    for trial in map(partial(with_ends, problem), trials):
         made = joint_fit(problem, base, (trial.applied,))
         if made is not None and not at_bound(made.active[-1]):
             fitted.append((made.log_posterior - weight * trial.cost, trial, made))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.law.shapes import ALIKE, ONE, TWO, Shape, pulse
-from toolkit.diagnosis.law.trial import Signal, Trial, started
+from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
 from toolkit.diagnosis.policy import LAWS
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.states import term_places
@@ -26,7 +26,11 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
     motion = problem.model.capability.motion
     if motion is None or not motion.integrates:
         return
-    for channel, of in term_places(problem.model.places).items():
+    places = term_places(problem.model.places)
+    positions = {motion.position(channel) for channel in places}
+    for channel, of in places.items():
+        if channel in positions:  # that its rate is a speed is no physics that something could be left out of
+            continue
         force = reduced(motion.units(channel)[0])
         listed = _signals(problem, motion, channel, of)
         steady = [signal for signal in listed if signal.steady]
@@ -70,6 +74,29 @@ def _signals(problem: Problem, motion: Moving, channel: str, of: str) -> list[Si
         if np.ptp(values) > 1e-9 * np.abs(values).max(initial=0.0)
     ]
     return listed + moving
+
+
+def with_ends(problem: Problem, trial: Trial) -> Trial:
+    """Return an event in an equation with its ends on rows, as numbers: no slope leads a fit to them."""
+    values = trial.applied.values
+    if trial.form != "event" or not {"start", "end"} <= values.keys():
+        return trial
+    (run,) = (run for run in problem.runs if trial.applied.acts_in(run))
+    start, end = (run.t[np.argmin(np.abs(run.t - values[name]))] for name in ("start", "end"))
+    text = trial.shape.text.replace("start", f"{start:.9g}").replace("end", f"{end:.9g}")
+    shape = Shape(form="event", text=text, units={"a": "{y}"}, enters=True)
+    made = trial_at(
+        problem,
+        shape,
+        trial.signals,
+        "enters",
+        str(trial.applied.channel),
+        {"a": values["a"]},
+        force=trial.unit,
+    )
+    return replace(
+        made, gain=trial.gain, looked=trial.looked, applied=replace(made.applied, runs=trial.applied.runs)
+    )
 
 
 def _events(problem: Problem, channel: str, force: str) -> Iterator[Trial]:

@@ -14,7 +14,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
-from toolkit.diagnosis.policy import STEP
+from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
@@ -206,6 +206,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     except BudgetSpentError as error:
         skipped.append(str(error))
     base, steps = _with_a_size(problem, base, steps)
+    with contextlib.suppress(BudgetSpentError):
+        base, held_base, steps = _told_from_none(problem, folds, base, held_base, steps)
     # Every effect with its values of the last joint fit, not of the step that found it.
     values = {applied.key: applied for applied in base.active}
     steps = [replace(step, active=values[step.active.key]) for step in steps]
@@ -318,6 +320,35 @@ def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, l
             remaining_steps = [step for step in steps if step.active.key in keys]
             return _with_a_size(problem, replace_effects(problem, base, remaining), remaining_steps)
     return base, steps
+
+
+def _told_from_none(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+) -> tuple[Fit, HeldOut, list[Step]]:
+    """Return a hypothesis without effects of one size that the others leave open: it may be none."""
+    from scipy.stats import norm
+
+    reach = float(norm.ppf((1 + VERDICT.interval) / 2))
+    at = len(problem.free)
+    for applied in base.active:
+        own, at = at, at + len(applied.searched)
+        sizes = [(i, each) for i, each in enumerate(applied.searched) if each.off is not None]
+        if len(sizes) != 1 or len(steps) < 2:
+            continue
+        (i, size) = sizes[0]
+        sd = math.sqrt(max(float(base.covariance[own + i, own + i]), 0.0))
+        if not abs(applied.values[size.name] - (size.off or 0.0)) < reach * sd:
+            continue
+        listed = [step for step in steps if step.active.key != applied.key]
+        if len(listed) == len(steps):
+            continue
+        try:
+            bare = fit(problem, without(base.active, applied), start=base.p)
+            scores = hold_out(problem, folds, bare.active, bare)
+        except FitError:  # the simulation needs it
+            continue
+        return _told_from_none(problem, folds, bare, scores, listed)
+    return base, held_base, steps
 
 
 def _as_declared(problem: Problem) -> Fit:

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
 
 
+_TOO_LARGE = ("more than its stated noise",)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
     """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance."""
@@ -167,6 +170,11 @@ class StructureFound:
         """Tell whether a law may answer it: an event has one, what only differs from run to run has none."""
         return not self.rest or self.variables[0].startswith("time (")
 
+    @property
+    def is_too_large(self) -> bool:
+        """Tell whether it is all that is known that the residual is larger than the stated noise."""
+        return self.variables == _TOO_LARGE
+
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
     """Return what stays unexplained about a fit, the largest first; nothing that matters to nobody."""
@@ -226,9 +234,7 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
     if p >= STRUCTURE.alpha:
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
-    return StructureFound(
-        output=name, variables=("more than its stated noise",), gain=gain, p_value=p, rest=True
-    )
+    return StructureFound(output=name, variables=_TOO_LARGE, gain=gain, p_value=p, rest=True)
 
 
 def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:
