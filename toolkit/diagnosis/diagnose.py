@@ -18,6 +18,7 @@ from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.law.imitations import without_imitations
 from toolkit.diagnosis.law.learn import Laws, learned
+from toolkit.diagnosis.law.rivals import judged_by_laws
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Search, search
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -108,6 +109,7 @@ def _diagnosed(
                 outcome = search(problem, seed=seed, budget=budget)
                 laws = learned(outcome, withdrawn=mostly_unknown(outcome), budget=budget)
                 outcome, laws = without_imitations(outcome, laws, budget)
+                outcome, laws = judged_by_laws(outcome, laws, budget)
             answer = answer_of(case, outcome, laws, findings)
     except BudgetSpentError as error:
         answer = _too_late(case, problem, declared, findings, str(error))

@@ -287,7 +287,8 @@ class _Laws:
     knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
     times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")
-    ends: int = _set(13, "times of a run", "between which an event in an equation may begin and end")
+    ends: int = _set(81, "times of a run", "between which an event in an equation may begin and end")
+    apart: float = _set(1e-12, "of a response", "squared, of two steps in an equation: less is rounding")
     columns: int = _set(
         4_000_000, "numbers of a response", "of laws in an equation that are propagated together"
     )

@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
+from toolkit.diagnosis.law.pulses import pulses_of
 from toolkit.diagnosis.law.ranking import p_value, ranked, responses
-from toolkit.diagnosis.law.terms import terms_of, with_ends
+from toolkit.diagnosis.law.terms import terms_of
 from toolkit.diagnosis.law.trial import Trial, amplitudes
 from toolkit.diagnosis.law.trials import curve_trial, trials_of, unlocked_tone
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
@@ -127,7 +127,11 @@ def _next(
     present = {applied.key for applied in base.active}
     trials = [
         trial
-        for trial in (*trials_of(problem, base, outputs), *terms_of(problem))
+        for trial in (
+            *trials_of(problem, base, outputs),
+            *terms_of(problem),
+            *pulses_of(problem, base, screen),
+        )
         if trial.applied.key not in present
     ]
     looked = len(trials)
@@ -161,7 +165,7 @@ def _fitted(
 ) -> list[tuple[float, Trial, Fit]]:
     """Return joint fits with their log-posterior less their parameters' cost, the best first."""
     fitted = []
-    for trial in map(partial(with_ends, problem), trials):
+    for trial in trials:
         made = joint_fit(problem, base, (trial.applied,))
         if made is not None and not at_bound(made.active[-1]):
             fitted.append((made.log_posterior - weight * trial.cost, trial, made))
@@ -185,6 +189,8 @@ def _judged(
 ) -> tuple[Law, Fit, HeldOut] | None:
     problem = search.problem
     applied = made.active[-1]
+    if not _told_from_none(made):
+        return None
     gain: float | None = None
     scores = held_out
     if trial.form == "event":
@@ -219,6 +225,19 @@ def _judged(
         resembles=_resembling(search, base, replace(trial, applied=applied)),
     )
     return law, made, scores
+
+
+def _told_from_none(made: Fit) -> bool:
+    """Tell whether one of the sizes of a fit's last effect, a law, is none only outside of its interval."""
+    from scipy.stats import norm
+
+    reach, applied = float(norm.ppf((1 + VERDICT.interval) / 2)), made.active[-1]
+    at = len(made.covariance) - len(applied.searched)
+    sds = np.sqrt(np.clip(np.diag(made.covariance)[at:], 0.0, None))
+    return any(
+        parameter.off is not None and abs(applied.values[parameter.name]) > reach * sd
+        for parameter, sd in zip(applied.searched, sds.tolist(), strict=True)
+    )
 
 
 def _taken(problem: Problem, before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> float:

@@ -152,22 +152,10 @@ TONE = Shape(
 )  # fmt: skip
 
 
-def pulse(row: float) -> Shape:
+def pulse(start: float, end: float, row: float) -> Shape:
     """Return an event in an equation: an input that is there for a while, with edges as long as a row [s]."""
-    return Shape(
-        form="event", text=f"a*pulse([time], start, end, {row:.4g})",
-        units={"a": "{y}", "start": "s", "end": "s"}, starts=_stretches, enters=True,
-    )  # fmt: skip
-
-
-def _stretches(t: Array, _: Array) -> list[dict[str, float]]:
-    ends = np.linspace(t[0], t[-1], LAWS.ends)
-    longest = LAWS.event_most * (t[-1] - t[0])
-    return [
-        {"start": start, "end": end}
-        for start, end in itertools.combinations(ends.tolist(), 2)
-        if end - start <= longest
-    ]
+    text = f"a*pulse([time], {start:.9g}, {end:.9g}, {row:.4g})"
+    return Shape(form="event", text=text, units={"a": "{y}"}, enters=True)
 
 
 UNLOCKED = Shape(

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.law.shapes import ALIKE, ONE, TWO, Shape, pulse
-from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
-from toolkit.diagnosis.policy import LAWS
+from toolkit.diagnosis.law.shapes import ALIKE, ONE, TWO, Shape
+from toolkit.diagnosis.law.trial import Signal, Trial, started
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.law import ITSELF, POSITION, TIME
@@ -26,11 +24,7 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
     motion = problem.model.capability.motion
     if motion is None or not motion.integrates:
         return
-    places = term_places(problem.model.places)
-    positions = {motion.position(channel) for channel in places}
-    for channel, of in places.items():
-        if channel in positions:  # that its rate is a speed is no physics that something could be left out of
-            continue
+    for channel, of in entered(problem, motion).items():
         force = reduced(motion.units(channel)[0])
         listed = _signals(problem, motion, channel, of)
         steady = [signal for signal in listed if signal.steady]
@@ -42,7 +36,16 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
             made += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]
         for shape, signals in made:
             yield from started(problem, shape, signals, "enters", channel, force=force)
-        yield from _events(problem, channel, force)
+
+
+def entered(problem: Problem, motion: Moving) -> dict[str, str]:
+    """Return the states whose equation a law may enter, and of what a law is there.
+
+    That the rate of a position is a speed is no physics that something could be left out of.
+    """
+    places = term_places(problem.model.places)
+    positions = {motion.position(channel) for channel in places}
+    return {channel: of for channel, of in places.items() if channel not in positions}
 
 
 def _signals(problem: Problem, motion: Moving, channel: str, of: str) -> list[Signal]:
@@ -74,37 +77,3 @@ def _signals(problem: Problem, motion: Moving, channel: str, of: str) -> list[Si
         if np.ptp(values) > 1e-9 * np.abs(values).max(initial=0.0)
     ]
     return listed + moving
-
-
-def with_ends(problem: Problem, trial: Trial) -> Trial:
-    """Return an event in an equation with its ends on rows, as numbers: no slope leads a fit to them."""
-    values = trial.applied.values
-    if trial.form != "event" or not {"start", "end"} <= values.keys():
-        return trial
-    (run,) = (run for run in problem.runs if trial.applied.acts_in(run))
-    start, end = (run.t[np.argmin(np.abs(run.t - values[name]))] for name in ("start", "end"))
-    text = trial.shape.text.replace("start", f"{start:.9g}").replace("end", f"{end:.9g}")
-    shape = Shape(form="event", text=text, units={"a": "{y}"}, enters=True)
-    made = trial_at(
-        problem,
-        shape,
-        trial.signals,
-        "enters",
-        str(trial.applied.channel),
-        {"a": values["a"]},
-        force=trial.unit,
-    )
-    return replace(
-        made, gain=trial.gain, looked=trial.looked, applied=replace(made.applied, runs=trial.applied.runs)
-    )
-
-
-def _events(problem: Problem, channel: str, force: str) -> Iterator[Trial]:
-    """Give stretches of one run's time in which something acts that no other run has seen."""
-    for run in problem.runs:
-        if run.rows < LAWS.event_rows:
-            continue
-        time = Signal(written=f"[{TIME}]", name=TIME, unit="s", values=run.t, steady=False)
-        row = float(np.median(np.diff(run.t)))
-        for trial in started(problem, pulse(row), (time,), "enters", channel, force=force):
-            yield replace(trial, applied=replace(trial.applied, runs=frozenset({run.name})))
