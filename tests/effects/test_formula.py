@@ -57,13 +57,35 @@ def test_a_loop_turns_round_within_its_reach():
     np.testing.assert_allclose(looped[later & falling & (x < 0.7)], -1.0, atol=1e-9)
 
 
-def test_a_spline_goes_through_its_points_and_on_straight():
+def test_a_spline_goes_through_its_points_and_on_as_it_ends():
     curve = formula("spline([x], 0, a1, 1, a2, 2, a3)")
     values = {"a1": 1.0, "a2": 3.0, "a3": 2.0}
     x = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
     y = curve({"x": x}, values)
     np.testing.assert_allclose(y[:3], [1.0, 3.0, 2.0], atol=1e-12)
-    assert y[4] - y[3] == pytest.approx(y[3] - y[2])
+    np.testing.assert_allclose(y[3:], 2.0)
+
+
+def test_splines_of_several_sets_are_those_of_each_set_alone():
+    curve = formula("spline([x], 0, a1, 1, a2, 2, a3)")
+    x = np.array([0.2, 0.7, 1.6, 1.1])
+    sets = [{"a1": 1.0, "a2": 3.0, "a3": 2.0}, {"a1": -1.0, "a2": 0.0, "a3": 5.0}]
+    of = np.array([0, 1, 1, 0])
+    values = {name: np.array([sets[k][name] for k in of]) for name in sets[0]}
+    alone = [float(curve({"x": at}, sets[k])) for at, k in zip(x, of, strict=True)]
+    np.testing.assert_allclose(curve({"x": x}, values), alone, rtol=1e-12)
+
+
+def test_a_pulse_is_there_between_its_ends_and_half_at_them():
+    values = {"a": 2.0}
+    there = formula("a*pulse([t], 1, 3, 0.05)")({"t": np.array([0.0, 1.0, 2.0, 3.0, 4.0])}, values)
+    np.testing.assert_allclose(there, [0, 1, 2, 1, 0], atol=1e-9)
+
+
+def test_a_way_is_the_integral_of_a_speed():
+    t = np.linspace(0, 2, 201)
+    way = formula("a*way([v])")({"v": 3 * t**2}, {"a": 1.0}, t)
+    np.testing.assert_allclose(way, t**3, atol=1e-3)
 
 
 @pytest.mark.parametrize(

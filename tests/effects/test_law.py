@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from toolkit.diagnosis.simulators.forces import Forces
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effect
 from toolkit.effects.forward import through
@@ -39,10 +40,25 @@ def test_signals_are_in_the_units_of_the_recording():
 
 
 def test_a_law_in_an_equation_is_taken_from_the_rate():
-    term = law_effect(law_name("enters", "a*[itself]*[position]**2")).term
-    assert term is not None
-    assert term.force is not None
-    assert term.force(3.0, 2.0, {"a": 5.0}) == pytest.approx(5 * 2 * 9)
+    law = AppliedEffect(
+        effect=law_effect(law_name("enters", "a*[itself]*[position]**2*[F]")), channel="v", values={"a": 5.0}
+    )
+    forces = Forces.of([law], ["x", "v"], {1: 0}, {"v": (1.0, 1.0)}, ["F"])
+    rate = np.zeros((2, 2))
+    states = np.array([[3.0, 1.0], [2.0, 2.0]])
+    forces.add(states, rate, 2, {"F": np.array([7.0, 10.0]), "time": np.zeros(2)})
+    np.testing.assert_allclose(rate, [[0, 0], [-5 * 2 * 9 * 7, -5 * 2 * 1 * 10]])
+
+
+def test_a_law_that_reads_what_an_equation_does_not_have_is_refused():
+    law = AppliedEffect(effect=law_effect("law enters: a*[q]"), channel="v", values={"a": 5.0})
+    with pytest.raises(ConfigError, match="does not have") as caught:
+        Forces.of([law], ["x", "v"], {1: 0}, {"v": (1.0, 1.0)}, ["F"])
+    assert (caught.value.rule, caught.value.got, caught.value.expected) == (
+        "model-place",
+        "q",
+        "x, v, F, time",
+    )
 
 
 def test_an_amplitude_can_be_off_and_a_width_is_positive():
@@ -54,7 +70,7 @@ def test_an_amplitude_can_be_off_and_a_width_is_positive():
 
 @pytest.mark.parametrize(
     "name",
-    ["law adds: open(a)", "law takes: a", "law ", "law enters: a*lag([itself], tau)", "law enters: a*[x]"],
+    ["law adds: open(a)", "law takes: a", "law ", "law enters: a*lag([itself], tau)"],
 )
 def test_what_is_no_law_is_refused(name):
     with pytest.raises(ConfigError) as caught:

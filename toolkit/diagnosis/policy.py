@@ -294,6 +294,9 @@ class _Laws:
     )
     cuts: int = _set(120, "stretches of a run", "on whose ends an event may begin and end")
     event_rows: int = _set(40, "values of a run", "fewer do not tell an event from a few outliers")
+    stands_out: float = _set(
+        3.0, "rms of other stretches as long", "an event's mean; less is what wanders, not what happened"
+    )
     event_least: int = _set(5, "rows", "fewer are single values far off, not an event")
     event_most: float = _set(0.6, "of a run", "what lasts longer is no event but the run's own zero")
     alike: float = _set(0.5, "of a response", "left beside a known effect's, above which it is not like it")

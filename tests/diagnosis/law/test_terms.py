@@ -96,3 +96,80 @@ def test_with_it_only_the_noise_is_left(answer):
     (fit,) = answer["fit"]["held_out"]
     assert fit["with_laws_rmse"] == pytest.approx(0.004, rel=0.1)
     assert fit["refitted_rmse"] > 0.02
+
+
+HIDDEN = {
+    "a factor of the force that grows with the position": lambda x, _v, F, _t, _run: 0.25 * F * x,
+    "a force that grows with its square": lambda _x, _v, F, _t, _run: 0.002 * F * abs(F),
+    "a damper that acts one way": lambda _x, v, _F, _t, _run: 0.9 * max(v, 0.0),
+    "a push in one run": lambda _x, _v, _F, t, run: -5.0 if run == 1 and 3 < t < 5.5 else 0.0,
+}
+"""What is concealed in the speed's equation [N/kg], as it is taken from the rate."""
+
+
+def _moved(hidden, seed: int, number: int) -> pd.DataFrame:
+    """A mass on a spring whose k is 41 and d 1.05 with a concealed term; the noise is 4 mm."""
+    rng = np.random.default_rng(1000 * seed + number)
+    t = np.arange(250) * 0.04
+    phase = rng.uniform(0, 6, 3)
+    force = sum(a * np.sin(w * t + p) for a, w, p in zip((12, 9, 6), (3.1, 5.2, 1.3), phase, strict=True))
+
+    def rates(s: float, x: np.ndarray) -> list[float]:
+        F = float(np.interp(s, t, force))
+        return [x[1], (F - 41 * x[0] - 1.05 * x[1]) / 2 - hidden(x[0], x[1], F, s, number)]
+
+    y = solve_ivp(rates, (0, t[-1]), [0, 0], t_eval=t, rtol=1e-8, atol=1e-10, max_step=0.02).y
+    return pd.DataFrame({"t": t, "F": force, "X": y[0] + rng.normal(0, 0.004, len(t))})
+
+
+def _diagnosed(folder: Path, hidden, seed: int = 0) -> dict:
+    (folder / "sim.py").write_text(SIMULATOR)
+    runs = "".join(f'[[recording.run]]\nfile = "r{i}.csv"\n' for i in range(3))
+    (folder / "case.toml").write_text(HEAD + runs)
+    for i in range(3):
+        _moved(hidden, seed, i).to_csv(folder / f"r{i}.csv", index=False)
+    return json.loads(run("diagnose", folder / "case.toml", "--out", folder / "out", "--json").output)
+
+
+def test_a_law_of_an_input_and_a_state_is_learned(tmp_path):
+    answer = _diagnosed(tmp_path, HIDDEN["a factor of the force that grows with the position"])
+    (law,) = answer["laws"]
+    assert (answer["effects"], law["place"], law["formula"]) == (
+        [],
+        {"kind": "state", "channel": "v"},
+        "a*x*F",
+    )
+    value, low, high = estimates(law)["a"]
+    assert low < 0.25 < high
+    assert value == pytest.approx(0.25, rel=0.01)
+    assert answer["fit"]["held_out"][0]["with_laws_rmse"] == pytest.approx(0.004, rel=0.05)
+
+
+def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path):
+    # A wrong sensitivity of the force takes most of its square's answer, and the law takes all of it.
+    answer = _diagnosed(tmp_path, HIDDEN["a force that grows with its square"])
+    assert (answer["verdict"], answer["effects"]) == ("unknown", [])
+    (law,) = answer["laws"]
+    assert law["formula"] == "a*F*abs(F)"
+    assert estimates(law)["a"][0] == pytest.approx(0.002, rel=0.02)
+
+
+def test_several_effects_that_leave_more_than_noise_give_way_to_one_law(tmp_path):
+    answer = _diagnosed(tmp_path, HIDDEN["a damper that acts one way"])
+    assert (answer["verdict"], answer["effects"]) == ("unknown", [])
+    (law,) = answer["laws"]
+    assert (law["formula"], law["variables"]) == ("a*max(v - c, 0)", ["v"])
+    for name, truth in (("a", 0.9), ("c", 0.0)):
+        _, low, high = estimates(law)[name]
+        assert low < truth < high
+
+
+def test_a_push_in_one_run_is_told_with_its_run_and_its_times(tmp_path):
+    answer = _diagnosed(tmp_path, HIDDEN["a push in one run"])
+    law = answer["laws"][0]
+    assert (law["form"], law["place"]) == ("event", {"kind": "state", "channel": "v"})
+    start, end = (float(each) for each in law["formula"].split(", ")[1:3])
+    assert start == pytest.approx(3.0, abs=0.04)  # a row
+    assert end == pytest.approx(5.5, abs=0.04)
+    assert law["parameters"][0]["runs"] == ["r1.csv"]
+    assert law["parameters"][0]["value"] == pytest.approx(-5.0, rel=0.02)

@@ -134,6 +134,8 @@ class FoundLaw:
             text = f"{place} * (1 + {law})"
         else:
             text = f"{place} + {law}"
+        runs = self.parameters[0].runs if self.parameters else None
+        text += f", in {' and '.join(runs)} alone" if runs is not None else ""
         return text if self.held_out_log_score_gain is not None else f"{text}; it explains, not predicts"
 
 

@@ -14,7 +14,9 @@ from toolkit.diagnosis.law.shapes import MODE, ONE, REMEMBERING, TONE, TWO, UNLO
 from toolkit.diagnosis.law.trial import Signal, Trial, bracketed, started, trial_at
 from toolkit.diagnosis.policy import LAWS, STRUCTURE
 from toolkit.diagnosis.search.unexplained import strongest_events, strongest_line
-from toolkit.diagnosis.simulators.parameter_units import channel_unit
+from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
+from toolkit.diagnosis.simulators.setting import dimension
+from toolkit.effects.formula import formula
 from toolkit.effects.law import ITSELF
 
 if TYPE_CHECKING:
@@ -27,8 +29,11 @@ if TYPE_CHECKING:
     Stacked = dict[str, Array]
 
 
+_SPEEDS = ("speed", "frequency")
+
+
 def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
-    """Return what a law on an output may depend on: every input and its rate, the output itself, time."""
+    """Return what a law on an output may depend on: inputs, their rates and ways, the output itself, time."""
     case, timed = problem.case, problem.case.has_time
     listed = []
 
@@ -53,11 +58,26 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
             values = np.concatenate([run.columns[channel.name] for run in problem.runs])
             if np.isfinite(values).all():
                 with_rate(channel.name, channel.name, values, channel.unit)
+                if timed and dimension(channel.unit) in _SPEEDS:
+                    listed.append(_way(problem, channel.name, channel.unit, values))
     with_rate(ITSELF, output, base.simulated[output], channel_unit(case, problem.model, output))
     if timed:
         times = np.concatenate([run.t for run in problem.runs])
         listed.append(Signal(written="[time]", name="time", unit="s", values=times, steady=False))
     return tuple(listed)
+
+
+def _way(problem: Problem, name: str, text: str, speed: Array) -> Signal:
+    """Return the way of a recorded speed from the first row of each run on."""
+    written = f"way([{name}])"
+    law = formula(written)
+    ways = [
+        law({name: speed[rows]}, {}, run.t) for run, rows in zip(problem.runs, problem.slices, strict=True)
+    ]
+    unit_of_way = reduced(f"{bracketed(text)}*s")
+    return Signal(
+        written=written, name=f"way of {name}", unit=unit_of_way, values=np.concatenate(ways), steady=False
+    )
 
 
 def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[Trial]:

@@ -102,7 +102,10 @@ class Event:
 
 
 def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64]) -> tuple[Event, ...]:
-    """Return for every run the stretch of its time that stands off the rest most clearly."""
+    """Return for every run the stretch of its time that stands off the rest most clearly.
+
+    None of a run in which other stretches as long are off as well: that is what wanders, not what happened.
+    """
     events = []
     for run, place in zip(problem.runs, problem.slices, strict=True):
         good = problem.kept[name][place]
@@ -116,6 +119,8 @@ def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64])
         usable = (rows >= LAWS.event_least) & (rows < LAWS.event_most * len(values))
         strength = np.where(usable, (total[last] - total[first]) ** 2 / rows, 0.0)
         at = int(np.argmax(strength))
+        if not _stands_out(values - np.median(values), edges[first[at]], edges[last[at]]):
+            continue
         events.append(
             Event(
                 run=run.name, start=float(t[edges[first[at]]]), end=float(t[edges[last[at]] - 1]),
@@ -123,6 +128,19 @@ def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64])
             )
         )  # fmt: skip
     return tuple(events)
+
+
+def _stands_out(values: NDArray[np.float64], first: int, last: int) -> bool:
+    """Tell whether the mean of some rows is far beyond those of all other stretches of as many."""
+    rows = last - first
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    means = (total[rows:] - total[:-rows]) / rows
+    begins = np.arange(len(means))
+    others = means[(begins + rows <= first) | (begins >= last)]
+    if not len(others):
+        return True
+    scatter = math.sqrt(float(np.mean(others**2)))
+    return abs(float(means[first])) > LAWS.stands_out * scatter
 
 
 def _event(problem: Problem, screen: LinearisedFit, base: Fit, name: str) -> StructureFound | None:
