@@ -166,7 +166,9 @@ def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
     read = read_case(case, model=path)
     model = model_of(read, None)
     run, p = read.runs[0], {one.name: one.value for one in model.parameters}
-    linear = model.capability.motion.pushed(run, p, (), "v", lambda x, _: np.ones((len(x), 1)))["h"][:, 0]
+    linear = model.capability.motion.pushed(run, p, (), "v", lambda seen: np.ones((len(seen["v"]), 1)))["h"][
+        :, 0
+    ]
     push = AppliedEffect(effect=effects()["constant_force"], channel="v", values={"force": 1e-3})
     moved = (model.simulate(run, p, (push,))["h"] - model.simulate(run, p, ())["h"]) / 1e-3
     # the drag holds back: less than the t^2/2 of a body without it
@@ -193,7 +195,13 @@ def simulate(inputs, p):
     model = model_of(read, None)
     run, p = read.runs[0], {one.name: one.value for one in model.parameters}
     seen = []
-    model.capability.motion.pushed(run, p, (), "h", lambda x, _: seen.append(x) or np.ones((len(x), 1)))
+    model.capability.motion.pushed(
+        run,
+        p,
+        (),
+        "h",
+        lambda signals: seen.append(signals["position"]) or np.ones((len(signals["position"]), 1)),
+    )
     w = np.sqrt(9.81 / 0.2)
     np.testing.assert_allclose(seen[0], -(w**2) / 9.81 * np.log(np.cosh(9.81 * run.t / w)), atol=0.03)
 

@@ -111,9 +111,14 @@ def _unlocked(problem: Problem, base: Fit, outputs: Sequence[str], before: Seque
 
 
 def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -> tuple[str, ...]:
-    """Return the outputs that ask for a law: all of them where a parameter has absorbed what was left out."""
+    """Return the outputs that ask for a law: all of them where a parameter has absorbed what was left out.
+
+    Of an equation runs that differ ask as well: an input that came once moves its run as long as it rings.
+    """
     strained = any(abs(off) > PRIORS.far for off in problem.off_priors(base.p))
-    shown = {each.output for each in structure if each.is_lawful or each.is_too_large}
+    motion = problem.model.capability.motion
+    solved = motion is not None and motion.integrates
+    shown = {each.output for each in structure if solved or each.is_lawful or each.is_too_large}
     return tuple(name for name in problem.names if strained or name in shown)
 
 
@@ -176,10 +181,10 @@ def _simplest_first(fitted: Sequence[tuple[float, Trial, Fit]]) -> list[tuple[fl
     """Return fits in order, of those that the data do not tell from the best one the simplest first."""
     best = max((score for score, _, _ in fitted), default=0.0)
 
-    def order(entry: tuple[float, Trial, Fit]) -> tuple[bool, float]:
+    def order(entry: tuple[float, Trial, Fit]) -> tuple[bool, int, float]:
         score, trial, _ = entry
         behind = score <= best - VERDICT.close
-        return behind, -score if behind else trial.cost + 1e-3 * len(trial.applied.effect.name)
+        return behind, 0 if behind else trial.cost, -score
 
     return sorted(fitted, key=order)
 

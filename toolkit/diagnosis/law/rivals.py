@@ -1,4 +1,4 @@
-"""A law as the rival of several effects: simpler, and better on rows that no fit has seen."""
+"""Laws as the rivals of effects: simpler, and no worse on rows that no fit has seen."""
 
 from __future__ import annotations
 
@@ -10,25 +10,36 @@ from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.policy import STEP
 
 if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.time_budget import TimeBudget
 
 
 def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
-    """Return a search and its laws, or the laws alone where they foretell better than its several effects.
+    """Return a search and its laws, or laws alone where these have fewer parameters and foretell as well.
 
-    Two effects together imitate much that neither is. Asked where what they leave is more than the sensor's
-    noise: coloured noise takes up the rest, and no structure shows.
+    Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
+    stand beside effects, and where these leave more than the sensor's noise: coloured noise takes up the
+    rest, and no structure shows. What has a name keeps it against a formula that says the same.
     """
     parts = [noise_parts(search.problem, search.augmented, name) for name in search.problem.names]
-    if len(search.steps) < 2 or laws.listed or not any(each.process_sd > each.sensor_sd for each in parts):
+    predicting = any(law.predicts for law in laws.listed)
+    asked = predicting or any(each.process_sd > each.sensor_sd for each in parts)
+    beside = any(step.active.key == applied.key for step in search.steps for applied in laws.fit.active)
+    if not beside or not asked or not laws.complete:
         return search, laws
     alone = learned(search, withdrawn=True, budget=budget)
-    better = alone.held_out.total - search.held_augmented.total
-    if not any(law.predicts for law in alone.listed) or better < STEP.least_gain:
+    if not any(law.predicts for law in alone.listed) or _parameters(alone.fit) >= _parameters(laws.fit):
+        return search, laws
+    before = (laws.held_out if predicting else search.held_augmented).total
+    if alone.held_out.total - before < -STEP.least_gain:
         return search, laws
     bare = replace(
         search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
         structure=search.structure_before,
     )  # fmt: skip
     return bare, alone
+
+
+def _parameters(fit: Fit) -> int:
+    return sum(len(applied.searched) for applied in fit.active)
