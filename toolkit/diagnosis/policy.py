@@ -281,6 +281,9 @@ class _Laws:
     fitted: int = _set(5, "laws", "fitted jointly, of those that are ranked first")
     judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
+    same: float = _set(
+        0.95, "of what laws take of the held-out mean square", "by effects: the laws are their own formulas"
+    )
     moved: float = _set(1.0, "prior sd", "a parameter that goes farther is what the law may be taken for")
     points: int = _set(41, "points of a curve", "that is drawn of a law over what was recorded")
     step: float = _set(1e-4, "of a parameter", "by which the band of a curve is differentiated")

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.learn import Laws, learned
-from toolkit.diagnosis.policy import STEP
+from toolkit.diagnosis.policy import LAWS, STEP
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
+    from toolkit.diagnosis.fit.folds import HeldOut
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.time_budget import TimeBudget
 
@@ -31,14 +34,33 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
     alone = learned(search, withdrawn=True, budget=budget)
     if not any(law.predicts for law in alone.listed) or _parameters(alone.fit) >= _parameters(laws.fit):
         return search, laws
-    before = (laws.held_out if predicting else search.held_augmented).total
-    if alone.held_out.total - before < -STEP.least_gain:
+    beside_laws = laws.held_out if predicting else search.held_augmented
+    if alone.held_out.total - beside_laws.total < -STEP.least_gain:
+        return search, laws
+    if _same(search, alone):
         return search, laws
     bare = replace(
         search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
         structure=search.structure_before,
     )  # fmt: skip
     return bare, alone
+
+
+def _same(search: Search, alone: Laws) -> bool:
+    """Tell whether the effects take nearly all that the laws take: then these are the effects' own formulas."""
+    problem = search.problem
+
+    def error(held_out: HeldOut, name: str) -> float:
+        counted = problem.kept[name]
+        return float(np.mean((problem.observed[name] - held_out.simulated[name])[counted] ** 2))
+
+    outputs = [name for name in problem.names if problem.kept[name].any()]
+    taken = [
+        (error(search.held_refitted, name) - error(search.held_augmented, name),
+         error(search.held_refitted, name) - error(alone.held_out, name))
+        for name in outputs
+    ]  # fmt: skip
+    return all(by_effects >= LAWS.same * by_laws for by_effects, by_laws in taken)
 
 
 def _parameters(fit: Fit) -> int:
