@@ -47,7 +47,7 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
 
 
 def _same(search: Search, alone: Laws) -> bool:
-    """Tell whether the effects take nearly all that the laws take: then these are the effects' own formulas."""
+    """Tell whether the effects take nearly all that the laws take: these are then their own formulas."""
     problem = search.problem
 
     def error(held_out: HeldOut, name: str) -> float:
