@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
     from toolkit.findings import Finding
-    from toolkit.planning.row_exchange import Criterion
+    from toolkit.planning.criteria import Criterion
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template
 
