@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from tests.cli.test_calibrate import run as run_command
 from toolkit.cli import compare
 from toolkit.errors import ToolkitError
+from toolkit.report.word.contents_pages import pdf_text
 
 TEXT = """measurand,laboratory,value [N],U [N]
 conicity,A,10.1,0.4
@@ -48,7 +50,7 @@ def test_every_measurand_is_answered_and_drawn(path: Path, tmp_path: Path) -> No
     assert conicity["scores"][3]["En"] is None
     assert answer["measurands"][1]["precision"]["s_r"] is None
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {
-        "laboratories_1.png", "laboratories_2.png"
+        "laboratories_1.png", "laboratories_2.png", "laboratories_h.png", "laboratories_k.png"
     }  # fmt: skip
 
 
@@ -67,7 +69,7 @@ def test_people_get_scores_and_precision(path: Path) -> None:
         ("--sigma", "nan"),
         ("--reference", "D"),
         ("--reference", "nobody"),
-        ("--out", "x"),
+        ("--template", "laboratories.docx"),
         ("other",),
     ],
 )
@@ -76,6 +78,27 @@ def test_what_cannot_be_compared_is_an_error(path: Path, arguments: tuple[str, .
         run("--laboratories", path, *arguments)
     assert refused.value.exit_code == 2
     assert refused.value.next_step
+
+
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_its_report_is_a_word_file_and_a_verified_pdf(path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    _, said = run("--laboratories", path, "--out", out, "--known-at", "2026-11-24", "--json")
+    document = json.loads(said)["document"]
+    assert {file.name for file in out.iterdir()} == {"laboratories.docx", "laboratories.pdf"}
+    assert document["warnings"] == []
+    text = pdf_text(out / "laboratories.pdf")
+    assert "Interlaboratory comparison: conicity, plysteer" in " ".join(text.split())
+    assert "2026-11-24" in text
+
+
+def test_a_file_that_cannot_be_compared_leaves_no_document(tmp_path: Path) -> None:
+    path = tmp_path / "two.csv"
+    path.write_text("laboratory,value [N]\nA,1\nB,2\n")
+    with pytest.raises(ToolkitError):
+        run("--laboratories", path, "--out", tmp_path / "out", "--figures", tmp_path / "figures")
+    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "figures").exists()
 
 
 def test_nothing_to_compare_is_an_error() -> None:

@@ -154,7 +154,7 @@ def test_the_sheet_of_a_test_stands_beside_its_protocol(run, quick, tmp_path):
     planned = run("plan", "test", "--u", "conicity", "--out", "p", "--template", template, "--json")
     assert planned.return_value == 0, planned
     assert json.loads(planned.stdout)["document"]["warnings"] == []
-    names = {"plan.docx", "plan.pdf", "plan.toml", "protocol.toml"}
+    names = {"plan.docx", "plan.json", "plan.pdf", "plan.toml", "protocol.toml"}
     assert {path.name for path in (tmp_path / "p").iterdir()} == names
 
 

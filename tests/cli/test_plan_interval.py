@@ -63,7 +63,9 @@ def test_the_sheet_draws_the_risk_over_the_days(tmp_path: Path) -> None:
         f"{answer['chosen']['days']}: {100 * answer['chosen']['beyond']:.1f} %"
         in (document["figures"][0]["alt"])
     )
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"plan.docx", "plan.pdf"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "plan.docx", "plan.json", "plan.pdf"
+    }  # fmt: skip
 
 
 def test_a_reliability_that_no_interval_keeps_names_the_nearest_that_one_does(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def test_the_answer_and_the_files_are_of_one_plan(planned: tuple[Path, dict[str,
     out, answer = planned
     assert answer["schema"] == 1
     assert {path.name for path in out.iterdir()} == {
-        "SESSION.toml", "loads.csv", "check.csv", "sheet.csv", "plan.txt"
+        "SESSION.toml", "loads.csv", "check.csv", "sheet.csv", "plan.txt", "plan.json"
     }  # fmt: skip
     assert len((out / "loads.csv").read_text().splitlines()) == 1 + len(answer["rows"])
     assert len((out / "check.csv").read_text().splitlines()) == 1 + len(answer["check"])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.planning.class_factory import T, answer, found, problem, with_run, write_case
+from toolkit.diagnosis.case.case import Run
 from toolkit.planning.members import members_of
 from toolkit.planning.next_run import Change, RunSearch, changed, movable, power_of, reach
 
@@ -95,3 +96,13 @@ def test_the_budget_ends_the_search(tmp_path: Path) -> None:
     spent = RunSearch(problem=posed, members=members, limits={}, until=lambda: False)
     assert spent.best() == Change(run="r0.csv")
     assert len(T) == posed.runs[0].rows
+
+
+def test_no_run_is_learned_twice(search: RunSearch) -> None:
+    """The worker of a case numbers the runs that it learns: one with two numbers is taken for another."""
+    learned: list[Run] = []
+    RunSearch(
+        problem=search.problem, members=search.members, limits={}, learn=learned.extend
+    ).best()  # fmt: skip
+    assert len(learned) > 4
+    assert len({id(run) for run in learned}) == len(learned)

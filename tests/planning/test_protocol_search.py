@@ -39,7 +39,7 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
     search = ProtocolSearch(asked, PACE, LOADS)
     for size in (8, 11, 14):
         found = search.best(size)
-        screened = search._screen.criterion(search._best[size])
+        screened = search._screen.criterion(np.array([search._best[size]]))[0]
         assert screened == pytest.approx(found.worst, rel=0.05)
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
+import pytest
 
 from toolkit.planning.fixtures import FeasibleLoads
 from toolkit.planning.sequence import in_order, visits
@@ -41,3 +44,17 @@ def test_creep_is_the_change_from_the_load_before() -> None:
     )
     assert order.tolist() == [0]
     assert answers[0].tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_few_mounts_the_order_is_the_best_of_all(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(1, 4, 5)
+    groups = np.split(np.arange(sizes.sum()), np.cumsum(sizes)[:-1])
+    weights, relative = rng.normal(size=(2, 3, sizes.sum()))
+    _, answers = in_order([groups], weights, relative, np.random.default_rng(seed))
+    least = min(
+        (in_order([[np.concatenate([groups[at] for at in order])]], weights, relative, rng)[1] ** 2).sum()
+        for order in itertools.permutations(range(5))
+    )
+    assert (answers**2).sum() == pytest.approx(least, rel=1e-9)

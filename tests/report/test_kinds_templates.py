@@ -23,6 +23,7 @@ from tests.report.certificate.test_certificate import STYLE, registry_of
 from tests.report.comparison.test_comparison_document import content as compared
 from tests.report.comparison.test_comparison_document import pair
 from tests.report.diagnosis.test_answer import ANSWER
+from tests.report.laboratories.laboratories_factory import compared as compared_laboratories
 from tests.report.plan.plan_factory import sheet
 from tests.report.report_factory import make_record, make_result
 from tests.report.template_factory import FOLDER
@@ -41,6 +42,7 @@ from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.kinds import check as check_template
+from toolkit.report.laboratories.content import build_laboratories_content
 from toolkit.report.plan.content import build_plan_content
 from toolkit.report.style import Style, read_style, replace_terms, style_file
 from toolkit.report.test.content import build_content, report_id
@@ -92,6 +94,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Delivered]:
         ),
         "certificate": certified(collect(registry_of(work), "pair-r1", STYLE, issued=CALIBRATED), STYLE),
         "comparison": compared(pair()),
+        "laboratories": build_laboratories_content(compared_laboratories(), Style()),
         "plan": build_plan_content(sheet(), Style()),
         "diagnosis": build_diagnosis_content(
             read_case(write_case(tmp_path_factory.mktemp("case"), HEAD + TWO, **recordings)),

@@ -15,11 +15,14 @@ import pytest
 from tests.workbench.conftest import Served, filled, serving
 from tests.workbench.test_home_page import command
 from tests.workbench.test_page import ANSWER
+from toolkit.cli.main import run
 from toolkit.lab.archive import audit_archive
 from toolkit.lab.laboratory import example
 
 Capture = pytest.CaptureFixture[str]
-_FILE = re.compile(r"\.(xlsx|png|csv|json|js|css|docx|pdf)$")
+_FILE = re.compile(r"\.(xlsx|png|csv|json|js|css|docx|pdf|toml|txt)$")
+PLANS = {"session": ("cell",), "test": ("--u", "conicity"), "interval": ("cell", "--tests", "100")}
+"""Kinds of plans with what each is asked for; the run that parts a class has a test of its own."""
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +35,10 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     shutil.copy(example("fig4_4"), home / "tests" / "few")
     (home / "tests" / "few" / "test.toml").write_text('schema = 1\nmachine = "m15"\ndate = 2019-05-31\n')
     audit_archive(home / "tests" / "few", out=home / "audits" / "one", calibrations=home / "calibrations")
+    for kind, words in PLANS.items():
+        with pytest.raises(SystemExit) as ended:
+            run(["plan", kind, *words, "--home", str(home), "--out", str(home / "plans" / kind), "--quiet"])
+        assert ended.value.code in (0, None)
     (home / "diagnoses" / "cell").mkdir(parents=True)
     (home / "diagnoses" / "cell" / "diagnosis.json").write_text(json.dumps(ANSWER))
     with serving(home) as bench:
@@ -83,6 +90,8 @@ def answers(home: Path, capsys: Capture) -> Iterator[Any]:
         yield ask("calibration", "history", instrument)
         yield ask("calibration", "chart", instrument)
     yield ask("process", home / "tests" / "few")
+    for kind, words in PLANS.items():
+        yield ask("plan", kind, *words)
     lines = (home / "audits" / "one" / "audit.jsonl").read_text().splitlines()
     yield [json.loads(line) for line in lines]
     yield ANSWER

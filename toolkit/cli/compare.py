@@ -28,7 +28,10 @@ from toolkit.cli.console import reader as choose_reader
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
+    from datetime import date
+
     from toolkit.comparison.model import Mode
+    from toolkit.report.word.package import Template
 
 NAME = "compare"
 
@@ -96,12 +99,16 @@ def command(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", callback=into_folder, help="Folder for comparison.docx and its verified comparison.pdf."
+            "--out",
+            callback=into_folder,
+            help="Folder for comparison.docx (laboratories.docx) and its verified PDF.",
         ),
     ] = None,
     template: Annotated[
         Path | None,
-        typer.Option("--template", help="Word template of --out; default: report_templates/comparison.docx."),
+        typer.Option(
+            "--template", help="Word template of --out; default: comparison.docx or laboratories.docx."
+        ),
     ] = None,
     protocol: ProtocolFile = None,
     known_at: KnownAt = None,
@@ -122,7 +129,8 @@ def command(
     U_conicity [N],plysteer [N],secant_cornering [N/deg],...).
 
     --laboratories takes an interlaboratory comparison instead: scores z', zeta and E_n by ISO 13528, and
-    repeatability and reproducibility by ISO 5725-2, for laboratories with different numbers of results too.
+    repeatability and reproducibility with Mandel's h and k by ISO 5725-2, for laboratories with different
+    numbers of results too.
 
     Ends with 0 whether or not there are differences: they are results. 1: the data has findings.
 
@@ -135,7 +143,17 @@ def command(
     from toolkit.lab.home import document_template
 
     if laboratories is not None:
-        return _laboratories(laboratories, sources, reference, sigma, figures, out, json=json, quiet=quiet)
+        if sources:
+            raise ConfigError(
+                "a comparison of laboratories takes no tests", where="--laboratories",
+                got=", ".join(map(str, sources)), expected="--laboratories FILE alone",
+                next_step="leave the tests out", rule="usage",
+            )  # fmt: skip
+        return _laboratories(
+            laboratories, reference, sigma, figures, out,
+            document_template(template, out, default="laboratories.docx", home=home),
+            day(known_at), json=json, quiet=quiet,
+        )  # fmt: skip
     if not sources or reference is not None or sigma is not None:
         raise ConfigError(
             "there is nothing to compare" if not sources else "an option of --laboratories alone",
@@ -176,26 +194,26 @@ def command(
 
 def _laboratories(
     path: Path,
-    sources: list[Path] | None,
     reference: str | None,
     sigma: float | None,
     figures: Path | None,
     out: Path | None,
+    opened: Template | None,
+    known_at: date | None,
     *,
     json: bool,
     quiet: bool,
 ) -> int:
+    from datetime import date as calendar
+
     from toolkit.lab.laboratories import laboratories_answer
 
-    if sources or out is not None:
-        raise ConfigError(
-            "a comparison of laboratories takes neither tests nor a document", where="--laboratories",
-            got=", ".join(map(str, sources)) if sources else "--out",
-            expected="--laboratories FILE, with --figures DIR",
-            next_step="leave them out", rule="usage",
-        )  # fmt: skip
     started = time.perf_counter()
-    payload, text, findings = laboratories_answer(path, reference=reference, sigma=sigma, figures=figures)
+    payload, text, findings = laboratories_answer(
+        path, reference=reference, sigma=sigma, figures=figures, opened=opened, out=out,
+        issued=known_at or calendar.today(),  # noqa: DTZ011
+    )  # fmt: skip
     payload["timing"] = {"seconds": time.perf_counter() - started}
     answer(payload, text, as_json=json, quiet=quiet)
-    return exit_code(findings)
+    warned = bool((payload["document"] or {}).get("warnings"))
+    return max(int(warned), exit_code(findings))

@@ -97,7 +97,7 @@ def session(
     """
     from toolkit.lab.home import document_template, open_registry
     from toolkit.lab.plan_session import PlanOrder, session_plan_answer
-    from toolkit.planning.row_exchange import CRITERIA
+    from toolkit.planning.criteria import CRITERIA
 
     if criterion not in CRITERIA:
         raise ConfigError(

@@ -180,7 +180,8 @@ def new(
         str,
         typer.Option(
             "--like",
-            help="Which to copy: org, summary, pruefbericht, certificate, comparison, diagnosis, audit.",
+            help="Which to copy: org, summary, pruefbericht, certificate, comparison, laboratories, "
+            "diagnosis, audit, plan.",
         ),
     ] = "org",
     language: Annotated[

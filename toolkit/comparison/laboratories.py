@@ -8,7 +8,8 @@ all by algorithm A. With sigma_pt, stated or robust, U = k u:
     E_n = (x - x_pt) / sqrt(U(x)^2 + U(x_pt)^2)             (9.7)
 
 Precision is the one-way analysis of variance of `precision`, for laboratories with different numbers of
-results too. Cochran's test looks for a laboratory that scatters more, Grubbs' for a mean that lies apart.
+results too. Cochran's test looks for a laboratory that scatters more, Grubbs' for a mean that lies apart;
+Mandel's h and k (`mandel`) say both of every laboratory.
 
 Algorithm A (ISO 13528, annex C.3) gives a robust mean and standard deviation.
 """
@@ -22,6 +23,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.comparison.mandel import Consistency, Departure, consistencies
 from toolkit.comparison.model import Spread
 from toolkit.comparison.precision import factor_spread, spread
 from toolkit.comparison.significance import grubbs_p
@@ -109,6 +111,7 @@ class Score:
     """A laboratory's scores; z' is None without sigma_pt, zeta and E_n where it states no uncertainty.
 
     ``signal`` is that of z' (beyond 2 a warning, from 3 an action), ``En_signal`` tells an E_n from 1 on.
+    ``h`` and ``k`` are Mandel's, None where there are too few laboratories or repeats to tell.
     """
 
     laboratory: str
@@ -120,6 +123,10 @@ class Score:
     En: float | None
     signal: Signal | None
     En_signal: bool
+    h: float | None
+    k: float | None
+    h_departure: Departure | None
+    k_departure: Departure | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,15 +233,21 @@ def _measurand(
         raise _refused(
             name, "the laboratories' results have no spread to score by", "s* = 0", "--sigma VALUE"
         )
+    alike = consistencies([entry.values for entry in taking_part])
     return Measurand(
         name=name, unit=unit, assigned=assigned, u_assigned=u_assigned, assigned_by=by, sigma_pt=sigma_pt,
         sigma_by=sigma_by,
-        scores=tuple(_score(entry, assigned, u_assigned, sigma_pt) for entry in taking_part),
+        scores=tuple(
+            _score(entry, consistency, assigned, u_assigned, sigma_pt)
+            for entry, consistency in zip(taking_part, alike, strict=True)
+        ),
         precision=method_precision(taking_part) if robust is not None else None,
     )  # fmt: skip
 
 
-def _score(entry: Results, assigned: float, u_assigned: float, sigma_pt: float | None) -> Score:
+def _score(
+    entry: Results, consistency: Consistency, assigned: float, u_assigned: float, sigma_pt: float | None
+) -> Score:
     off = entry.mean - assigned
     z_prime = None if sigma_pt is None else off / math.hypot(sigma_pt, u_assigned)
     size = 0.0 if z_prime is None else abs(z_prime)
@@ -245,6 +258,8 @@ def _score(entry: Results, assigned: float, u_assigned: float, sigma_pt: float |
         zeta=zeta, En=En,
         signal="action" if size >= 3 else "warning" if size > 2 else None,
         En_signal=En is not None and abs(En) >= 1,
+        h=consistency.h, k=consistency.k,
+        h_departure=consistency.h_departure, k_departure=consistency.k_departure,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""What a laboratory's home holds beside its registry: tests, audits, diagnoses, each under an id.
+"""What a laboratory's home holds beside its registry: tests, audits, diagnoses, plans, each under an id.
 
 An id is a hash of the place in the home. Who shows what is held, or asks for it, names no path.
 """
@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-Kind = Literal["test", "audit", "diagnosis", "case"]
+Kind = Literal["test", "audit", "diagnosis", "case", "plan"]
 
-ANSWER, CASE = "diagnosis.json", "case.toml"
+ANSWER, CASE, PLAN = "diagnosis.json", "case.toml", "plan.json"
 _ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "node_modules"))
 
-_WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses", "models"))
+_WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses", "models", "plans"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,7 +143,7 @@ def rows_of_tests(
 
 
 def _marks() -> Mapping[Kind, frozenset[str]]:
-    """Return the files by which a folder is told to hold a test, an audit, a diagnosis or a case."""
+    """Return the files by which a folder is told to hold a test, an audit, a diagnosis, a case or a plan."""
     from toolkit.audit.resume import RESULTS
     from toolkit.lab.audit import LINES
     from toolkit.recording.folder import TEST_FILE
@@ -153,6 +153,7 @@ def _marks() -> Mapping[Kind, frozenset[str]]:
         "audit": frozenset((LINES, RESULTS)),
         "diagnosis": frozenset((ANSWER,)),
         "case": frozenset((CASE,)),
+        "plan": frozenset((PLAN,)),
     }
 
 

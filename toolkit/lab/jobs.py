@@ -33,7 +33,7 @@ ID = re.compile(r"\d{8}T\d{6}-[0-9a-f]{8}")
 _LOG_SHOWN = 20_000  # bytes of a log's end
 _PROBES, _PAUSE = 5, 0.05  # somebody else who only looks holds the lock for microseconds
 
-Kind = Literal["audit", "repair", "preview", "report", "diagnosis"]
+Kind = Literal["audit", "repair", "preview", "report", "diagnosis", "plan"]
 State = Literal["running", "interrupted", "cancelled", "clean", "findings", "refused", "failed"]
 
 

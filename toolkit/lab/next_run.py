@@ -109,7 +109,7 @@ def plan_next(
         figures = plots(problem, members, chosen)
         files = _files(problem, members, chosen, plan, figures)
         sheet = next_sheet(plan, figures, date.today())  # noqa: DTZ011
-        payload |= write_plan(files, out, sheet, template) | {"files": list(files)}
+        payload |= write_plan(files, out, sheet, template, payload) | {"files": list(files)}
     return payload, plan_text(plan, payload["files"]) + sheet_text(payload)
 
 

@@ -43,7 +43,7 @@ def interval_plan_answer(
     from toolkit.calibration.control.recall import due_of
     from toolkit.declared import answer
     from toolkit.lab.plan_sheets import interval_sheet, sheet_text, write_plan
-    from toolkit.planning.interval import paths_of, plan_interval
+    from toolkit.planning.interval import ASSUMPTIONS, paths_of, plan_interval
 
     if not LEAST <= reliability < 1:
         raise _wrong("--reliability", reliability, f"a share from {LEAST:g} to below 1, such as 0.95")
@@ -60,11 +60,12 @@ def interval_plan_answer(
     payload = answer(plan) | {
         "instrument": instrument, "record": due.record, "in_use": due.recall,
         "next": (due.session_date + dt.timedelta(days=plan.days)).isoformat(),
-        "method_2_days": due.recommendation.days, "findings": [finding.as_dict() for finding in findings],
+        "method_2_days": due.recommendation.days, "assumptions": ASSUMPTIONS,
+        "findings": [finding.as_dict() for finding in findings],
     }  # fmt: skip
     if out is not None:
         sheet = interval_sheet(plan, instrument, due.record, findings, registry.today())
-        payload |= write_plan({}, out, sheet, template)
+        payload |= write_plan({}, out, sheet, template, payload)
     return payload, _text(plan, payload, findings) + sheet_text(payload), findings
 
 

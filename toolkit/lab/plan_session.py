@@ -21,11 +21,20 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
     from toolkit.findings import Finding
-    from toolkit.planning.row_exchange import Criterion
+    from toolkit.planning.criteria import Criterion
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template
 
-FILES = ("SESSION.toml", "loads.csv", "check.csv", "sheet.csv", "plan.txt", "plan.docx", "plan.pdf")
+FILES = (
+    "SESSION.toml",
+    "loads.csv",
+    "check.csv",
+    "sheet.csv",
+    "plan.txt",
+    "plan.json",
+    "plan.docx",
+    "plan.pdf",
+)
 _DEMAND = re.compile(r"\s*(\w+)\s*=\s*([-+0-9.eE]+)\s*(\S.*)?")
 
 
@@ -78,7 +87,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
     if order.out is not None:
         files = _files(plan, record, text, people)
         sheet = session_sheet(plan, record, order.known_at or registry.today())
-        payload |= write_plan(files, order.out, sheet, order.template)
+        payload |= write_plan(files, order.out, sheet, order.template, payload)
         payload["files"] = [str(order.out / name) for name in files]
         people += "\n\n" + "\n".join(f"written: {one_line(path)}" for path in payload["files"])
         people += sheet_text(payload)

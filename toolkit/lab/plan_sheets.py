@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -23,20 +24,32 @@ if TYPE_CHECKING:
 
 DOCUMENT = "plan"
 """The name of the sheet's two files."""
+_WHERE = ("out", "files")  # of an answer: what was written, not what was planned
 
 
 def write_plan(
-    files: Mapping[str, str | bytes], out: Path, sheet: PlanSheet, template: Template | None
+    files: Mapping[str, str | bytes],
+    out: Path,
+    sheet: PlanSheet,
+    template: Template | None,
+    answer: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Write a plan's files and, by a template, its sheet, all or none; return what the answer says of it."""
+    """Write a plan's files, its answer and, by a template, its sheet, all or none.
+
+    Returns what the answer says of the sheet. ``answer`` is written as ``plan.json``, with the kind of plan.
+    """
+    from toolkit.declared import json_value
     from toolkit.lab.answers import delivered_keys
+    from toolkit.lab.holdings import PLAN
     from toolkit.publication import publication
     from toolkit.report.deliver import deliver
     from toolkit.report.plan.content import build_plan_content
     from toolkit.report.style import read_style, style_file
 
+    stated = {key: json_value(value) for key, value in answer.items() if key not in _WHERE}
+    kept = json.dumps(stated | {"kind": sheet.kind}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
     with publication(out) as stage:
-        for name, data in files.items():
+        for name, data in {**files, PLAN: kept}.items():
             (stage / name).write_bytes(data if isinstance(data, bytes) else data.encode())
         if template is None:
             return {}

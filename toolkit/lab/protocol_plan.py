@@ -88,7 +88,7 @@ def plan_test(
     if out is not None:
         payload["files"] = {"protocol": PROTOCOL, "simulation": SIMULATION}
         sheet = protocol_sheet(plan, date.today())  # noqa: DTZ011
-        payload |= write_plan(_files(plan, own, tire, out), out, sheet, template)
+        payload |= write_plan(_files(plan, own, tire, out), out, sheet, template, payload)
     return payload, plan_text(plan, payload["files"]) + sheet_text(payload)
 
 

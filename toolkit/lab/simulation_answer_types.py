@@ -316,6 +316,7 @@ class _IntervalKeys(_Sheet):
     in_use: Annotated[str | None, "interval, as its approval states it"]
     next: Annotated[str, "day of the next session"]
     method_2_days: Annotated[int | None, "what drift alone recommends"]
+    assumptions: Annotated[list[str], "what it rests on"]
     findings: list[FindingEntry]
 
 

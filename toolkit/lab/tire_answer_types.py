@@ -303,6 +303,7 @@ class _LaboratoryKeys(TypedDict):
     mode: Annotated[str, "always laboratories"]
     source: str
     figures: Annotated[Mapping[str, Path], "pictures that were written, by name"]
+    document: Annotated[Mapping[str, Any] | None, "Word document and PDF, where they were asked for"]
     timing: Timing
 
 

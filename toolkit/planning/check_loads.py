@@ -12,6 +12,7 @@ import numpy as np
 
 from toolkit.calibration.registry.gates import VERIFIED
 from toolkit.calibration.terms import INTERCEPT
+from toolkit.planning.exchange import Points, grown, shrunk
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,15 +42,15 @@ def choose_check_loads(
     Each step adds the load that verifies most, then those without which as much is verified are taken out.
     Loads to ``avoid`` are those of the fit; they are taken where nothing else verifies a term.
     """
-    every = list(range(len(loads)))
-    chosen: list[int] = []
+
+    def lacking(chosen: Points) -> float:
+        return -_value(knowledge, loads, list(chosen))
+
+    every = range(len(loads))
+    chosen: Points = ()
     for pool in ([at for at in every if at not in avoid], every):
-        chosen = _grown(knowledge, loads, pool, chosen)
-    for at in list(chosen):
-        fewer = [other for other in chosen if other != at]
-        if _value(knowledge, loads, fewer) >= _value(knowledge, loads, chosen) - 1e-12:
-            chosen = fewer
-    order = np.array(chosen, dtype=np.intp)
+        chosen = grown(chosen, pool, lacking)
+    order = np.array(shrunk(chosen, lacking), dtype=np.intp)
     return order, verification(knowledge, loads[order])
 
 
@@ -73,16 +74,6 @@ def verification(knowledge: Knowledge, check: NDArray[np.float64]) -> tuple[Veri
             for term, size in zip(fit.terms, moved, strict=True)
         ]  # fmt: skip
     return tuple(results)
-
-
-def _grown(knowledge: Knowledge, loads: NDArray[np.float64], pool: list[int], chosen: list[int]) -> list[int]:
-    value = _value(knowledge, loads, chosen)
-    while True:
-        gains = [(_value(knowledge, loads, [*chosen, at]), -at) for at in pool if at not in chosen]
-        best, at = max(gains, default=(value, 0))
-        if best <= value + 1e-9:
-            return chosen
-        chosen, value = [*chosen, -at], best
 
 
 def _value(knowledge: Knowledge, loads: NDArray[np.float64], chosen: list[int]) -> float:

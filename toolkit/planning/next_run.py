@@ -1,6 +1,6 @@
 """The run that parts members of a class: a search over what can be changed of the runs that were made.
 
-A run is a recording of the case with factors changed one by one (coordinate exchange): how fast its inputs
+A run is a recording of the case with factors changed one by one (`exchange`): how fast its inputs
 go, how far, which of them alone moves, a condition such as the way the drum turns or how the tire stands on
 its hub. Inputs stay within what was recorded, or within limits that are given. A channel that is another
 one's rate of change stays that.
@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.policy import VERDICT
+from toolkit.planning.exchange import Alternatives, exchanged
 from toolkit.planning.members import Member, Predicted, expected_log_evidence, predict
 
 if TYPE_CHECKING:
@@ -101,21 +102,18 @@ class RunSearch:
 
     def best(self) -> Change:
         """Return the change of a recording that parts the members furthest."""
-        starts = [Change(run=run.name) for run in self.problem.runs]
-        best = self._first(starts)
-        for _ in range(_ROUNDS):
-            before = best
-            for alternatives in self._factors(best):
-                best = self._first((best, *alternatives))
-            if best == before:
-                break
-        return best
+        start = Change(run=self.problem.runs[0].name)
+        factors = range(len(self._factors(start)))
+        return exchanged(start, self._alternatives, lambda: factors, sweeps=_ROUNDS)
 
-    def _first(self, changes: Sequence[Change]) -> Change:
-        runs = [self._run(change) for change in changes if change not in self.judged]
+    def _alternatives(self, change: Change, factor: int) -> Alternatives[Change]:
+        changes = (change, *self._factors(change)[factor])
+        # Each once: a run that is learned twice is known by two numbers.
+        runs = [self._run(new) for new in dict.fromkeys(changes) if new not in self.judged]
         if self.until() or not self.judged:
             self.learn([run for run in runs if run is not None])
-        return max(changes, key=self.value)
+        losses = np.array([-self.value(alternative) for alternative in changes])
+        return Alternatives(losses=losses, present=0, design=lambda place: changes[place])
 
     def _run(self, change: Change) -> Run | None:
         if change not in self.runs:
@@ -152,23 +150,28 @@ class RunSearch:
             if a is not b
         )
 
-    def _factors(self, change: Change) -> Iterator[tuple[Change, ...]]:
+    def _factors(self, change: Change) -> list[tuple[Change, ...]]:
+        """Return what each factor of a change may be instead: the recording first."""
         names = [name for name, source in movable(self.problem) if source is None]
-        # Faster, and where a rate of change is limited, as much less far.
-        yield tuple(dataclasses.replace(change, rate=rate) for rate in _RATES)
-        yield tuple(
-            dataclasses.replace(change, rate=rate, sizes=tuple((name, 1 / rate) for name in names))
-            for rate in _RATES
-        )
+        factors = [
+            tuple(dataclasses.replace(change, run=run.name) for run in self.problem.runs),
+            # Faster, and where a rate of change is limited, as much less far.
+            tuple(dataclasses.replace(change, rate=rate) for rate in _RATES),
+            tuple(
+                dataclasses.replace(change, rate=rate, sizes=tuple((name, 1 / rate) for name in names))
+                for rate in _RATES
+            ),
+        ]
         for name in names:
             others = tuple(entry for entry in change.sizes if entry[0] != name)
-            yield tuple(dataclasses.replace(change, sizes=(*others, (name, size))) for size in _SIZES)
+            factors.append(
+                tuple(dataclasses.replace(change, sizes=(*others, (name, size))) for size in _SIZES)
+            )
         for key, values in conditions(self.problem).items():
             rest = tuple(entry for entry in change.conditions if entry[0] != key)
-            yield (
-                dataclasses.replace(change, conditions=rest),
-                *(dataclasses.replace(change, conditions=(*rest, (key, value))) for value in values),
-            )
+            turned = (dataclasses.replace(change, conditions=(*rest, (key, value))) for value in values)
+            factors.append((dataclasses.replace(change, conditions=rest), *turned))
+        return factors
 
     def judge(self, change: Change) -> NextRun | None:
         """Return a changed run with what it parts; None where it cannot be simulated."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
@@ -16,7 +16,7 @@ from toolkit.characteristics.catalogue import by_name
 from toolkit.errors import ConfigError
 from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, Pace, steps_of
-from toolkit.planning.exchange import Exchange, Points
+from toolkit.planning.exchange import Points, PointSearch
 from toolkit.planning.reach import Reach, is_of, worst
 from toolkit.planning.screen import screen_of
 from toolkit.tires.fit import MIN_POINTS
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # A curve that a report prints is measured to its peak, or to the end of the range: within this part of it.
 _PEAK_SHARE = 0.99
 _MOST = 30  # slip angles in each direction
+_STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
 _ALIKE = 1.05
 
@@ -136,7 +137,7 @@ class ProtocolSearch:
         full = self.design(tuple(range(len(self.candidates))))
         self.full = self.found(full)
         self._screen = screen_of(question.earlier, full, self.full.reaches)
-        self._exchange = Exchange(self._criterion, len(self.candidates))
+        self._points = PointSearch(self._criterion, len(self.candidates))
         self._best: dict[int, Points] = {}
 
     def design(self, points: Points) -> Design:
@@ -154,8 +155,14 @@ class ProtocolSearch:
             self._tell(f"{size} slip angles")
             larger = min((n for n in self._best if n > size), default=None)
             start = self._best[larger] if larger else tuple(range(len(self.candidates)))
-            self._best[size] = self._exchange.improved(self._exchange.resized(start, size))
+            self._best[size] = self._points.best((self._points.resized(start, size), *self._drawn(size)))
         return self.found(self.design(self._best[size]))
+
+    def _drawn(self, size: int) -> Iterator[Points]:
+        """Yield designs of a size drawn at random, the same for the same size."""
+        rng = np.random.default_rng([_SEED, size])
+        for _ in range(_STARTS):
+            yield tuple(rng.integers(len(self.candidates), size=size).tolist())
 
     def least(self, most: int) -> Found | None:
         """Return the best design of the fewest slip angles, at most so many, that meets every demand."""
@@ -172,10 +179,12 @@ class ProtocolSearch:
         of_each = self.pace.minutes(self.design((0,)))
         return int(min(minutes / of_each + 1e-9, _MOST))
 
-    def _criterion(self, points: Points) -> float:
-        if not self.question.covers(points):
-            return math.inf
-        return self._screen.criterion(points)
+    def _criterion(self, designs: Sequence[Points]) -> NDArray[np.float64]:
+        losses = np.full(len(designs), math.inf)
+        serves = np.array([self.question.covers(points) for points in designs])
+        if serves.any():
+            losses[serves] = self._screen.criterion(np.array(designs)[serves])
+        return losses
 
 
 def least_plan(

@@ -8,27 +8,25 @@ with coefficients b common to the session and r drawn anew by every run. A coeff
 zero is known beforehand to that precision (0 a priori, as a run's zero or a possible misfit); what is sought
 are the first ``wanted`` of b. Their covariance is a block of the inverse of the information: linear Bayes, as
 DuMouchel and Jones (Technometrics 36 (1994) 37) have it for terms that may be missing, and generalised least
-squares for random run effects (Goos and Vandebroek, Technometrics 43 (2001) 436). Rows are exchanged by
-themselves (Fedorov 1972) until no exchange is better, from several starts; they are a list of loads that
-fixtures can make, not factors that can be set freely.
+squares for random run effects (Goos and Vandebroek, Technometrics 43 (2001) 436). Rows are the parts of such
+a design (`exchange`); they are a list of loads that fixtures can make, not factors that can be set freely.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from toolkit.planning.criteria import Criterion, criterion, together, with_each_row
+from toolkit.planning.exchange import Alternatives, best_of, exchanged
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-Criterion = Literal["D", "I", "G"]
-CRITERIA: tuple[Criterion, ...] = ("D", "I", "G")
 _RIDGE = 1e-9  # a first draw may not determine what an exchange will
-_SWEEPS = 30
-_BETTER = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,15 +94,6 @@ class Price:
         return float(self.minutes[chosen].sum()) + mounted
 
 
-def response_loss(covariance: NDArray[np.float64], targets: NDArray[np.float64], by: Criterion) -> float:
-    """Return what a criterion asks to be small, of the covariance (wanted, wanted) of one response."""
-    if by == "D":
-        sign, size = np.linalg.slogdet(covariance)
-        return float(size) if sign > 0 else float("inf")
-    variances = np.einsum("ij,jk,ik->i", targets, covariance, targets)
-    return float(variances.mean() if by == "I" else variances.max())
-
-
 def loss(
     responses: Sequence[Response],
     chosen: NDArray[np.intp],
@@ -125,8 +114,8 @@ def loss(
         if np.linalg.matrix_rank(information, hermitian=True) < len(information):
             return float("inf")
         covariance = np.asarray(np.linalg.inv(information)[: response.wanted, : response.wanted], np.float64)
-        values.append(response_loss(covariance, response.targets, by))
-    return max(values) if by == "G" else sum(values)
+        values.append(np.array(criterion(covariance, response.targets, by)))
+    return float(together(values, by))
 
 
 def exchange(
@@ -143,76 +132,59 @@ def exchange(
 
     With a ``price`` the criterion pays for what the rows take; ``once``: no run has a candidate twice.
     """
-    count = len(responses[0].common)
-    designs = []
-    for _ in range(starts):
+    rows = _Rows(responses=responses, run=run, by=by, price=price, once=once)
+    return best_of(
+        (rows.drawn(rng) for _ in range(starts)),
+        lambda start: exchanged(start, rows.alternatives, lambda: rng.permutation(len(run)).tolist()),
+        rows.loss,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Rows:
+    """The rows of a session as parts of a design: each may be any candidate, in its own run."""
+
+    responses: Sequence[Response]
+    run: NDArray[np.intp]
+    by: Criterion
+    price: Price | None
+    once: bool
+
+    def drawn(self, rng: np.random.Generator) -> NDArray[np.intp]:
+        """Return a design (rows,) drawn at random."""
+        count = len(self.responses[0].common)
         first = np.concatenate(
-            [rng.choice(count, size=size, replace=not once) for size in np.bincount(run).tolist()]
+            [rng.choice(count, size=size, replace=not self.once) for size in np.bincount(self.run).tolist()]
         )
-        chosen = _descend(
-            responses, first[np.argsort(np.argsort(run, kind="stable"))], run, by, rng, price, once
-        )
-        value = loss(responses, chosen, run, by, _RIDGE)
-        value += 0.0 if price is None else price.weight * price.total(chosen, run)
-        designs.append((value, chosen))
-    return min(designs, key=lambda design: design[0])[1]
+        return np.asarray(first[np.argsort(np.argsort(self.run, kind="stable"))])
 
+    def loss(self, chosen: NDArray[np.intp]) -> float:
+        value = loss(self.responses, chosen, self.run, self.by, _RIDGE)
+        return value + (0.0 if self.price is None else self.price.weight * self.price.total(chosen, self.run))
 
-def _descend(
-    responses: Sequence[Response],
-    chosen: NDArray[np.intp],
-    run: NDArray[np.intp],
-    by: Criterion,
-    rng: np.random.Generator,
-    price: Price | None,
-    once: bool,
-) -> NDArray[np.intp]:
-    """Exchange row after row for the best candidate until a sweep changes none."""
-    chosen = chosen.copy()
-    for _ in range(_SWEEPS):
-        changed = False
-        for at in rng.permutation(len(chosen)).tolist():
-            rest, run_of_rest = np.delete(chosen, at), np.delete(run, at)
-            losses = _losses(responses, rest, run_of_rest, int(run[at]), run, by)
-            beside = rest[run_of_rest == run[at]]
-            if price is not None:
-                losses = losses + price.added(beside)
-            if once:
-                losses[beside] = np.inf
-            best = int(np.argmin(losses))
-            if losses[best] < losses[chosen[at]] - _BETTER * max(abs(losses[best]), 1.0):
-                chosen[at], changed = best, True
-        if not changed:
-            break
-    return chosen
+    def alternatives(self, chosen: NDArray[np.intp], at: int) -> Alternatives[NDArray[np.intp]]:
+        rest, run_of_rest = np.delete(chosen, at), np.delete(self.run, at)
+        losses = self._losses(rest, run_of_rest, int(self.run[at]))
+        beside = rest[run_of_rest == self.run[at]]
+        if self.price is not None:
+            losses = losses + self.price.added(beside)
+        if self.once:
+            losses[beside] = np.inf
 
+        def exchanged_for(candidate: int) -> NDArray[np.intp]:
+            design = chosen.copy()
+            design[at] = candidate
+            return design
 
-def _losses(
-    responses: Sequence[Response],
-    rest: NDArray[np.intp],
-    run_of_rest: NDArray[np.intp],
-    run: int,
-    all_runs: NDArray[np.intp],
-    by: Criterion,
-) -> NDArray[np.float64]:
-    """Return the criterion (candidates,) of the rest of a design with each candidate added to a run."""
-    runs = int(all_runs.max()) + 1
-    values = []
-    for response in responses:
-        information = response.information(rest, run_of_rest, runs)
-        covariance = np.linalg.inv(information + _RIDGE * np.eye(len(information)))
-        rows = response.row(np.arange(len(response.common)), run, runs)
-        # (M + z z')^-1 = C - (C z)(C z)' / (1 + z' C z)
-        moved = rows @ covariance
-        scale = 1.0 + np.einsum("ij,ij->i", moved, rows)
-        p = response.wanted
-        inner, gained = covariance[:p, :p], moved[:, :p]
-        if by == "D":
-            share = np.einsum("ij,ij->i", gained, np.linalg.solve(inner, gained.T).T) / scale
-            value = np.linalg.slogdet(inner)[1] + np.log(np.maximum(1.0 - share, 1e-300))
-        else:
-            before = np.einsum("ij,jk,ik->i", response.targets, inner, response.targets)
-            after = before - (gained @ response.targets.T) ** 2 / scale[:, None]
-            value = after.mean(axis=1) if by == "I" else after.max(axis=1)
-        values.append(value)
-    return np.asarray(np.max(values, axis=0) if by == "G" else np.sum(values, axis=0))
+        return Alternatives(losses=losses, present=int(chosen[at]), design=exchanged_for)
+
+    def _losses(self, rest: NDArray[np.intp], run_of_rest: NDArray[np.intp], run: int) -> NDArray[np.float64]:
+        """Return the criterion (candidates,) of the rest of a design with each candidate added to a run."""
+        runs = int(self.run.max()) + 1
+        values = []
+        for response in self.responses:
+            information = response.information(rest, run_of_rest, runs)
+            covariance = np.asarray(np.linalg.inv(information + _RIDGE * np.eye(len(information))))
+            rows = response.row(np.arange(len(response.common)), run, runs)
+            values.append(with_each_row(covariance, rows, response.targets, self.by))
+        return together(values, self.by)

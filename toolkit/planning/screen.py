@@ -54,14 +54,16 @@ class Screen:
     fixed: Array
     limits: Array
 
-    def criterion(self, points: Sequence[int]) -> float:
-        """Return the largest U over its limit, where many are alike a little more."""
-        chosen = list(points)
-        pseudo = np.linalg.pinv(self.tangents[:, chosen], rcond=_NO_DATA)
-        weights = np.einsum("rcp,cpn->rcn", self.gradients, pseudo)
-        own = np.einsum("rcn,cn->r", weights**2, self.variances[:, chosen])
+    def criterion(self, designs: NDArray[np.intp]) -> Array:
+        """Return the largest U over its limit (designs,), where many are alike a little more.
+
+        ``designs`` (designs, points) are candidates by their numbers.
+        """
+        pseudo = np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA)  # (curves, designs, p, points)
+        weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
+        own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
         ratios = _COVERAGE * np.sqrt(self.fixed + own) / self.limits
-        return float(np.sum(ratios**_POWER) ** (1 / _POWER))
+        return np.asarray(np.sum(ratios**_POWER, axis=1) ** (1 / _POWER))
 
 
 def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> Screen:

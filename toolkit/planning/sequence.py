@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.planning.exchange import Alternatives, best_of, exchanged
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.planning.fixtures import FeasibleLoads
 
-_SWAPS, _STARTS = 60, 5
+_STARTS = 16
 
 
 def visits(
@@ -63,24 +65,26 @@ def _best_order(
     relative: NDArray[np.float64],
     rng: np.random.Generator,
 ) -> NDArray[np.intp]:
-    """Return a run's rows by swaps of its visits, the best of a few starts."""
-    ends = []
-    for _ in range(_STARTS if len(groups) > 1 else 1):
-        order = rng.permutation(len(groups))
-        lowest = float(_squares(_sequence(groups, order), weights, relative).sum())
-        for _ in range(_SWAPS if len(groups) > 1 else 0):
-            i, j = rng.choice(len(groups), size=2, replace=False)
-            order[[i, j]] = order[[j, i]]
-            size = float(_squares(_sequence(groups, order), weights, relative).sum())
-            if size < lowest:
-                lowest = size
-            else:
-                order[[i, j]] = order[[j, i]]
-        ends.append((lowest, _sequence(groups, order)))
-    return min(ends, key=lambda end: end[0])[1]
+    """Return a run's rows by exchange of its visits' places, the best of a few starts."""
+    places = range(len(groups))
+
+    def answers(order: tuple[int, ...]) -> float:
+        return float(_squares(_sequence(groups, order), weights, relative).sum())
+
+    def alternatives(order: tuple[int, ...], place: int) -> Alternatives[tuple[int, ...]]:
+        def swapped(other: int) -> tuple[int, ...]:
+            swap = {place: order[other], other: order[place]}
+            return tuple(swap.get(at, visit) for at, visit in enumerate(order))
+
+        losses = np.array([answers(swapped(other)) for other in places])
+        return Alternatives(losses=losses, present=place, design=swapped)
+
+    starts = (tuple(rng.permutation(len(groups)).tolist()) for _ in range(_STARTS if len(groups) > 2 else 1))
+    best = best_of(starts, lambda start: exchanged(start, alternatives, lambda: places), answers)
+    return _sequence(groups, best)
 
 
-def _sequence(groups: list[NDArray[np.intp]], order: NDArray[np.intp]) -> NDArray[np.intp]:
+def _sequence(groups: list[NDArray[np.intp]], order: tuple[int, ...]) -> NDArray[np.intp]:
     return np.concatenate([groups[at] for at in order])
 
 

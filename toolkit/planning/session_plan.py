@@ -10,7 +10,8 @@ import numpy as np
 
 from toolkit.findings import Finding
 from toolkit.planning.check_loads import Verification, choose_check_loads
-from toolkit.planning.row_exchange import Criterion, loss
+from toolkit.planning.criteria import Criterion
+from toolkit.planning.row_exchange import loss
 from toolkit.planning.sequence import in_order, visits
 from toolkit.planning.session_search import Demand, Design, SessionSearch
 

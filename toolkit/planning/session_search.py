@@ -12,7 +12,8 @@ import numpy as np
 from toolkit.calibration.fit.findings import FEW_POINTS
 from toolkit.errors import ConfigError
 from toolkit.planning.check_loads import choose_check_loads
-from toolkit.planning.row_exchange import Criterion, Price, exchange, loss
+from toolkit.planning.criteria import Criterion
+from toolkit.planning.row_exchange import Price, exchange, loss
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -65,7 +65,7 @@ class Table:
 class Curve:
     """One line or point set: ``x``, ``y`` and optional standard error bars, in the axes' units.
 
-    ``note`` stands at the end of a line, ``notes`` on each of its bars.
+    ``note`` stands at the end of a line, ``notes`` on each of its bars; bars are ``width`` wide.
     """
 
     label: str
@@ -77,13 +77,14 @@ class Curve:
     open: bool = False
     note: str | None = None
     notes: tuple[str, ...] = ()
+    width: float = 0.38
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plot:
     """A figure before it is drawn: its curves, labels with units, caption and alternative text.
 
-    ``names`` stand at x = 0, 1, 2 ... in place of numbers.
+    ``names`` stand at x = 0, 1, 2 ... in place of numbers. ``zero_y``: y begins at zero or beyond it.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Plot:
     alt: str
     watermark: str | None = None
     zero_x: bool = False
+    zero_y: bool = True
     legend_title: str | None = None
     decimal_comma: bool = False
     names: tuple[str, ...] = ()

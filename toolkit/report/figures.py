@@ -122,7 +122,8 @@ def _furnish(axes: Axes, plot: Plot) -> None:
     axes.set_ylabel(plot.y_label)
     axes.grid(visible=True, color="#d9d9d9", linewidth=0.6)
     axes.set_axisbelow(True)
-    axes.axhline(0.0, color="#606060", linewidth=0.8, zorder=1)
+    if plot.zero_y:
+        axes.axhline(0.0, color="#606060", linewidth=0.8, zorder=1)
     if plot.zero_x:
         axes.axvline(0.0, color="#606060", linewidth=0.8, zorder=1)
     for side in ("top", "right"):
@@ -174,7 +175,7 @@ def _curve(axes: Axes, curve: Curve) -> None:
             )
         return
     if curve.style == "bars":
-        axes.bar(curve.x, curve.y, 0.38, color=colour, zorder=3)
+        axes.bar(curve.x, curve.y, curve.width, color=colour, zorder=3)
         for x, y, note in zip(curve.x, curve.y, curve.notes, strict=False):
             axes.annotate(note, (x, y), ha="center", va="bottom", fontsize=7.5, zorder=6)
         return

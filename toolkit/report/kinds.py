@@ -27,6 +27,7 @@ TITLES = {
     "diagnosis": "A diagnosis",
     "audit": "An audit's summary",
     "plan": "The sheet of a plan",
+    "laboratories": "An interlaboratory comparison",
 }
 
 
@@ -119,6 +120,7 @@ _DOCUMENTS = {
     "diagnosis": "diagnosis.answer.DIAGNOSIS",
     "audit": "audit.content.AUDIT",
     "plan": "plan.content.PLAN",
+    "laboratories": "laboratories.content.LABORATORIES",
 }
 
 

@@ -109,6 +109,9 @@ def _result(bench: Bench, seen: SeenJob) -> str | None:
     if seen.job.kind == "diagnosis" and "--out" in words[:-1]:
         found = holding_id(os.path.normpath(words[words.index("--out") + 1]))
         return f"/diagnosis/{found}" if bench.path_of("diagnosis", found) is not None else None
+    if seen.job.kind == "plan" and "--out" in words[:-1]:
+        found = holding_id(os.path.normpath(words[words.index("--out") + 1]))
+        return f"/plan/{found}" if bench.path_of("plan", found) is not None else None
     return None
 
 

@@ -14,10 +14,11 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 from starlette.responses import HTMLResponse
 
-from toolkit.estimate import plus_minus
+from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import one_line
 from toolkit.lab.holdings import holding_id
 from toolkit.report.pages.kit import data, drawn, environment
+from toolkit.words.phrasebook import phrasebook
 from toolkit.workbench.words import decimal_sign, preferred, translations
 
 if TYPE_CHECKING:
@@ -42,8 +43,9 @@ def templates(language: str) -> Environment:
     drawn.add_extension("jinja2.ext.i18n")
     drawn.install_gettext_translations(translations(language), newstyle=False)  # type: ignore[attr-defined]
     drawn.globals |= {"language": language, "point": decimal_sign(language)}
-    drawn.globals |= {"number": _number, "measured": _measured}
+    drawn.globals |= {"number": _number, "measured": _measured, "expanded": _expanded}
     drawn.filters |= {"chart": _chart, "one_line": one_line, "holding_id": holding_id}
+    drawn.filters["said"] = phrasebook(language).say
     return drawn
 
 
@@ -101,6 +103,12 @@ def _measured(context: Context, value: float, U: float | None) -> tuple[str, str
     parts = plus_minus(value, math.nan if U is None else U).split(" ± ")
     U_text = data(json.dumps(U), _printed(context, parts[1])) if len(parts) > 1 else "–"
     return data(json.dumps(value), _printed(context, parts[0])), U_text
+
+
+@pass_context
+def _expanded(context: Context, U: float | None) -> str:
+    """Return an expanded uncertainty in two digits."""
+    return "–" if U is None else data(json.dumps(U), _printed(context, round_uncertainty(U)))
 
 
 def _printed(context: Context, digits: str) -> str:

@@ -68,7 +68,7 @@ REPORT: Document[ReportedTest] = Document(
     name="report",
     package=__package__,
     required=("tk:calibration.hash",),
-    foreign=("certificate", "audit", "plan", "comparison", "diagnosis"),
+    foreign=("certificate", "audit", "plan", "comparison", "diagnosis", "laboratories"),
 )
 
 # A report may tell a diagnosis by the tags of its own document, from the answer alone.

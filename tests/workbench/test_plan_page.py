@@ -1,0 +1,155 @@
+"""Plans by their pages: each kind is made from its form, and shows the numbers of its command."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.planning.class_factory import answer, found, write_case
+from tests.workbench.conftest import Served, filled, plain, serving
+from tests.workbench.test_app_numbers import numbers
+from tests.workbench.test_home_page import command
+from tests.workbench.test_jobs_page import done
+from toolkit.diagnosis.answer.serial import as_json
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.errors import ConfigError, UnreadableError
+from toolkit.lab.holdings import holding_id
+from toolkit.lab.kept_plans import plan_words, read_plan
+
+ANSWER = holding_id("diagnoses/late")
+FORMS: dict[str, dict[str, str]] = {
+    "session": {"subject": "cell", "u": "", "minutes": "", "loads": "33", "criterion": "I"},
+    "test": {"subject": "", "u": "conicity, slope_cornering=3 %", "load": "833 lbf, 4 kN", "minutes": ""},
+    "next": {"subject": ANSWER, "budget": "20", "limit": ""},
+    "interval": {"subject": "cell", "reliability": "0.9", "tests": "100"},
+}
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "session": ("cell", "--loads", "33", "--criterion", "I"),
+    "test": ("--u", "conicity", "--u", "slope_cornering=3 %", "--load", "833 lbf", "--load", "4 kN"),
+    "interval": ("cell", "--reliability", "0.9", "--tests", "100"),
+}
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Served, dict[str, str]]]:
+    """A server of a home, in which each kind of plan was made from its form; ids by kind."""
+    home = filled(tmp_path_factory.mktemp("planned") / "lab")
+    case = write_case(home / "cases" / "late")
+    folder = home / "diagnoses" / "late"
+    folder.mkdir(parents=True)
+    leaves = answer(read_case(case).sha256, found("channel_delay", "filter_lag"))
+    (folder / "diagnosis.json").write_text(json.dumps({"schema": 1, **as_json(leaves)}), encoding="utf-8")
+    (folder / "model.toml").write_text('[answer]\ncase = "../../cases/late/CASE.toml"\n', encoding="utf-8")
+    ids = {}
+    with serving(home) as bench:
+        for kind, form in FORMS.items():
+            page = done(bench, bench.send(f"/plans/{kind}", form))
+            link = re.search(r"/plan/([0-9a-f]{16})", page.body)
+            assert link is not None, plain(page.body)
+            ids[kind] = link[1]
+        yield bench, ids
+
+
+def kept(bench: Served, plan_id: str) -> dict[str, Any]:
+    answer = bench.page(f"/plan/{plan_id}/file/plan.json")
+    assert answer.status == 200
+    return dict(json.loads(answer.body))
+
+
+@pytest.mark.parametrize("kind", [*FORMS])
+def test_every_number_of_a_plan_is_one_of_its_answer(
+    planned: tuple[Served, dict[str, str]], kind: str
+) -> None:
+    bench, ids = planned
+    page = bench.page(f"/plan/{ids[kind]}")
+    assert page.status == 200
+    known = set(numbers(kept(bench, ids[kind])))
+    shown = [float(html.unescape(value)) for value in re.findall(r'<data value="([^"]*)"', page.body)]
+    assert len(shown) > 8
+    assert [value for value in shown if value not in known] == []
+    for text in kept(bench, ids[kind])["assumptions"]:
+        assert " ".join(text.split()) in " ".join(html.unescape(plain(page.body)).split())
+
+
+@pytest.mark.parametrize("kind", [*COMMANDS])
+def test_a_kept_plan_is_what_the_command_answers(
+    planned: tuple[Served, dict[str, str]], kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench, ids = planned
+    said = command(capsys, "plan", kind, *COMMANDS[kind], "--home", bench.home)
+    for key in ("timing", "out", "files"):
+        said.pop(key, None)
+    assert kept(bench, ids[kind]) == {**said, "kind": kind}
+
+
+def test_every_kind_is_listed_with_its_files(planned: tuple[Served, dict[str, str]]) -> None:
+    bench, ids = planned
+    listed = bench.page("/plans/list").body
+    assert {*re.findall(r'data-plan="([0-9a-f]{16})"', listed)} == {*ids.values()}
+    for kind, name in (("session", "SESSION.toml"), ("test", "protocol.toml"), ("next", "next.csv")):
+        page = bench.page(f"/plan/{ids[kind]}")
+        assert f"/file/{name}" in page.body
+        file = bench.page(f"/plan/{ids[kind]}/file/{name}")
+        assert file.status == 200
+        assert file.headers["content-disposition"] == f'attachment; filename="{name}"'
+        assert file.body == (bench.home / place_of(bench, ids[kind]) / name).read_text()
+    assert "/file/next_F.png" in bench.page(f"/plan/{ids['next']}").body
+
+
+def place_of(bench: Served, plan_id: str) -> str:
+    number = next(n for n in range(1, 9) if holding_id(f"plans/plan-{n}") == plan_id)
+    return f"plans/plan-{number}"
+
+
+def test_a_page_speaks_german_and_so_do_what_it_assumes(planned: tuple[Served, dict[str, str]]) -> None:
+    bench, ids = planned
+    page = plain(bench.page(f"/plan/{ids['interval']}", Accept_Language="de").body)
+    assert "Wann wieder kalibriert wird" in page
+    assert "nichts bricht plötzlich" in page
+
+
+def test_only_what_a_plan_writes_can_be_fetched(planned: tuple[Served, dict[str, str]]) -> None:
+    bench, ids = planned
+    (bench.home / place_of(bench, ids["session"]) / "secret.txt").write_text("x")
+    for path in (
+        f"/plan/{ids['session']}/file/secret.txt", f"/plan/{ids['session']}/file/protocol.toml",
+        f"/plan/{ids['session']}/file/..%2F..%2Fcalibrations", f"/plan/{ids['interval']}/file/next_F.png",
+        "/plan/plan-1", f"/plan/{holding_id('plans')}",
+    ):  # fmt: skip
+        assert bench.page(path).status == 404, path
+
+
+def test_what_is_not_held_cannot_be_planned_for(planned: tuple[Served, dict[str, str]]) -> None:
+    bench, _ = planned
+    for kind, subject in (("session", "nobody"), ("test", "tests/a"), ("next", "x"), ("none", "cell")):
+        assert bench.send(f"/plans/{kind}", {"subject": subject}).status == 404
+    assert bench.send("/plans/interval", {"subject": ""}).status == 400
+
+
+def test_what_somebody_types_is_never_an_option_of_its_own(tmp_path: Path) -> None:
+    form = {"u": "--out=/etc, FY=1 N", "minutes": "--home", "criterion": "D", "seed": "9"}
+    words = plan_words(tmp_path, "session", form, "cell", None)
+    assert words == (
+        "plan", "session", "cell", "--minutes=--home", "--criterion=D", "--u=--out=/etc", "--u=FY=1 N",
+        "--out", "plans/plan-1", "--home", ".",
+    )  # fmt: skip
+    (tmp_path / "plans" / "plan-7").mkdir(parents=True)
+    assert "plans/plan-8" in plan_words(tmp_path, "test", {}, None, "plan.docx")
+    with pytest.raises(ConfigError):
+        plan_words(tmp_path, "interval", {}, None, None)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"kind": "session"}', '{"kind": "party"}', '{"kind": "interval", "days": 3}']
+)
+def test_a_plan_that_cannot_be_read_says_so(tmp_path: Path, text: str) -> None:
+    (tmp_path / "plan.json").write_text(text)
+    with pytest.raises(UnreadableError) as refused:
+        read_plan(tmp_path)
+    assert "plan.json" in str(refused.value)

@@ -1,0 +1,1 @@
+"""An interlaboratory comparison as a document: its vocabulary, texts, tables and figures."""

@@ -1,0 +1,130 @@
+"""What to measure next: the plans that the home keeps, and a form for each kind of plan."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse, Response
+
+from toolkit.inputs import RESULT_FILE, read_regular
+from toolkit.lab.jobs import start_job
+from toolkit.lab.kept_plans import KINDS, plan_words, read_plan
+from toolkit.lab.previews import templates_of
+from toolkit.workbench.page import page
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from starlette.requests import Request
+
+    from toolkit.lab.kept_plans import PlanKind
+    from toolkit.workbench.bench import Bench
+    from toolkit.workbench.page import Routes
+
+_TYPES = {
+    "pdf": "application/pdf", "png": "image/png", "json": "application/json",
+    "csv": "text/csv; charset=utf-8", "txt": "text/plain; charset=utf-8",
+    "toml": "text/plain; charset=utf-8",
+    "docx": "application/vnd.openxmlformats-officedocument.wordprocessingml.document",
+}  # fmt: skip
+
+
+def plans(request: Request) -> Response:
+    """Return the list's page: nothing is looked through before it stands."""
+    return page(request, "plans")
+
+
+def plan_list(request: Request) -> Response:
+    """Return the plans that the home keeps, and a form for each kind of a new one."""
+    bench: Bench = request.app.state.bench
+    holdings = bench.holdings(again=True)
+    return page(
+        request, "part_plans", plans=holdings.places["plan"], instruments=bench.registry.instruments(),
+        tests=holdings.places["test"], answers=holdings.places["diagnosis"],
+        templates=templates_of(bench.home),
+    )  # fmt: skip
+
+
+def plan(request: Request) -> Response:
+    """Return a plan's page."""
+    _, plan_id, folder = _asked(request)
+    kept = read_plan(folder)
+    return page(
+        request, "plan", kept=kept, answer=kept.answer, plan_id=plan_id,
+        chart=_risk_chart(kept.answer) if kept.kind == "interval" else None,
+        place_of=request.app.state.bench.holdings().places["plan"][plan_id],
+    )  # fmt: skip
+
+
+def file(request: Request) -> Response:
+    """Return a file of a plan, one of those that a plan writes."""
+    _, _, folder = _asked(request)
+    kept, name = read_plan(folder), request.path_params["name"]
+    if name not in (*kept.files, *kept.pictures):
+        raise HTTPException(404)
+    shown = "inline" if name in kept.pictures else "attachment"
+    return Response(
+        read_regular(folder / name, RESULT_FILE), media_type=_TYPES[name.rpartition(".")[2]],
+        headers={"content-disposition": f'{shown}; filename="{name}"'},
+    )  # fmt: skip
+
+
+def start(request: Request) -> Response:
+    """Start a plan as a job."""
+    bench: Bench = request.app.state.bench
+    kind = next((kind for kind in KINDS if kind == request.path_params["kind"]), None)
+    if kind is None:
+        raise HTTPException(404)
+    form = request.state.form
+    subject = _subject(bench, kind, form)
+    template = templates_of(bench.home).get(form.get("template", ""))
+    words = plan_words(bench.home, kind, form, subject, template)
+    job = start_job(bench.home, kind="plan", title=" ".join(filter(None, (kind, subject))), words=words)
+    return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)
+
+
+def _subject(bench: Bench, kind: PlanKind, form: Mapping[str, str]) -> str | None:
+    """Return what a plan is for: an instrument, or the place of a holding by its id; nothing else has one."""
+    chosen = form.get("subject", "")
+    if not chosen:
+        return None
+    if kind in ("session", "interval"):
+        found = chosen if chosen in bench.registry.instruments() else None
+    else:
+        bench.holdings(again=True)
+        found = bench.holdings().places["test" if kind == "test" else "diagnosis"].get(chosen)
+    if found is None:
+        raise HTTPException(404)
+    return found
+
+
+def _risk_chart(answer: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the risk over the days of an interval, and what is allowed."""
+    points = {risk["days"]: 100 * risk["beyond"] for risk in (*answer["risks"], answer["chosen"])}
+    days = sorted(points)
+    return {
+        "x_label": "interval [days]",
+        "y_label": "beyond [%]",
+        "series": [{"label": "risk", "line": True}, {"label": "allowed", "line": True, "dash": True}],
+        "data": [days, [points[day] for day in days], [100 * (1 - answer["reliability"])] * len(days)],
+    }
+
+
+def _asked(request: Request) -> tuple[Bench, str, Path]:
+    bench: Bench = request.app.state.bench
+    plan_id = request.path_params["plan"]
+    folder = bench.path_of("plan", plan_id)
+    if folder is None:
+        raise HTTPException(404)
+    return bench, plan_id, folder
+
+
+ROUTES: Routes = (
+    ("GET", "/plans", plans),
+    ("GET", "/plans/list", plan_list),
+    ("POST", "/plans/{kind}", start),
+    ("GET", "/plan/{plan}", plan),
+    ("GET", "/plan/{plan}/file/{name}", file),
+)
