@@ -12,11 +12,11 @@ from toolkit.errors import ConfigError
 from toolkit.files import read_toml, same_file
 from toolkit.inputs import is_regular
 from toolkit.machine import Machine, load_machine
+from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import machine_of
 
 MachineSource = Literal["option", "test.toml", "file", "default"]
-DEFAULT_MACHINE = "m15"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +43,7 @@ def context_of(
     read: Callable[[Path], Mapping[str, Any]] = read_toml,
     find: Callable[[Path], Path | None] = nearest_test_toml,
 ) -> Context:
-    """Return a file's context: ``machine`` where it is named, else test.toml, else the file, else m15.
+    """Return a file's context: ``machine`` where it is named, else test.toml, the file, else the default.
 
     ``own`` tells the machine that the file names, ``read`` reads a test.toml and ``find`` finds it: for a
     caller that remembers.

@@ -15,7 +15,7 @@ from toolkit.audit.candidates import unfit
 from toolkit.audit.choices import Choices
 from toolkit.audit.columns import columns_of
 from toolkit.audit.conditions import Change, changes
-from toolkit.audit.context import DEFAULT_MACHINE, Context, MachineSource, context_of
+from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import Grade, Identification
@@ -27,6 +27,7 @@ from toolkit.files import read_toml, sha256_bytes, sha256_file
 from toolkit.findings import Finding
 from toolkit.inputs import RECORDING_FILE, limit_of, read_regular
 from toolkit.machine import load_machine
+from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording

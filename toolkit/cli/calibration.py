@@ -55,7 +55,7 @@ def list_records(
 ) -> int:
     """List the records with their state, and the head of each ledger; --all has discarded candidates too.
 
-    Example: toolkit calibration list m15 --known-at 2026-03-02
+    Example: toolkit calibration list rig --known-at 2026-03-02
     """
     from toolkit.lab.registry_answer import listed
 
@@ -82,7 +82,7 @@ def show(
 ) -> int:
     """Show one record: its state, cells, ranges, coefficients, issued digits, check loads and files.
 
-    Example: toolkit calibration show m15-r2
+    Example: toolkit calibration show rig-r2
     """
     from toolkit.lab.gates_answer import full_record
     from toolkit.lab.registry_answer import shown
@@ -134,7 +134,7 @@ def history(
 ) -> int:
     """Tell what happened to an instrument's records, from its ledger.
 
-    Example: toolkit calibration history m15
+    Example: toolkit calibration history rig
     """
     from toolkit.lab.registry_answer import history as told
 
@@ -229,7 +229,7 @@ def approve(
 ) -> int:
     """Put a record in force; a failed gate (sign, span, polarity, range, check load) blocks it.
 
-    Example: toolkit calibration approve m15-r2 --in-force-from 2026-03-02 --checked-by "second person"
+    Example: toolkit calibration approve rig-r2 --in-force-from 2026-03-02 --checked-by "second person"
     """
     from toolkit.calibration.registry.approval import approve as decide
     from toolkit.lab.answers import finding_lines
@@ -288,7 +288,7 @@ def withdraw(
 ) -> int:
     """Withdraw a record; the ledger keeps it and says why.
 
-    Example: toolkit calibration withdraw m15-r2 --on 2026-04-01 --by "first person" --reason "dropped"
+    Example: toolkit calibration withdraw rig-r2 --on 2026-04-01 --by "first person" --reason "dropped"
     """
     from toolkit.calibration.registry.approval import withdraw as decide
     from toolkit.lab.registry_answer import void_day
@@ -319,7 +319,7 @@ def diff(
 ) -> int:
     """Compare two records term by term; exit code 1 where they differ.
 
-    Example: toolkit calibration diff m15-r1 m15-r2
+    Example: toolkit calibration diff rig-r1 rig-r2
     """
     from toolkit.lab.registry_answer import difference
 
@@ -330,7 +330,7 @@ def diff(
 
 @answers("toolkit.lab.decision_answer_types:DiscardAnswer")
 def discard(
-    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
+    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
     reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
     by: Annotated[str, typer.Option("--by", help="Who discards.")],
     calibrations: Calibrations = None,
@@ -347,7 +347,7 @@ def discard(
     The record stays and is verified for ever. The same session entered again is refused with this reason,
     unless with 'toolkit calibrate SESSION.toml --again', which makes a record with a new id.
 
-    Example: toolkit calibration discard m15-r3 --reason "cable of D52 was loose" --by "first person"
+    Example: toolkit calibration discard rig-r3 --reason "cable of D52 was loose" --by "first person"
     """
     from toolkit.calibration.registry.approval import discard as decide
 
@@ -372,7 +372,7 @@ def report(
 ) -> int:
     """Fit a record's stored data again and print the whole report; exit code 1 where it has findings.
 
-    Example: toolkit calibration report m15-r2 --figures fit
+    Example: toolkit calibration report rig-r2 --figures fit
     """
     from toolkit.calibration.fit.findings import session_findings
     from toolkit.calibration.fit.session_fit import fit_session

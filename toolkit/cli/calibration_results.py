@@ -80,7 +80,7 @@ def budget(
 ) -> int:
     """Tell the uncertainty of a record's loads: components with shares, U with k, U over the range.
 
-    Example: toolkit calibration budget m15-r2 --load FY --at 4000N
+    Example: toolkit calibration budget rig-r2 --load FY --at 4000N
     """
     from toolkit.lab.budget import BudgetOrder, budget_answer, temperature_of
     from toolkit.lab.home import open_registry
@@ -138,7 +138,7 @@ def apply(
 
 @answers("toolkit.lab.document_answer_types:CertificateAnswer")
 def certificate(
-    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
+    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
     template: Annotated[
         Path | None,
         typer.Option("--template", help="Word template; default: report_templates/certificate.docx."),
@@ -187,7 +187,7 @@ def certificate(
     candidate and a withdrawn record have none. What nobody stated is a visible gap (exit 1). --known-at is
     the day of issue, and of what was known.
 
-    Example: toolkit calibration certificate m15-r3 --out certificates --dcc
+    Example: toolkit calibration certificate rig-r3 --out certificates --dcc
     """
     from toolkit.lab.certificate import certificate_payload, certificate_text, deliver_certificate
     from toolkit.lab.home import home_template, open_registry
@@ -289,7 +289,7 @@ def chart(
 ) -> int:
     """Chart the error of each check load over the sessions; exit code 1 where the newest breaks a rule.
 
-    Example: toolkit calibration chart m15 --out chart.png
+    Example: toolkit calibration chart rig --out chart.png
     """
     from toolkit.lab.control_answer import chart_answer
     from toolkit.lab.home import open_registry

@@ -141,7 +141,7 @@ Home = Annotated[
         help="Laboratory's home; default: the nearest folder upward with calibrations/.",
     ),
 ]
-Id = Annotated[str, typer.Argument(help="Record id, such as m15-r2.")]
+Id = Annotated[str, typer.Argument(help="Record id, such as rig-r2.")]
 CalibrationId = Annotated[
     str | None,
     typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),

@@ -55,12 +55,18 @@ def command(
 
     Example: toolkit demo --out demo
     """
+    from toolkit.machine import load_machine
+    from toolkit.machine.default import SIMULATED_MACHINE
+
     started = time.perf_counter()
     say = _silent if json or quiet else typer.echo
     steps_run: list[Payload] = []
     with _stage(out) as stage:
         steps = _steps(stage)
-        say(f"The virtual M-15 from raw strain gauges to a report, in {len(steps) + 1} steps.\n")
+        say(
+            f"{load_machine(SIMULATED_MACHINE).title}: from raw strain gauges to a report, "
+            f"in {len(steps) + 1} steps.\n"
+        )
         for number, step in enumerate(steps, start=1):
             say(f"[{number}/{len(steps) + 1}] {step.title}")
             say(f"      $ toolkit {' '.join(_shown(step.words, stage, out))}")
@@ -131,6 +137,7 @@ def _stage(out: Path) -> Iterator[Path]:
 def _steps(stage: Path) -> list[Step]:
     from toolkit.examples.fig4_4 import packaged_fig4_4
     from toolkit.lab.home import packaged_home
+    from toolkit.machine.default import SIMULATED_MACHINE
 
     home = stage / "home"
     for name in ("calibrations", "report_templates"):
@@ -161,7 +168,7 @@ def _steps(stage: Path) -> list[Step]:
         ),
         Step(
             title="the certificate of the calibration: ISO/IEC 17025, 7.8.2 and 7.8.4",
-            words=("calibration", "certificate", "m15-virtual-r1", "--template",
+            words=("calibration", "certificate", f"{SIMULATED_MACHINE}-r1", "--template",
                    str(home / "report_templates" / "certificate.docx"), "--out", str(stage / "certificate"),
                    *at),
             told=_told_certificate,
@@ -272,7 +279,7 @@ def _tire_file(resolved: Resolved, path: Path) -> str:
     """Write MF 6.1 over all loads of the forward run, and tell how well it fits."""
     from toolkit.lab.tire_files import write_test_tir
 
-    fit = write_test_tir(path, resolved.result.reduced, comments=["simulated: the virtual M-15"])
+    fit = write_test_tir(path, resolved.result.reduced, comments=[resolved.result.reduced.machine_title])
     errors = ", ".join(f"{channel.channel} {channel.error_percent:.2f} %" for channel in fit.fits)
     return f"tire.tir: MF 6.1 over all loads, error {errors}"
 

@@ -31,7 +31,9 @@ def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, under any name.")],
     machine: Annotated[
         str | None,
-        typer.Option("--machine", help="Machine; default: that of test.toml, else of the file, else m15."),
+        typer.Option(
+            "--machine", help="Machine; default: that of test.toml, else of the file, else the packaged one."
+        ),
     ] = None,
     known_at: KnownAt = None,
     prove: Annotated[
@@ -47,7 +49,7 @@ def command(
     Channels with units, load blocks, the measured slip angle, the calibration that computed Fy and Mz,
     and the corrected values beside them.
 
-    Example: toolkit inspect tests/2019-06-04/M15_1.xlsx
+    Example: toolkit inspect tests/2019-06-04/run_01.xlsx
     """
     from toolkit.audit.inspection import inspect_file
     from toolkit.errors import ToolkitError

@@ -25,7 +25,7 @@ def show(
 ) -> int:
     """Show a machine: version, file hash, and every correction with the answer that it comes from.
 
-    Example: toolkit machine show m15
+    Example: toolkit machine show belt.toml
     """
     from toolkit.files import sha256_file
     from toolkit.machine import load_machine
@@ -54,8 +54,9 @@ def correct(
         typer.Option("--out", callback=into_file, help="The new definition (.toml); it must not exist yet."),
     ],
     machine: Annotated[
-        str, typer.Option("--machine", help="Machine that is corrected: a packaged name, or a definition.")
-    ] = "m15",
+        str | None,
+        typer.Option("--machine", help="Machine that is corrected: a packaged name, or a definition."),
+    ] = None,
     on: Annotated[
         datetime | None,
         typer.Option("--on", formats=["%Y-%m-%d"], help="Day of the decision; default today."),
@@ -71,17 +72,19 @@ def correct(
     reason, such as a zero that was measured with the wheel at rest.
 
     Example: toolkit machine correct answer --effect steer_offset --by "second person" --reason "zero
-    measured at rest, 2026-03-02" --machine m15 --out m15-2.toml
+    measured at rest, 2026-03-02" --machine belt.toml --out belt-2.toml
     """
     from datetime import date
 
     from toolkit.diagnosis.answer.correction import correction_of, machine_of
     from toolkit.machine import load_machine
+    from toolkit.machine.default import DEFAULT_MACHINE
     from toolkit.machine.next_version import next_version
     from toolkit.publication import write_result
     from toolkit.simulation.model_file import read_model
 
     _refuse_existing(out)
+    machine = machine or DEFAULT_MACHINE
     corrected = load_machine(machine)
     model = read_model(source / "model.toml" if source.is_dir() else source)
     day = on.date() if on else date.today()  # noqa: DTZ011

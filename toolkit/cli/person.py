@@ -37,7 +37,7 @@ By = Annotated[
     str | None, typer.Option("--by", help="Who decides, by id; default: whose key signs or has answered.")
 ]
 Why = Annotated[str, typer.Option("--reason", help="Why; the log of people keeps it.")]
-Instrument = Annotated[str, typer.Argument(help="Instrument, such as m15, or people: the log of people.")]
+Instrument = Annotated[str, typer.Argument(help="Instrument, such as rig, or people: the log of people.")]
 
 
 @person.command()
@@ -203,7 +203,7 @@ def prove(
 ) -> int:
     """Print an entry with the proof that it is in the ledger of today, for `ledger check` on any later day.
 
-    Example: toolkit ledger prove m15
+    Example: toolkit ledger prove rig
     """
     from toolkit.lab.people import anchor_document, checkpoint_of
 
@@ -272,7 +272,7 @@ def witness(
 ) -> int:
     """Let a second place countersign the ledger; it refuses what is no continuation of what it has signed.
 
-    Example: toolkit ledger witness m15 /mnt/north --name north --key north.key
+    Example: toolkit ledger witness rig /mnt/north --name north --key north.key
     """
     from toolkit.lab.people import witness as countersigned
 

@@ -40,7 +40,7 @@ SheetTemplate = Annotated[
 @answers("toolkit.lab.simulation_answer_types:PlanSessionAnswer")
 def session(
     instrument: Annotated[
-        str, typer.Argument(help="Instrument, such as m15: its record in force is the basis.")
+        str, typer.Argument(help="Instrument, such as rig: its record in force is the basis.")
     ],
     session_file: Annotated[
         Path | None, typer.Option("--session", metavar="FILE", help="SESSION.toml to plan from instead.")
@@ -93,7 +93,7 @@ def session(
     --out gets SESSION.toml, loads.csv and check.csv, which 'toolkit calibrate' reads once the readings are
     filled in, and the operator's sheet; with --template as Word and PDF too.
 
-    Example: toolkit plan session m15-virtual --u "FY=1.2 N" --out next
+    Example: toolkit plan session rig --u "FY=1.2 N" --out next
     """
     from toolkit.lab.home import document_template, open_registry
     from toolkit.lab.plan_session import PlanOrder, session_plan_answer
@@ -125,7 +125,7 @@ def sheet_code(payload: Mapping[str, Any]) -> int:
 @answers("toolkit.lab.simulation_answer_types:PlanIntervalAnswer")
 def interval(
     instrument: Annotated[
-        str, typer.Argument(help="Instrument, such as m15: by the history of its check loads.")
+        str, typer.Argument(help="Instrument, such as rig: by the history of its check loads.")
     ],
     reliability: Annotated[
         float, typer.Option("--reliability", help="Chance to be inside the tolerance at the interval's end.")
@@ -153,7 +153,7 @@ def interval(
     the record before; the path that drifts most decides. ILAC-G24's method 2 stands beside it. Nothing is
     entered: the interval in use is set on approval.
 
-    Example: toolkit plan interval m15-virtual --reliability 0.95 --tests 200
+    Example: toolkit plan interval rig --reliability 0.95 --tests 200
     """
     from toolkit.lab.home import document_template, open_registry
     from toolkit.lab.plan_interval import interval_plan_answer

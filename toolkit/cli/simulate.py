@@ -87,7 +87,7 @@ def command(
       --effect crosstalk.FZ.FY=0.01            (from FZ to FY)
       --effect channel_sign.E5
       --effect channel_swap.D51.D52
-      --effect wrong_calibration=m15-virtual-r1
+      --effect wrong_calibration=rig-r1
       --effect load_lag@order:1+2=1.5s         (in runs with that condition)
 
     In place of a plan it takes the model.toml of a diagnosis, of any kind of simulation, and runs it on

@@ -75,7 +75,7 @@ def new_test(
 ) -> int:  # fmt: skip
     """Begin the test.toml of a folder of recordings.
 
-    Example: toolkit test new test.toml --set machine=m15 --set date=2026-03-17
+    Example: toolkit test new test.toml --set machine=belt.toml --set date=2026-03-17
     """
     return _begin("test", file, entries, None, ask=ask, json=json, quiet=quiet)
 

@@ -12,7 +12,6 @@ from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.lab.starters import guess_case, headers_of
 from toolkit.recording.sniff import sniff
 
-_MACHINE = "m15"
 _ROLES = {
     "time": "time", "load": "input", "slip_angle": "input", "indication": "output",
     "covariate": "covariate", "angle": "covariate",
@@ -41,8 +40,9 @@ def _with_own_channels(
 ) -> dict[str, dict[str, str]]:
     """Return channels with those of the standard machine's own recordings, by symbol, in their places."""
     from toolkit.machine import load_machine
+    from toolkit.machine.default import DEFAULT_MACHINE
 
-    own = load_machine(_MACHINE).columns
+    own = load_machine(DEFAULT_MACHINE).columns
     names = {name for column in own for name in (column.header, column.symbol)}
     return {name: entries for name, entries in channels.items() if name not in names} | {
         column.symbol: {

@@ -185,7 +185,7 @@ def example(name: str) -> Path:
 
     ``home`` is a laboratory with its records and templates; ``test_plan``, ``session_plan`` and
     ``continuous_plan`` are plans of the virtual machine, ``tire`` its tire property file; ``fig4_4`` is a
-    real recording of the machine M-15.
+    real recording of the default machine.
 
     Raises
     ------

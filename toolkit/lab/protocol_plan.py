@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
 DEMANDS = ("slope_cornering", "conicity", "plysteer", "peak")
-VIRTUAL = "m15-virtual"
 _SIMULATED = 3  # tests of a tire file: the scatter of one alone is not sure
 _NEAR = 0.15  # a load that is asked for is the nominal one within this part of it
 
@@ -146,11 +145,12 @@ def _virtual(order: ProtocolOrder) -> EarlierTest:
     from toolkit.lab.home import packaged_home, registry_if_any
     from toolkit.lab.resolve import resolve_test
     from toolkit.lab.simulate import simulate_plan
+    from toolkit.machine.default import SIMULATED_MACHINE
     from toolkit.planning.expectation import pooled
     from toolkit.simulation.plan import read_plan
 
     registry = registry_if_any(order.calibrations, order.home)
-    known = registry is not None and (registry.folder / VIRTUAL).is_dir()
+    known = registry is not None and (registry.folder / SIMULATED_MACHINE).is_dir()
     calibrations = registry.folder if registry is not None and known else packaged_home() / "calibrations"
     plan = read_plan(Path(__file__).parents[1] / "examples" / "virtual" / "test_plan.toml")
     if order.like is not None:
@@ -258,9 +258,10 @@ def _files(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> di
     """Return the protocol, and what the virtual machine runs of it, by the names of their files."""
     from datetime import date
 
+    from toolkit.machine.default import SIMULATED_MACHINE
     from toolkit.planning.protocol_plan import protocol_text, simulation_text
 
-    twin = own.name if own.simulated else VIRTUAL
+    twin = own.name if own.simulated else SIMULATED_MACHINE
     own_tire = None if tire is None else Path(os.path.relpath(real_path(tire), real_path(out))).as_posix()
     return {
         PROTOCOL: protocol_text(plan, own.protocol),

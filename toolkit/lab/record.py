@@ -42,7 +42,7 @@ class Record(Face):
 
     @property
     def id(self) -> str:
-        """Its id, such as ``m15-r2``."""
+        """Its id, such as ``rig-r2``."""
         return self.result.id
 
     @property

@@ -270,12 +270,13 @@ class Report(Face):
         }
 
 
-def read_recording(path: str | Path, *, machine: str = "m15") -> Recording:
+def read_recording(path: str | Path, *, machine: str | None = None) -> Recording:
     """Read one recording.
 
     Parameters
     ----------
-    machine : a packaged machine's name, or the path of a definition: it says what the columns are
+    machine : a packaged machine's name, or the path of a definition, None for the default one: it says what
+        the columns are
 
     Raises
     ------
@@ -289,9 +290,10 @@ def read_recording(path: str | Path, *, machine: str = "m15") -> Recording:
     <Recording M15_fig4_4.xlsx | m15 | 10 rows | FZ [lbf], D52 [lbf], D51 [lbf], E5 [lbf], SA [deg], ...>
     """
     from toolkit.machine import load_machine
+    from toolkit.machine.default import DEFAULT_MACHINE
     from toolkit.recording.read import read_recording as read
 
-    return Recording(result=read(Path(path), load_machine(machine)))
+    return Recording(result=read(Path(path), load_machine(machine or DEFAULT_MACHINE)))
 
 
 def read_test(

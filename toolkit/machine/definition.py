@@ -31,6 +31,7 @@ from toolkit.errors import ConfigError
 from toolkit.files import parse_toml
 from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine.correction import Correction
+from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.machine.protocol import Protocol
 from toolkit.units import unit
 
@@ -180,12 +181,13 @@ class Machine:
 
     FORMAT: ClassVar[Format] = Format(
         title="machine definition", schema=1,
-        next_step="correct {key}; the packaged m15.toml shows every entry",
+        next_step="correct {key}; " f"the packaged {DEFAULT_MACHINE}.toml shows every entry",
     )  # fmt: skip
 
-    name: Annotated[str, Entry("of the machine, and of the instrument in its calibrations", example="m15")]
+    name: Annotated[str, Entry("of the machine, and of the instrument in its calibrations", example="belt-2")]
     extends: Annotated[
-        str | None, Entry("packaged machine whose entries hold where this file states none", example="m15")
+        str | None,
+        Entry("packaged machine whose entries hold where this file states none", example=DEFAULT_MACHINE),
     ] = None
     title: Annotated[str, Entry("for reports")]
     kind: Annotated[Literal["real", "simulated"], Entry("whether its data are measured")]

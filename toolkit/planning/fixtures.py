@@ -49,7 +49,7 @@ class LoadingFixtures:
 
     FORMAT: ClassVar[Format] = Format(title="loading fixtures", schema=1)
 
-    instrument: Annotated[str, Entry("what they calibrate", example="m15")]
+    instrument: Annotated[str, Entry("what they calibrate", example="rig")]
     run_minutes: Annotated[float, AtLeast(0), Entry("before every run: preload, rest, zero")] = 10.0
     limits: Annotated[
         tuple[tuple[str, float], ...], Keyed(), Unit("N", "N*m"), Above(0),

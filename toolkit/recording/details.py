@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from toolkit.channels import Reversal, Rotation
 from toolkit.declared import Above, Day, Entry, Fault, Format, Keyed, Short, Source, Text, Unit, build
+from toolkit.machine.default import DEFAULT_MACHINE
 
 # A series or a DOT code may be written as a number.
 _Text = Annotated[str | None, Text(empty=True, strip=True, numbers="any")]
@@ -107,8 +108,8 @@ class StatedTest:
     machine: Annotated[
         str, Text(empty=True, strip=True, numbers="any"),
         Entry(
-            "name of the machine, or its definition's path", example="m15",
-            expected='machine = "m15", or the path of a machine definition',
+            "name of the machine, or its definition's path", example=DEFAULT_MACHINE,
+            expected=f'machine = "{DEFAULT_MACHINE}", or the path of a machine definition',
         ),
     ]  # fmt: skip
     date: Annotated[str | None, Day(moment=True), Entry("of the test")] = None

@@ -1,4 +1,4 @@
-"""The virtual M-15: tire, road, carriage, load cells and data acquisition, one stage a file.
+"""The virtual machine: tire, road, carriage, load cells and data acquisition, one stage a file.
 
 Every stage is a pure function of the signals of the stage before it; `timeline` moves rack and actuator,
 `chain` walks road, carriage and tire, `run` goes on through cells and acquisition, and `write` stores what

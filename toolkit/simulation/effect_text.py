@@ -6,7 +6,7 @@
     zero_offset.D51=0.002mV/V                   on one signal; without a name on every cell
     crosstalk.FZ.FY=0.01                        from FZ to FY
     channel_swap.D51.D52   channel_sign.E5      there or not: no value
-    wrong_calibration=m15-r1                    the record that was used instead
+    wrong_calibration=rig-r1                    the record that was used instead
     load_lag@order:1+2=1.5s                     only in runs with the condition order = 1 or 2
 
 A number without a unit is in the parameter's own. A parameter that is not given is off, or has its usual
@@ -69,7 +69,7 @@ def parse_effect(text: str, machine: Machine) -> tuple[AppliedEffect, ...]:
     if effect.replaces_record:
         if not value_text.strip():
             raise _wrong(
-                "the record that was used is not named", where, "nothing", "a registry id, such as m15-r1",
+                "the record that was used is not named", where, "nothing", "a registry id, such as rig-r1",
                 f"write --effect {effect.name}=ID",
             )  # fmt: skip
         return (AppliedEffect(effect=effect, source=value_text.strip(), condition=condition),)

@@ -18,6 +18,7 @@ from toolkit.declared import Fault, Source, read_text, refuse
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError
 from toolkit.inputs import SETTINGS_FILE, read_input
+from toolkit.machine.default import SIMULATED_MACHINE
 from toolkit.machine.definition import Machine, load_machine
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth, RoadTruth
@@ -172,7 +173,7 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
     stated = read_text(PlanFile, data, where=path)
     machine = load_machine(stated.machine)
     if not machine.simulated:
-        expected = 'a machine definition with kind = "simulated", such as m15-virtual'
+        expected = f'a machine definition with kind = "simulated", such as {SIMULATED_MACHINE}'
         problem = "a real machine cannot be simulated under its own name"
         fault = Fault(
             key=("machine",), got=machine.name, expected=expected, what=problem, form=PlanFile.FORMAT

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar, cast
 
 from toolkit.channels import Rotation
 from toolkit.declared import Above, AtLeast, Day, Entry, Fault, Format, Keyed, Names, Size, Text, Unit
+from toolkit.machine.default import SIMULATED_MACHINE
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth, RoadTruth
 from toolkit.simulation.case_plan import CasePlan
@@ -161,7 +162,7 @@ class PlanFile:
         str | None, Text(empty=True, numbers="any"), Entry("default: the file's name", example="virtual test")
     ] = None
     date: Annotated[str, Day(), Entry("the day on which it is run", expected="a date such as 2026-03-17")]
-    machine: Annotated[str, Entry("a machine definition that is simulated")] = "m15-virtual"
+    machine: Annotated[str, Entry("a machine definition that is simulated")] = SIMULATED_MACHINE
     seed: Annotated[int, AtLeast(0), Entry("of the random numbers")] = 0
     label: Annotated[
         tuple[tuple[str, str], ...],

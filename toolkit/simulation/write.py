@@ -218,8 +218,10 @@ def session_toml(session: VirtualSession) -> str:
             for load in LOADS
         ),
     ]
+    # No serials of real cells: of the machine that the simulated one stands for.
+    prefix = f"V{(plan.machine.extends or plan.machine.name).upper()}"
     for name in CELLS:
-        lines += ["", f"[cells.{name}]", f"serial = {_text('VM15-' + name)}", *_electrics(session)]
+        lines += ["", f"[cells.{name}]", f"serial = {_text(f'{prefix}-{name}')}", *_electrics(session)]
     if session.zeros:
         lines += ["", "[zero]", 'fit = "tared"  # the amplifier was zeroed before each run']
     for when, values in session.zeros:

@@ -1,6 +1,6 @@
 """Checkpoints: what a log was at a moment, signed (C2SP tlog-checkpoint), and countersigned by witnesses.
 
-    m15.calibrations.example
+    rig.calibrations.example
     41
     5wHqDQwl...=
 

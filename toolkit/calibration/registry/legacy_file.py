@@ -64,7 +64,7 @@ class LegacyFile:
 
     instrument: Annotated[
         str, Text(pattern=INSTRUMENT.pattern),
-        Entry("what was calibrated", example="m15", expected="letters, digits, '-', '_' and '.'"),
+        Entry("what was calibrated", example="rig", expected="letters, digits, '-', '_' and '.'"),
     ]  # fmt: skip
     date: Annotated[str, Day(), Entry("of the source", example="2021-12-31")]
     entered_by: Annotated[str, Text(strip=True), Entry("who enters it", example="first person")]

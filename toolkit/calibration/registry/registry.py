@@ -57,7 +57,7 @@ def instrument_of(record_id: str) -> str:
             f"not a record id: {record_id!r}",
             where="record id",
             got=record_id,
-            expected="<instrument>-r<N>, such as m15-r2",
+            expected="<instrument>-r<N>, such as rig-r2",
             next_step="see 'toolkit calibration list'",
             rule="record-id",
         )

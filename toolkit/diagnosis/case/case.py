@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from toolkit.channels import Axes
 from toolkit.declared import Above, Entry, UnitName
+from toolkit.machine.default import DEFAULT_MACHINE
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,7 +64,7 @@ class Simulation:
     """What a case says of its simulation; fields of other kinds are empty."""
 
     kind: Kind
-    machine: str = "m15"
+    machine: str = DEFAULT_MACHINE
     calibration: str = ""
     tire: Path | None = None
     path: Path | None = None

@@ -9,6 +9,7 @@ from typing import Any
 from toolkit.diagnosis.case.case import KINDS, Simulation
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
+from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.simulation.case_plan import CaseParameter
 from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
 
@@ -29,7 +30,7 @@ def simulation_of(model: ModelFile) -> Simulation:
     )
     return Simulation(
         kind=model.kind,
-        machine=machine or "m15",
+        machine=machine or DEFAULT_MACHINE,
         calibration=calibration,
         tire=model.file("tire"),
         path=model.file("path"),

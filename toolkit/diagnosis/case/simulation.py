@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from toolkit.declared import Distinct, Entry, Format, Keyed, Size, Text, UnitName
 from toolkit.diagnosis.case.case import Kind, Simulation
 from toolkit.diagnosis.case.model_file import parameters_of, simulation_of, tire_model
+from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.simulation.case_plan import CaseParameter
 from toolkit.simulation.model_file import ModelFile, read_model
 
@@ -27,9 +28,9 @@ class MachineSimulation:
     """The chain of the machine: tire, road, carriage, load cells, acquisition."""
 
     kind: Literal["machine"]
-    machine: Annotated[str, Entry("name of the machine, or its definition's path")] = "m15"
+    machine: Annotated[str, Entry("name of the machine, or its definition's path")] = DEFAULT_MACHINE
     calibration: Annotated[
-        str, Text(empty=True), Entry("id or file of a record; with cells", example="m15-r3")
+        str, Text(empty=True), Entry("id or file of a record; with cells", example="rig-r3")
     ] = ""
     tire: Annotated[Path | None, Entry("MF 5.2 or 6.x, or a model file", example="tire.tir")] = None
     parameters: _Parameters = ()

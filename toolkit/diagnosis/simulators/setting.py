@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
 
-NOMINAL_SPEED = 7.66 / 3.6  # m/s, of the M-15's drum (the thesis, 2.2)
+NOMINAL_SPEED = 7.66 / 3.6  # m/s, of the drum of the source document (the thesis, 2.2)
 # What tire models call the load to which their coefficients are counted, without case and underlines.
 _NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMINALLOAD"})
 

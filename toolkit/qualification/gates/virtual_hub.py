@@ -16,8 +16,10 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.machine.default import SIMULATED_MACHINE
+
 RIG = "rig"  # an instrument that no machine definition knows
-HUB = "m15-virtual"  # one that has a packaged machine definition
+HUB = SIMULATED_MACHINE  # one that has a packaged machine definition
 CELLS = ("D51", "D52", "E5")
 LOADS = ("FY", "MZ", "MX")
 UNITS = MappingProxyType({**dict.fromkeys(CELLS, "mV/V"), "FY": "N", "MZ": "N*m", "MX": "N*m"})
@@ -25,7 +27,7 @@ LARGEST = (6000.0, 250.0, 300.0)  # N, N·m, N·m
 FIRST, SECOND = dt.date(2020, 3, 2), dt.date(2020, 6, 1)
 RUNS = 3
 
-_ARM = 0.048  # m, as published for the M-15; the drawing's own half-side is 0.0866 m
+_ARM = 0.048  # m, as published for such a hub; the drawing's own half-side is 0.0866 m
 _CAPACITY = 1600.0  # N per mV/V
 _FORCES = np.array([[1.0, 1.0, 1.0], [-_ARM, _ARM, 0.0], [0.05, 0.05, -0.10]])
 PER_INDICATION = _FORCES * _CAPACITY

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import summary
 from toolkit.estimate import plus_minus
+from toolkit.machine import load_machine
+from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.report.content import Value
 from toolkit.report.document import DeclaredValue, printed_number
 from toolkit.report.style import Style
@@ -271,7 +273,8 @@ def _summarised(
 
 SUMMARY = tuple(value for characteristic in summary() for value in _summarised(characteristic))
 
-# The coefficients of the M-15's cells stand for those of all.
+# The coefficients of the default machine's cells, sorted, stand for those of all.
+_DEFAULT_CELLS = sorted(column.symbol for column in load_machine(DEFAULT_MACHINE).indications)
 _COEFFICIENTS = [
     Entry(
         path=f"calibration.{load}.{term}",
@@ -280,7 +283,7 @@ _COEFFICIENTS = [
         description=f"coefficient of {term} in {load}, in the record's units",
     )
     for load in ("FY", "MZ")
-    for term in ("D51", "D52", "E5", "intercept")
+    for term in (*_DEFAULT_CELLS, "intercept")
 ]
 
 
