@@ -22,6 +22,7 @@ from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.case.simulation import (
     ColumnsSimulation,
+    FmuSimulation,
     MachineSimulation,
     OdeSimulation,
     PythonSimulation,
@@ -143,11 +144,12 @@ def test_the_case_of_the_page_is_read(tmp_path: Path) -> None:
         "python": PythonSimulation,
         "ode": OdeSimulation,
         "machine": MachineSimulation,
+        "fmu": FmuSimulation,
         "columns": ColumnsSimulation,
     }
     tables = [tomllib.loads(block)["simulation"] for block in simulations]
     kinds = {build(forms[table["kind"]], table, Source(where="case.md")).kind for table in tables}
-    assert kinds | {case.simulation.kind} == {"python", "ode", "machine", "columns"}
+    assert kinds | {case.simulation.kind} == {"python", "ode", "machine", "fmu", "columns"}
 
 
 def _paths(value: object, path: str = "") -> Iterator[str]:

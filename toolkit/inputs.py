@@ -109,6 +109,14 @@ CODE_FILE = Form(
     expected="a readable Python file",
     next_step="check the path",
 )
+FMU_FILE = Form(
+    title="the FMU",
+    limit=512 * MIB,
+    reason="it holds binaries of every system",
+    error=ConfigError,
+    expected="a readable .fmu file",
+    next_step="check the path",
+)
 RECORD_FILE = Form(
     title="a file of the registry",
     limit=512 * MIB,
@@ -168,6 +176,7 @@ FORMS = (
     TEMPLATE_FILE,
     RESULT_FILE,
     CODE_FILE,
+    FMU_FILE,
     RECORD_FILE,
     NAMED_FILE,
     LIST_FILE,

@@ -8,10 +8,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from toolkit.cli import evaluate, fit
+from tests.tires.fmu.fmu_factory import outputs_of
+from toolkit.cli import convert, evaluate, fit
 from toolkit.errors import ToolkitError
 from toolkit.tires.models.magic_formula import value
 from toolkit.tires.tir import read_tir
+from toolkit.tires.tir_evaluate import evaluate_tir
 
 
 def run(command, *arguments):
@@ -117,3 +119,33 @@ def test_the_file_tells_its_formula_side_rated_load_radius_and_ranges(table, tmp
         error /= np.linalg.norm(measured[:, column - 1])
         one = next(f for f in json.loads(text)["fits"] if f["channel"] == channel)
         assert error == pytest.approx(one["error_percent"], rel=1e-6)
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_the_fmu_is_the_tire_of_the_tire_file(table, tmp_path, fmi):
+    tir, fmu, again = tmp_path / "x.tir", tmp_path / "x.fmu", tmp_path / "again.fmu"
+    _, text = run(fit.command, table, "--model", "mf61", "--tir", tir, "--fmu", fmu, "--fmi", fmi, "--json")
+    assert json.loads(text)["fmu"] == str(fmu)
+    run(convert.command, tir, again, "--fmi", fmi)
+    SA, FZ = np.linspace(-0.2, 0.2, 41), np.full(41, 3000.0)
+    expected = evaluate_tir(read_tir(tir), SA=SA, FZ=FZ)[0]
+    for path in (fmu, again):
+        outputs = outputs_of(path, {"SA": SA, "FZ": FZ})
+        np.testing.assert_allclose(outputs["FY"], expected.FY, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(outputs["MZ"], expected.MZ, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "rule"),
+    [
+        (["--fmu", "x.fmu"], "fmu-needs-global"),
+        (["--model", "mf61", "--model", "brush", "--fmu", "x.fmu"], "fmu-needs-global"),
+        (["--model", "mf61", "--fmu", "x.fmu", "--fmi", "1"], "fmi-version"),
+    ],
+)
+def test_an_fmu_that_cannot_be_is_refused_before_anything_is_fitted(table, tmp_path, options, rule):
+    target = tmp_path / "x.fmu"
+    with pytest.raises(ToolkitError) as caught:
+        run(fit.command, table, *(target if option == "x.fmu" else option for option in options))
+    assert caught.value.rule == rule
+    assert not target.exists()

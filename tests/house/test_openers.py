@@ -42,6 +42,8 @@ ALLOWED = {
     ("toolkit.cli.template", "read_bytes"): "data of the package",
     ("toolkit.cli.template", "read_text"): "data of the package",
     ("toolkit.workbench.assets", "read_bytes"): "data of the package",
+    ("toolkit.tires.fmu.archive", "read_text"): "data of the package",
+    ("toolkit.tires.fmu.archive", "read_bytes"): "what the compiler just wrote",
     ("toolkit.words.catalogue", "read_bytes"): "data of the package",
     ("toolkit.diagnosis.simulators.user_code", "open"): "the null device, an output",
     ("toolkit.qualification.gates.bench", "copytree"): "a registry of the qualification's own",

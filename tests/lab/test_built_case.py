@@ -102,7 +102,7 @@ def test_a_workbook_of_the_machine_is_a_case_without_a_word_typed(tmp_path: Path
 
 
 def test_another_kind_of_simulation_has_its_own_entries(folder: Path) -> None:
-    assert set(kinds()) == {"machine", "python", "ode", "columns"}
+    assert set(kinds()) == {"machine", "python", "ode", "fmu", "columns"}
     assert state_entry(folder, "simulation.kind", "ode")
     names = {entry.name for group in open_case(folder).groups for entry in group.statements}
     assert "simulation.states" in names

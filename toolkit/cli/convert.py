@@ -28,10 +28,13 @@ NAME = "convert"
 @answers("toolkit.lab.tire_answer_types:ConvertAnswer")
 def command(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A .tir, .tdx, .csv or reduced .xlsx.")],
-    target: Annotated[Path, typer.Argument(metavar="OUT", callback=into_file, help="A .tir, .tdx or .csv.")],
+    target: Annotated[
+        Path, typer.Argument(metavar="OUT", callback=into_file, help="A .tir, .fmu, .tdx or .csv.")
+    ],
     axes: Annotated[
         str, typer.Option("--axes", help="Axes of the .csv: SAE, adapted-SAE, ISO-W, machine.")
     ] = "SAE",
+    fmi: Annotated[str, typer.Option("--fmi", help="Version of FMI of an .fmu: 2 or 3.")] = "2",
     known_at: KnownAt = None,
     draft: Draft = False,
     calibrations: Calibrations = None,
@@ -54,7 +57,7 @@ def command(
 
     started = time.perf_counter()
     resolve = partial(resolve_test, calibrations=calibrations, home=home, known_at=day(known_at), draft=draft)
-    converted = convert(source, target, axes=axes, resolve=resolve)
+    converted = convert(source, target, axes=axes, fmi=fmi, resolve=resolve)
     text = f"{target} written"
     if converted.findings:
         text += f"\n\n{findings_text(converted.findings)}"

@@ -49,6 +49,13 @@ def command(
         Path | None,
         typer.Option("--tir", callback=into_file, help="Write a tire file of mf52, mf61 or mf62."),
     ] = None,
+    fmu: Annotated[
+        Path | None,
+        typer.Option(
+            "--fmu", callback=into_file, help="Write an FMU of a model over all loads; runs without Python."
+        ),
+    ] = None,
+    fmi: Annotated[str, typer.Option("--fmi", help="Version of FMI of the FMU: 2 or 3.")] = "2",
     figures: Annotated[
         Path | None,
         typer.Option(
@@ -88,7 +95,7 @@ def command(
     """Fit tire models to a test or a table, every load by itself or all of them at once; no start values.
 
     A continuous belt test, a Tire Test Consortium .mat or a Calspan .dat, is split by
-    inclination, pressure, load and direction of its sweeps; with --tir alone mf61 is fitted to it.
+    inclination, pressure, load and direction of its sweeps; with --tir or --fmu alone mf61 is fitted to it.
 
     Example: toolkit fit tire.csv --model magic_formula --model mf61 --model brush --figures figures
     """
@@ -101,15 +108,17 @@ def command(
         model_choice,
         write_figures,
     )
+    from toolkit.lab.fmu_files import check_fmu, write_fit_fmu
     from toolkit.lab.tire_files import check_tir, write_fit
     from toolkit.publication import publication
     from toolkit.tires.field_file import is_field_file
 
     started = time.perf_counter()
     in_field_form = is_field_file(source)
-    names = model_choice(model or ["mf61" if tir is not None and in_field_form else "magic_formula"])
+    names = model_choice(model or ["mf61" if (tir or fmu) is not None and in_field_form else "magic_formula"])
     options = fit_options(loss, weights, rated_load, radius)
     into = check_tir(tir, source, names) if tir is not None else None
+    modelled = check_fmu(fmu, source, names, fmi) if fmu is not None else None
     refuse_unwritable(figures)
     if source.suffix.lower() != ".csv" and not in_field_form:
         fitted = fit_test_models(
@@ -124,6 +133,8 @@ def command(
     findings = fitted.findings
     with nullcontext() if figures is None else publication(figures) as stage:
         written = [] if stage is None else write_figures(fitted, stage)
+        if fmu is not None and modelled is not None:
+            findings += write_fit_fmu(fmu, fitted, modelled, source=source, side=side.upper(), fmi=fmi)
         if tir is not None:
             fit = next(fit for fit in fitted.globals if fit.model == into)
             findings += write_fit(
@@ -133,6 +144,7 @@ def command(
     payload: dict[str, Any] = {
         **fit_payload(fitted),
         "tir": None if tir is None else str(tir),
+        "fmu": None if fmu is None else str(fmu),
         "figures": written,
         "findings": [finding.as_dict() for finding in findings],
         "timing": {
@@ -143,6 +155,8 @@ def command(
     text = fit_text(fitted, findings)
     if tir is not None:
         text += f"\n\n{tir} written: {into}"
+    if fmu is not None:
+        text += f"\n\n{fmu} written: {modelled}, FMI {fmi}"
     if written:
         text += f"\n\n{len(written)} figures in {figures}"
     answer(payload, text, as_json=json, quiet=quiet)

@@ -19,9 +19,24 @@ if TYPE_CHECKING:
 
     Columns = dict[str, tuple[str, NDArray[np.float64]]]
 
-_KINDS = {".tir": "tir", ".csv": "csv", ".tdx": "tydex", ".tydex": "tydex", ".tyd": "tydex", ".xlsx": "test"}
-_PAIRS = {("tir", "tir"), ("tydex", "csv"), ("csv", "tydex"), ("test", "csv"), ("test", "tydex")}
-_WAYS = ".tir to .tir; .tdx to .csv; .csv to .tdx; a reduced test .xlsx to .csv or .tdx"
+_KINDS = {
+    ".tir": "tir",
+    ".fmu": "fmu",
+    ".csv": "csv",
+    ".tdx": "tydex",
+    ".tydex": "tydex",
+    ".tyd": "tydex",
+    ".xlsx": "test",
+}
+_PAIRS = {
+    ("tir", "tir"),
+    ("tir", "fmu"),
+    ("tydex", "csv"),
+    ("csv", "tydex"),
+    ("test", "csv"),
+    ("test", "tydex"),
+}
+_WAYS = ".tir to .tir or .fmu; .tdx to .csv; .csv to .tdx; a reduced test .xlsx to .csv or .tdx"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,13 +48,16 @@ class Converted:
     use: CalibrationUse | None = None
 
 
-def convert(source: Path, target: Path, *, axes: str, resolve: Callable[[Path], Resolved]) -> Converted:
+def convert(
+    source: Path, target: Path, *, axes: str, resolve: Callable[[Path], Resolved], fmi: str = "2"
+) -> Converted:
     """Write a file in another format.
 
     Parameters
     ----------
     axes : of a .csv, read or written
     resolve : reads a reduced test (`lab.resolve`)
+    fmi : version of FMI of an .fmu, 2 or 3
 
     Raises
     ------
@@ -48,6 +66,7 @@ def convert(source: Path, target: Path, *, axes: str, resolve: Callable[[Path], 
     """
     from toolkit.channels import AXES
     from toolkit.errors import ConfigError
+    from toolkit.lab.fmu_files import file_fmu
     from toolkit.publication import write_result
 
     if axes not in AXES:
@@ -57,8 +76,11 @@ def convert(source: Path, target: Path, *, axes: str, resolve: Callable[[Path], 
         )  # fmt: skip
     kinds = _kinds(source, target)
     use: CalibrationUse | None = None
+    text: str | bytes
     if kinds == ("tir", "tir"):
         text, findings = _tir(source)
+    elif kinds == ("tir", "fmu"):
+        text, findings = file_fmu(source, target, fmi=fmi)
     else:
         resolved = resolve(source) if kinds[0] == "test" else None
         use = None if resolved is None else resolved.result.reduced.calibration

@@ -228,6 +228,7 @@ class FitAnswer(FittedModels):
     """Tire models fitted to a test or a table, and what was written."""
 
     tir: Annotated[str | None, "tire file that was written"]
+    fmu: Annotated[str | None, "FMU that was written"]
     figures: Annotated[list[str], "files that were written"]
     findings: list[FindingEntry]
     timing: Timing

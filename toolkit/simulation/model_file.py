@@ -32,8 +32,9 @@ FILES = ("tire", "path", "calibration", "machine")
 _TOP = "schema content title code_version axes time nominal_load_N answer simulation channels effect".split()
 _ANSWER = ("verdict", "remaining", "complete", "case", "case_sha256", "recordings")
 _SIMULATION = (
-    "kind machine calibration tire path function states force_terms simulated parameters sha256".split()
-)
+    "kind machine calibration tire path function states force_terms simulated inputs outputs step_s "
+    "parameters sha256"
+).split()
 _EFFECT = (
     "name stage statement equation channel source runs condition nuisance equivalent_to parameters numerics"
 ).split()

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.tires.recorded import as_array
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -27,8 +29,8 @@ def slips(rows: Rows, turned: ArrayLike = 0.0) -> tuple[Array, Array]:
     ``turned`` [rad] is an equivalent slip angle (plysteer, camber). Angles are limited to 89 deg.
     """
     rolling = np.maximum(np.abs(1.0 + rows.KAPPA), _LOCKED)
-    angle = np.clip(rows.SA + np.asarray(turned), -_ANGLE, _ANGLE)
-    return np.asarray(rows.KAPPA / rolling), np.asarray(np.tan(angle) / rolling)
+    angle = np.clip(rows.SA + as_array(turned), -_ANGLE, _ANGLE)
+    return as_array(rows.KAPPA / rolling), as_array(np.tan(angle) / rolling)
 
 
 def directed(sx: Array, sy: Array) -> tuple[Array, Array, Array]:
@@ -44,7 +46,7 @@ def with_load(base: Any, change: Any, dfz: Array, bend: Any = 0.0) -> Array:
     >>> float(with_load(2.0, -0.1, np.array(0.0)))
     2.0
     """
-    return np.asarray(base * np.exp(change * dfz + bend * dfz**2))
+    return as_array(base * np.exp(change * dfz + bend * dfz**2))
 
 
 def half_length(base: Any, exponent: Any, rows: Rows) -> Array:
@@ -52,7 +54,7 @@ def half_length(base: Any, exponent: Any, rows: Rows) -> Array:
 
     The deflection of a tire is about proportional to its load and the patch is a chord: exponent 1/2.
     """
-    return np.asarray(base * np.power(rows.FZ / rows.FNOMIN, exponent))
+    return as_array(base * np.power(rows.FZ / rows.FNOMIN, exponent))
 
 
 def bulged(u: ArrayLike, exponent: ArrayLike, skew: ArrayLike) -> Array:
@@ -61,5 +63,5 @@ def bulged(u: ArrayLike, exponent: ArrayLike, skew: ArrayLike) -> Array:
     Exponent 2 is the parabola of the brush model, a large one a uniform pressure; skew > 0 moves the load
     towards the leading edge (|skew| < 1 keeps it positive).
     """
-    u = np.asarray(u)
-    return np.asarray((1.0 - np.power(np.abs(u), exponent)) * (1.0 + np.asarray(skew) * u))
+    u = as_array(u)
+    return as_array((1.0 - np.power(np.abs(u), exponent)) * (1.0 + as_array(skew) * u))

@@ -16,6 +16,7 @@ import numpy as np
 
 from toolkit.tires.mf61 import Lateral
 from toolkit.tires.mf_combined import Forces, arm, equivalent, kappa_force, longitudinal, weight_x, weight_y
+from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def side(p: Mapping[str, float], q: State) -> Lateral:
     """Return FY [N] of pure slip at a state (4.E19 to 4.E30)."""
     c, s = readers(p)
     FZ, F0, df, g = q.FZ, q.F0, q.df, q.g * s("LGAY")
-    K = c("PKY1") * F0 * np.sin(2 * np.arctan(FZ / nonzero(np.asarray(c("PKY2") * F0))))
+    K = c("PKY1") * F0 * np.sin(2 * np.arctan(FZ / nonzero(as_array(c("PKY2") * F0))))
     K = nonzero(K * (1 - c("PKY3") * np.abs(g)) * s("LKY"))
     Sh = (c("PHY1") + c("PHY2") * df) * s("LHY") + c("PHY3") * g
     Sv = FZ * ((c("PVY1") + c("PVY2") * df) * s("LVY") + (c("PVY3") + c("PVY4") * df) * g) * q.mu_y
@@ -72,4 +73,4 @@ def _moment(
     Dr = (c("QDZ6") + c("QDZ7") * df) * s("LRES") + (c("QDZ8") + c("QDZ9") * df) * g
     turned = equivalent(q.a + lateral.residual_shift, ratio, q.kappa)
     residual = FZ * UNLOADED_RADIUS * q.mu_y * Dr * np.cos(np.arctan(Br * turned)) * q.cosine
-    return np.asarray(residual - trail * FY)
+    return as_array(residual - trail * FY)

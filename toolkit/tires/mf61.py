@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.tires.mf_combined import Forces, arm, equivalent, kappa_force, longitudinal, weight_x, weight_y
+from toolkit.tires.recorded import as_array, may_differ_from_zero
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine, state
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def forces(p: Mapping[str, float], q: State, *, UNLOADED_RADIUS: float) -> Force
     reduced = weight_y(p, q) * leaned.FY
     FY = reduced + kappa_force(p, q, leaned.friction)
     # Without camber the upright tire is the tire itself: half of the work.
-    upright = weight_y(p, q.upright()) * side(p, q.upright()).FY if np.any(q.g) else reduced
+    upright = weight_y(p, q.upright()) * side(p, q.upright()).FY if may_differ_from_zero(q.g) else reduced
     MZ = _moment(p, q, leaned, FY=upright, ratio=pure.K / leaned.K, UNLOADED_RADIUS=UNLOADED_RADIUS)
     MZ = MZ + arm(p, q, FY=FY, UNLOADED_RADIUS=UNLOADED_RADIUS) * FX
     return Forces(FX=FX, FY=FY, MZ=MZ)
@@ -140,4 +141,4 @@ def _moment(
     Dr = FZ * UNLOADED_RADIUS * q.mu_y
     Dr = Dr * ((c("QDZ6") + c("QDZ7") * df) * s("LRES") + camber * g * s("LKZC"))
     turned = equivalent(q.a + leaned.residual_shift, ratio, q.kappa)
-    return np.asarray(Dr * np.cos(np.arctan(Br * turned)) * q.cosine - trail * FY)
+    return as_array(Dr * np.cos(np.arctan(Br * turned)) * q.cosine - trail * FY)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def kappa_force(p: Mapping[str, float], q: State, friction: Array) -> Array:
     """Return S_Vyk [N], the side force that kappa induces (4.E66, 4.E67); ``friction`` is mu_y Fz [N]."""
     c, s = readers(p)
     D = friction * (c("RVY1") + c("RVY2") * q.df + c("RVY3") * q.g) * np.cos(np.arctan(c("RVY4") * q.a))
-    return np.asarray(D * np.sin(c("RVY5") * np.arctan(c("RVY6") * q.kappa)) * s("LVYKA"))
+    return as_array(D * np.sin(c("RVY5") * np.arctan(c("RVY6") * q.kappa)) * s("LVYKA"))
 
 
 def equivalent(slip: Array, ratio: Array, kappa: Array) -> Array:

@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from toolkit.tires.recorded import as_array
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -92,8 +94,8 @@ def state(
     V0 : the file's LONGVL [m/s]; with it and LMUV (4.E7) friction falls with the slip speed
     """
     s = Reader(p, 1.0)
-    angle, load, camber = (np.asarray(column, dtype=np.float64) for column in (SA, FZ, IA))
-    speed, kappa = np.asarray(V, dtype=np.float64), np.asarray(KAPPA, dtype=np.float64)
+    angle, load, camber = (as_array(column, np.float64) for column in (SA, FZ, IA))
+    speed, kappa = as_array(V, np.float64), as_array(KAPPA, np.float64)
     a = np.tan(angle) if angles == "star" else angle
     F0 = FNOMIN * s("LFZO")
     # LMUV is the one scale that is off when it is absent: it divides by 1 + LMUV Vs / V0.
@@ -110,7 +112,7 @@ def state(
         FZ=load,
         F0=F0,
         df=(load - F0) / F0,
-        dp=np.asarray(pressure_change, dtype=np.float64),
+        dp=as_array(pressure_change, np.float64),
         mu_x=s("LMUX") * fade,
         mu_y=s("LMUY") * fade,
     )

@@ -73,15 +73,15 @@ def evaluate_tir(
         )  # fmt: skip
     version = tir.version
     p = tir.coefficients()
-    FNOMIN, radius = _positive(tir, "FNOMIN"), _positive(tir, "UNLOADED_RADIUS")
+    FNOMIN, radius = positive(tir, "FNOMIN"), positive(tir, "UNLOADED_RADIUS")
     speed = si_number(tir, "LONGVL", 0.0) or None
     change, findings = _pressure_change(tir, version, P)
     with np.errstate(all="ignore"):
-        q = state(
-            p, SA=SA, FZ=FZ, FNOMIN=FNOMIN, IA=IA, KAPPA=KAPPA, pressure_change=change,
-            V=(speed or 1.0) if V is None else V, V0=speed if version == "6.x" else None, angles=angles,
+        responses = forces_of(
+            version, p, SA=SA, FZ=FZ, IA=IA, KAPPA=KAPPA, pressure_change=change,
+            V=(speed or 1.0) if V is None else V, LONGVL=speed, FNOMIN=FNOMIN, UNLOADED_RADIUS=radius,
+            angles=angles,
         )  # fmt: skip
-        responses = (mf52 if version == "5.2" else mf61).forces(p, q, UNLOADED_RADIUS=radius)
     FX, FY, MZ, _ = np.broadcast_arrays(
         responses.FX, responses.FY, responses.MZ, np.asarray(SA, dtype=np.float64)
     )
@@ -92,7 +92,35 @@ def evaluate_tir(
     return result, tuple(findings)
 
 
-def _positive(tir: TirFile, key: str) -> float:
+def forces_of(
+    version: str,
+    p: Mapping[str, float],
+    *,
+    SA: ArrayLike,
+    FZ: ArrayLike,
+    IA: ArrayLike,
+    KAPPA: ArrayLike,
+    pressure_change: ArrayLike,
+    V: ArrayLike,
+    LONGVL: float | None,
+    FNOMIN: float,
+    UNLOADED_RADIUS: float,
+    angles: Angles = "star",
+) -> Forces:
+    """Return the forces of coefficients of ``5.2`` or ``6.x``, ISO-W, SI; the whole way from slips to them.
+
+    ``pressure_change`` is (P - NOMPRES) / NOMPRES, ``LONGVL`` None where the file has none.
+    """
+    q = state(
+        p, SA=SA, FZ=FZ, FNOMIN=FNOMIN, IA=IA, KAPPA=KAPPA, pressure_change=pressure_change, V=V,
+        V0=LONGVL if version == "6.x" else None, angles=angles,
+    )  # fmt: skip
+    forces = mf52.forces if version == "5.2" else mf61.forces
+    return forces(p, q, UNLOADED_RADIUS=UNLOADED_RADIUS)
+
+
+def positive(tir: TirFile, key: str) -> float:
+    """Return an entry in SI; ConfigError where it is absent or not above zero."""
     value = si_number(tir, key)
     if value <= 0:
         raise ConfigError(

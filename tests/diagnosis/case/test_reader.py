@@ -69,7 +69,7 @@ def test_a_word_that_is_not_known_names_the_nearest_one(tmp_path, old, new, what
         ("schema = 1", "", "schema = 1", "schema"),
         ('title = "A carriage"', 'title = ["x"]', "a text", "title"),
         ('kind = "python"', "", "is missing", "simulation.kind"),
-        ('kind = "python"', 'kind = ["python"]', "machine, python, ode, columns", "simulation.kind"),
+        ('kind = "python"', 'kind = ["python"]', "machine, python, ode, fmu, columns", "simulation.kind"),
         ('kind = "python"', 'kind = "ode"', "unknown key 'function'", "simulation"),
         ('path = "sim.py"', "", "is missing", "simulation.path"),
         ('path = "sim.py"', "path = 3", 'path = "FILE"', "simulation.path"),

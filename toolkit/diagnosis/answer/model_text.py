@@ -113,7 +113,12 @@ def _simulation(case: Case, search: Search, folder: Path) -> list[str]:
         entries["function"] = simulation.function
     if simulation.states:
         entries["states"] = list(simulation.states)
-    for key, pairs in (("force_terms", simulation.force_terms), ("simulated", simulation.simulated)):
+    if simulation.step_s is not None:
+        entries["step_s"] = simulation.step_s
+    for key, pairs in (
+        ("force_terms", simulation.force_terms), ("simulated", simulation.simulated),
+        ("inputs", simulation.fmu_inputs), ("outputs", simulation.fmu_outputs),
+    ):  # fmt: skip
         if pairs:
             entries[key] = dict(pairs)
     lines = ["", "[simulation]", *toml_lines(entries)]

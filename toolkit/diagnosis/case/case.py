@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from toolkit.simulation.model_file import FittedEffect
 
 Role = Literal["time", "input", "output", "covariate"]
-Kind = Literal["machine", "python", "ode", "columns"]
+Kind = Literal["machine", "python", "ode", "fmu", "columns"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
@@ -72,6 +72,9 @@ class Simulation:
     states: tuple[str, ...] = ()
     force_terms: tuple[tuple[str, str], ...] = ()
     simulated: tuple[tuple[str, str], ...] = ()
+    fmu_inputs: tuple[tuple[str, str], ...] = ()
+    fmu_outputs: tuple[tuple[str, str], ...] = ()
+    step_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,7 +112,7 @@ class Case:
         return tuple(channel for channel in self.channels if channel.role in ("input", "covariate"))
 
     def file(self) -> Path:
-        """Return the simulator's file; kinds ``python`` and ``ode`` always have one."""
+        """Return the simulator's file; kinds ``python``, ``ode`` and ``fmu`` always have one."""
         return self.simulation.path or self.path
 
     def channel(self, name: str) -> CaseChannel:

@@ -12,6 +12,7 @@ from toolkit.diagnosis.case.case import CaseChannel
 from toolkit.diagnosis.case.simulation import (
     FORMAT,
     ColumnsSimulation,
+    FmuSimulation,
     MachineSimulation,
     ModelSimulation,
     OdeSimulation,
@@ -129,7 +130,7 @@ class CaseFile(_CaseEntries):
     FORMAT: ClassVar[Format] = FORMAT
 
     simulation: Annotated[
-        MachineSimulation | PythonSimulation | OdeSimulation | ColumnsSimulation,
+        MachineSimulation | PythonSimulation | OdeSimulation | FmuSimulation | ColumnsSimulation,
         Entry("what is to be judged"),
     ]
 

@@ -38,6 +38,9 @@ def simulation_of(model: ModelFile) -> Simulation:
         states=tuple(entries.get("states", ())),
         force_terms=tuple(dict(entries.get("force_terms", {})).items()),
         simulated=tuple(dict(entries.get("simulated", {})).items()),
+        fmu_inputs=tuple(dict(entries.get("inputs", {})).items()),
+        fmu_outputs=tuple(dict(entries.get("outputs", {})).items()),
+        step_s=float(entries["step_s"]) if "step_s" in entries else None,
     )
 
 

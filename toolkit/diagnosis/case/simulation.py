@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from toolkit.declared import Distinct, Entry, Format, Keyed, Size, Text, UnitName
+from toolkit.declared import Above, Distinct, Entry, Format, Keyed, Size, Text, Unit, UnitName
 from toolkit.diagnosis.case.case import Kind, Simulation
 from toolkit.diagnosis.case.model_file import parameters_of, simulation_of, tire_model
 from toolkit.machine.default import DEFAULT_MACHINE
@@ -87,6 +87,38 @@ class OdeSimulation:
         """Return the equation with its path from here."""
         simulation = Simulation(
             kind=self.kind, path=path.parent / self.path, states=self.states, force_terms=self.force_terms
+        )
+        return simulation, self.parameters, None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FmuSimulation:
+    """A co-simulation unit of FMI 2 or 3; parameters are its own by name."""
+
+    kind: Literal["fmu"]
+    path: Annotated[Path, Entry("of the unit", example="plant.fmu", expected='path = "FILE.fmu"')]
+    inputs: Annotated[
+        tuple[tuple[str, str], ...], Keyed(),
+        Entry("column of each variable; those of one name need none", example={"alpha": "SA"}),
+    ] = ()  # fmt: skip
+    outputs: Annotated[
+        tuple[tuple[str, str], ...], Keyed(),
+        Entry("variable of each output; those of one name need none", example={"FY": "tire.Fy"}),
+    ] = ()  # fmt: skip
+    step_s: Annotated[
+        float | None, Unit("s"), Above(0),
+        Entry("longest communication step; without it row to row", key="step"),
+    ] = None  # fmt: skip
+    parameters: _Parameters = ()
+
+    def resolve(self, path: Path) -> Resolved:
+        """Return the unit with its path from here."""
+        simulation = Simulation(
+            kind=self.kind,
+            path=path.parent / self.path,
+            fmu_inputs=self.inputs,
+            fmu_outputs=self.outputs,
+            step_s=self.step_s,
         )
         return simulation, self.parameters, None
 

@@ -26,6 +26,7 @@ import numpy as np
 from toolkit.tires.contact import directed, half_length, slips, with_load
 from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
 from toolkit.tires.parameter_table import CAMBER, OFFSETS, SHIFT, parameters
+from toolkit.tires.recorded import as_array
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,7 +89,7 @@ def filled(growth: Any, front: Any, rear: Any) -> tuple[Array, Array]:
     """
     node, weight = np.polynomial.legendre.leggauss(_NODES)
     node, weight = 0.5 * (node + 1), 0.5 * weight
-    K, f, r = (np.asarray(array)[..., None] for array in (growth, front, rear))
+    K, f, r = (as_array(array)[..., None] for array in (growth, front, rear))
     flat = 1.0 - f - r
     t = np.concatenate(np.broadcast_arrays(f * node, f + flat * node, 1 - r * node), axis=-1)
     # The rise and the fall are linear in their own coordinate, which is 0 at the outer edge.

@@ -28,6 +28,7 @@ import numpy as np
 
 from toolkit.tires.global_model import GlobalModel, Responses
 from toolkit.tires.parameter_table import parameters
+from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import nonzero, sine
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def lateral(a: Sequence[Any], F: Array, slip: Array, g: Array) -> Array:
     x = slip + a[8] * F + a[9] + a[10] * g
     E = (a[6] * F + a[7]) * (1 - (a[16] * g + a[17]) * np.sign(x))
     V = a[11] * F + a[12] + (a[13] * F + a[14]) * g * F
-    return np.asarray(D * sine(BCD / nonzero(a[0] * D), a[0], np.minimum(E, 1.0), x) + V)
+    return as_array(D * sine(BCD / nonzero(a[0] * D), a[0], np.minimum(E, 1.0), x) + V)
 
 
 def aligning(c: Sequence[Any], F: Array, slip: Array, g: Array) -> Array:
@@ -112,7 +113,7 @@ def aligning(c: Sequence[Any], F: Array, slip: Array, g: Array) -> Array:
     E = (c[7] * F * F + c[8] * F + c[9]) * (1 - (c[19] * g + c[20]) * np.sign(x))
     E = np.minimum(E / np.maximum(1 - c[10] * np.abs(g), 0.05), 1.0)
     V = c[14] * F + c[15] + (c[16] * F * F + c[17] * F) * g
-    return np.asarray(D * sine(BCD / nonzero(c[0] * D), c[0], E, x) + V)
+    return as_array(D * sine(BCD / nonzero(c[0] * D), c[0], E, x) + V)
 
 
 def starts(seeds: Seeds) -> Sequence[Mapping[str, float]]:

@@ -1,0 +1,1 @@
+"""Tires as FMU."""
