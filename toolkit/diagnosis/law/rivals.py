@@ -22,12 +22,12 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
     """Return a search and its laws, or laws alone where these have fewer parameters and foretell as well.
 
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
-    stand beside effects, and where these leave more than the sensor's noise: coloured noise takes up the
-    rest, and no structure shows. What has a name keeps it against a formula that says the same.
+    stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
+    there rings, coloured noise takes it up, and no structure shows. What has a name keeps it against a
+    formula that says the same.
     """
-    parts = [noise_parts(search.problem, search.augmented, name) for name in search.problem.names]
     predicting = any(law.predicts for law in laws.listed)
-    asked = predicting or any(each.process_sd > each.sensor_sd for each in parts)
+    asked = predicting or _leaves_process_noise(search)
     beside = any(step.active.key == applied.key for step in search.steps for applied in laws.fit.active)
     if not beside or not asked or not laws.complete:
         return search, laws
@@ -44,6 +44,15 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
         structure=search.structure_before,
     )  # fmt: skip
     return bare, alone
+
+
+def _leaves_process_noise(search: Search) -> bool:
+    """Tell whether an equation with the effects found leaves more than its sensors' noise."""
+    motion = search.problem.model.capability.motion
+    if motion is None or not motion.integrates:
+        return False
+    parts = [noise_parts(search.problem, search.augmented, name) for name in search.problem.names]
+    return any(each.process_sd > each.sensor_sd for each in parts)
 
 
 def _same(search: Search, alone: Laws) -> bool:
