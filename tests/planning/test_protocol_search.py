@@ -81,6 +81,20 @@ def test_a_time_that_holds_no_curve_is_refused_with_the_least_that_does() -> Non
     assert f"{math.ceil(10 * PACE.minutes(smallest)) / 10} min" in str(error.value.expected)
 
 
+def test_a_demand_at_a_slip_angle_keeps_it_beside_demands_that_would_do_without() -> None:
+    found = least_plan(question("FY@5deg=200 N", "conicity", "slope_cornering=3 %"), PACE)
+    assert 5.0 in np.round(np.degrees(found.design.slip_angles_rad), 9)
+    assert found.worst <= 1
+    assert {reach.demand.label for reach in found.reaches} == {"FY@5deg", "conicity", "slope_cornering"}
+
+
+def test_a_demand_at_a_slip_angle_that_no_test_measures_is_refused() -> None:
+    with pytest.raises(ConfigError) as error:
+        question("FY@5.3deg=200 N")
+    assert error.value.rule == "plan-demand"
+    assert ", 5, " in str(error.value.expected)
+
+
 def test_further_loads_are_tried_the_nearest_first() -> None:
     asked = question("conicity", loads=LOADS[2:3])
     sets = load_sets(asked)

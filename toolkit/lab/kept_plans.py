@@ -77,6 +77,13 @@ def read_plan(folder: Path) -> KeptPlan:
     )  # fmt: skip
 
 
+def titles_of(kept: KeptPlan) -> dict[str, str]:
+    """Return what the characteristics of a test's plan are called, by the names of its demands."""
+    from toolkit.planning.printed_units import title_of
+
+    return {value["name"]: title_of(value["name"]) for value in kept.answer.get("values", ())}
+
+
 def plan_words(
     home: Path, kind: PlanKind, form: Mapping[str, str], subject: str | None, template: str | None
 ) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.estimate import round_uncertainty
+from toolkit.planning.printed_units import title_of
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.planning.interval import IntervalPlan, IntervalRisk
     from toolkit.planning.next_run_plan import NextRunPlan
-    from toolkit.planning.protocol_plan import ProtocolPlan
+    from toolkit.planning.printed_units import PrintedUnits
+    from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template
 
@@ -70,7 +72,7 @@ def operator_steps(plan: SessionPlan) -> Iterator[tuple[str, str, PlannedLoad | 
     """Yield the operator's steps of a session: run, what to do, and the load that is then on."""
     run, mount = 0, ""
     for row in (*plan.rows, *plan.check):
-        name = str(row.run) if row.run <= plan.runs else "check"
+        name = str(row.run) if row.run <= plan.runs else "check loads"
         if row.run != run:
             yield name, "preload to the largest load and back; rest; read the zeros", None
             run, mount = row.run, ""
@@ -79,7 +81,7 @@ def operator_steps(plan: SessionPlan) -> Iterator[tuple[str, str, PlannedLoad | 
             mount = row.mount
         way = "from below" if row.direction == "up" else "from above"
         yield name, f"{row.label}, {way}" if row.mount else f"no load, {way}", row
-    yield "check", "read the zeros", None
+    yield "check loads", "read the zeros", None
 
 
 def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date) -> PlanSheet:
@@ -118,10 +120,12 @@ def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date)
     )  # fmt: skip
 
 
-def protocol_sheet(plan: ProtocolPlan, issued: dt.date) -> PlanSheet:
+def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> PlanSheet:
     """Return the sheet of a test: a step is a recording, which runs through all loads."""
     design, own = plan.plan, plan.protocol
-    loads = f"{', '.join(f'{load:.0f}' for load in design.loads_N)} N"
+    force = _dotted(units.force)
+    sizes = (units.shown(load, "N")[0] for load in design.loads_N)
+    loads = f"{', '.join(f'{size:.0f}' for size in sizes)} {force}"
     record = "" if plan.calibration is None else f", {plan.calibration}"
     return PlanSheet(
         kind="test",
@@ -132,13 +136,7 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date) -> PlanSheet:
         f"minutes in place of {own.minutes:.1f}.",
         issued=issued,
         uncertainties=tuple(
-            Expected(
-                quantity=value.name, at=f"{value.load_N:.0f} N", unit=_dotted(value.unit),
-                reference="-" if value.protocol_U is None else round_uncertainty(value.protocol_U),
-                asked=round_uncertainty(value.demanded_U), expected=round_uncertainty(value.planned_U),
-                span=f"{round_uncertainty(value.planned_U_low)} to {round_uncertainty(value.planned_U_high)}",
-            )
-            for value in plan.values
+            _expected(value, units) for value in plan.values
         ),
         steps=tuple(
             Step(run=rotation, action=f"slip angle {angle:g} deg", applied=loads)
@@ -148,6 +146,21 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date) -> PlanSheet:
         assumptions=plan.assumptions,
         gives_up=plan.gives_up,
     )  # fmt: skip
+
+
+def _expected(value: PlannedValue, units: PrintedUnits) -> Expected:
+    def U(size: float) -> str:
+        return round_uncertainty(units.shown(size, value.unit)[0])
+
+    return Expected(
+        quantity=title_of(value.name),
+        at="{:.0f} {}".format(*units.shown(value.load_N, "N")),
+        unit=_dotted(units.shown(value.planned_U, value.unit)[1]),
+        reference="-" if value.protocol_U is None else U(value.protocol_U),
+        asked=U(value.demanded_U),
+        expected=U(value.planned_U),
+        span=f"{U(value.planned_U_low)} – {U(value.planned_U_high)}",
+    )
 
 
 def next_sheet(plan: NextRunPlan, plots: Sequence[Plot], issued: dt.date) -> PlanSheet:
@@ -185,13 +198,15 @@ def interval_sheet(
 
     risks = sorted({*plan.risks, plan.chosen}, key=lambda risk: risk.days)
     inside = f"{100 * (1 - plan.chosen.beyond):.1f} %"
+    load, _, check_load = plan.limiting.partition(" at ")
+    limiting = f"{load} by the check load {check_load}"
     return PlanSheet(
         kind="interval",
         subject=instrument,
-        basis=f"{record}: {plan.readings} readings of {plan.limiting}",
+        basis=f"{record}: {plan.readings} readings of {limiting}",
         size=f"{plan.days} days",
         summary=f"After {plan.chosen.days} days inside the tolerance with a chance of {inside}; asked for: "
-        f"{100 * plan.reliability:g} %. {plan.limiting} drifts most.",
+        f"{100 * plan.reliability:g} %. {limiting} drifts most.",
         issued=issued,
         risks=tuple(
             (str(risk.days), f"{100 * risk.beyond:.1f}", f"{risk.sessions_a_year:.2g}",

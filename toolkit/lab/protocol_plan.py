@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from toolkit.lab.resolve import Resolved
     from toolkit.machine import Machine
     from toolkit.planning.expectation import EarlierTest
+    from toolkit.planning.printed_units import PrintedUnits
     from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
     from toolkit.report.word.package import Template
     from toolkit.simulation.plan import Plan
@@ -69,6 +70,7 @@ def plan_test(
     from toolkit.machine import load_machine
     from toolkit.planning.demands import parse_demand
     from toolkit.planning.design import pace_of
+    from toolkit.planning.printed_units import units_of
     from toolkit.planning.protocol_plan import plan_protocol
 
     demands = tuple(dict.fromkeys(parse_demand(text) for text in order.demands or DEMANDS))
@@ -84,11 +86,12 @@ def plan_test(
     if not plan.feasible:
         raise _infeasible(plan, order.minutes)
     payload: dict[str, Any] = answer(plan) | {"out": out, "files": {}, "findings": []}
+    units = units_of(own.protocol)
     if out is not None:
         payload["files"] = {"protocol": PROTOCOL, "simulation": SIMULATION}
-        sheet = protocol_sheet(plan, date.today())  # noqa: DTZ011
+        sheet = protocol_sheet(plan, date.today(), units)  # noqa: DTZ011
         payload |= write_plan(_files(plan, own, tire, out), out, sheet, template, payload)
-    return payload, plan_text(plan, payload["files"]) + sheet_text(payload)
+    return payload, plan_text(plan, payload["files"], units) + sheet_text(payload)
 
 
 def _refuse_doubled(labels: Sequence[str]) -> None:
@@ -269,29 +272,43 @@ def _files(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> di
     }
 
 
-def plan_text(plan: ProtocolPlan, files: dict[str, str]) -> str:
+def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) -> str:
     """Return a plan for people: what to measure, what it reaches, what it rests on and gives up."""
     from toolkit.estimate import plus_minus, round_uncertainty
     from toolkit.lab.answers import table
+    from toolkit.planning.printed_units import title_of
 
     own, design = plan.protocol, plan.plan
 
-    def U(value: float | None) -> str:
-        return "" if value is None else round_uncertainty(value)
+    def row(value: PlannedValue) -> list[str]:
+        def U(size: float | None) -> str:
+            return "" if size is None else round_uncertainty(units.shown(size, value.unit)[0])
 
-    rows = [
-        [value.name, f"{value.load_N:.0f}", f"{plus_minus(value.value, value.planned_U)} {value.unit}",
-         U(value.demanded_U), f"{U(value.planned_U_low)} to {U(value.planned_U_high)}", U(value.protocol_U),
-         U(value.same_time_U)]
-        for value in plan.values
-    ]  # fmt: skip
-    head = ["", "FZ [N]", "expected, ± U", "U demanded", "U, how sure", "U by protocol", "U in its time"]
+        size, unit = units.shown(value.value, value.unit)
+        return [
+            title_of(value.name), f"{units.shown(value.load_N, 'N')[0]:.0f}",
+            f"{plus_minus(size, units.shown(value.planned_U, value.unit)[0])} {unit}", U(value.demanded_U),
+            f"{U(value.planned_U_low)} to {U(value.planned_U_high)}", U(value.protocol_U),
+            U(value.same_time_U),
+        ]  # fmt: skip
+
+    rows = [row(value) for value in plan.values]
+    head = [
+        "",
+        f"FZ [{units.force}]",
+        "expected, ± U",
+        "U demanded",
+        "U, how sure",
+        "U by protocol",
+        "U in its time",
+    ]
     directions = " and ".join(design.rotations)
+    loads = [units.shown(load, "N")[0] for load in design.loads_N]
     lines = [
         f"{design.rows} rows in {design.minutes:.1f} min: {len(design.slip_angles_deg)} slip angles at "
         f"{len(design.loads_N)} loads, drum {directions}",
         f"  slip angles  {', '.join(f'{angle:g}' for angle in design.slip_angles_deg)} deg, in this order",
-        f"  loads        {', '.join(f'{load:.0f}' for load in design.loads_N)} N",
+        f"  loads        {', '.join(f'{load:.0f}' for load in loads)} {units.force}",
         f"  like         {plan.like}"
         + (f", record {plan.calibration}" if plan.calibration is not None else ""),
         "",

@@ -13,10 +13,10 @@ from toolkit.channels import Rotation
 from toolkit.declared import Entry, toml_text
 from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, Pace, ordered, standard
+from toolkit.planning.printed_units import PrintedUnits, units_of
 from toolkit.planning.protocol_search import Found, ProtocolSearch, Question, least_plan
 from toolkit.planning.reach import Reach
 from toolkit.tires.fit import MIN_POINTS
-from toolkit.units import from_si
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine, Protocol
@@ -102,6 +102,7 @@ def plan_protocol(
     ConfigError
         ``plan-infeasible``: the time does not hold the smallest design
     """
+    units = units_of(own.protocol)
     protocol = protocol_design(earlier, own)
     question = Question.beside(protocol, earlier=earlier, demands=demands, loads_N=loads_N)
     tell("the protocol")
@@ -123,8 +124,8 @@ def plan_protocol(
         alike=None if alike is None or alike.worst > 1 else _shown(alike.design, alike.minutes),
         same_time=None if same_time is None else _shown(same_time.design, same_time.minutes),
         values=_values(question, found, of_protocol, same_time),
-        assumptions=_assumptions(earlier, pace),
-        gives_up=_gives_up(found.design, protocol),
+        assumptions=_assumptions(earlier, pace, units),
+        gives_up=_gives_up(found.design, protocol, units),
     )
 
 
@@ -184,13 +185,17 @@ def _key(reach: Reach) -> tuple[str, float]:
     return reach.demand.label, reach.load_N
 
 
-def _assumptions(earlier: EarlierTest, pace: Pace) -> tuple[str, ...]:
+def _assumptions(earlier: EarlierTest, pace: Pace, units: PrintedUnits) -> tuple[str, ...]:
+    def scatter(place: int, unit: str) -> str:
+        size, printed = units.shown(math.sqrt(earlier.variances[place]), unit)
+        return f"{size:.2g} {printed.replace('*', '·')}"
+
     angle = math.degrees(math.sqrt(earlier.variances[3]))
     statements = [
         "the tire is like that of the earlier test: its curves say where the slip angles are needed",
         "blocks scatter about the curves as in that test: "
-        f"{math.sqrt(earlier.variances[0]):.2g} N in FY, {math.sqrt(earlier.variances[1]):.2g} N·m in MZ, "
-        f"{math.sqrt(earlier.variances[2]):.2g} N in the load and {angle:.2g} deg in the slip angle (1 sd), "
+        f"{scatter(0, 'N')} in FY, {scatter(1, 'N*m')} in MZ, {scatter(2, 'N')} in the load and "
+        f"{angle:.2g} deg in the slip angle (one standard deviation), "
         f"and their loads stand {100 * earlier.load_spread:.2g} % off the common one",
         "every curve is a Magic Formula; a form that it misses shows only where residuals are left",
         "what the machine definition states of slip angle, load, pressure and zeros holds",
@@ -207,12 +212,12 @@ def _assumptions(earlier: EarlierTest, pace: Pace) -> tuple[str, ...]:
     return tuple(statements)
 
 
-def _gives_up(design: Design, protocol: Design) -> tuple[str, ...]:
+def _gives_up(design: Design, protocol: Design, units: PrintedUnits) -> tuple[str, ...]:
     lost = []
     loads = [load for load in protocol.loads_N if load not in design.loads_N]
     if loads:
-        shown = ", ".join(f"{float(from_si(load, 'lbf')):.0f}" for load in loads)
-        lost.append(f"every characteristic at {shown} lbf")
+        shown = ", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in loads)
+        lost.append(f"every characteristic at {shown} {units.force}")
     if set(design.rotations) < set(protocol.rotations):
         lost.append("the reversed runs: conicity, plysteer, CRAT and PRAT")
     steps = sorted(set(protocol.slip_angles_rad) - set(design.slip_angles_rad))
@@ -223,8 +228,8 @@ def _gives_up(design: Design, protocol: Design) -> tuple[str, ...]:
     spare, usual = (len(d.slip_angles_rad) - MIN_POINTS + 1 for d in (design, protocol))
     if spare < usual:
         lost.append(
-            f"{usual - spare} of the {usual} residual freedoms of each curve, by which a wrong block or a "
-            "curve of another form is seen"
+            f"{usual - spare} of the {usual} residual degrees of freedom of each curve, by which a wrong "
+            "block or a curve of another form is seen"
         )
     return tuple(lost)
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 # A curve that a report prints is measured to its peak, or to the end of the range: within this part of it.
 _PEAK_SHARE = 0.99
+_SAME_RAD = 1e-9
 _MOST = 30  # slip angles in each direction
 _STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
@@ -58,6 +59,7 @@ class Question:
     ) -> Question:
         """Return a question that knows what the machine's protocol reaches."""
         bare = cls(earlier=earlier, demands=demands, loads_N=loads_N)
+        bare.refuse_what_no_design_has()
         reached = {(reach.demand, reach.load_N): _ALIKE * reach.U for reach in bare.reaches(protocol)}
         return dataclasses.replace(bare, protocol_U=reached)
 
@@ -102,10 +104,39 @@ class Question:
             ]
         return np.array(rows)
 
+    @cached_property
+    def _at_angles(self) -> NDArray[np.bool_]:
+        """Which candidates are the slip angle of a demand at one: (demands at slip angles, candidates)."""
+        every = np.array(self.candidates_rad)
+        angles = [demand.SA_rad for demand in self.demands if demand.SA_rad is not None]
+        return np.asarray(np.abs(every - np.array(angles)[:, None]) < _SAME_RAD)
+
     def covers(self, points: Points) -> bool:
-        """Tell whether candidates give a curve: enough places, to the peak on either side."""
+        """Tell whether candidates give a curve: enough places, to the peak on either side, all demanded."""
         chosen = list(dict.fromkeys(points))
-        return len(chosen) >= MIN_POINTS and bool(self._at_peak[:, chosen].any(axis=1).all())
+        if len(chosen) < MIN_POINTS:
+            return False
+        needed = np.concatenate([self._at_peak, self._at_angles])
+        return bool(needed[:, chosen].any(axis=1).all())
+
+    def refuse_what_no_design_has(self) -> None:
+        """Refuse a demand at a slip angle where the machine cannot stand or the earlier test has no curve.
+
+        Raises
+        ------
+        ConfigError
+            ``plan-demand``
+        """
+        at_angles = [demand for demand in self.demands if demand.SA_rad is not None]
+        measured = [bool(places.any()) for places in self._at_angles]
+        absent = [demand for demand, known in zip(at_angles, measured, strict=True) if not known]
+        if absent:
+            steps = ", ".join(f"{math.degrees(angle):.4g}" for angle in self.candidates_rad)
+            raise ConfigError(
+                "a demand is at a slip angle that no planned test measures", where="--u",
+                got=", ".join(demand.label for demand in absent), expected=f"one of {steps} deg",
+                next_step="name one of those; nothing was written", rule="plan-demand",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -193,13 +193,14 @@ class _Finished:
     def _assumptions(self) -> tuple[str, ...]:
         knowledge, record = self.knowledge, self.knowledge.record
         between = ", ".join(
-            f"{fit.load} {own.within:.3g} within, {own.zero:.3g} zero, {own.gain:.3g} gain {fit.unit}"
+            f"{fit.load} {own.within:.3g} / {own.zero:.3g} / {own.gain:.3g} {fit.unit.replace('*', '·')}"
             for fit, own in zip(record.loads, knowledge.runs, strict=True)
         )
         told = knowledge.scatter[0].runs.groups
         return (
-            f"readings scatter as in {record.id}, runs by a standard error more: {between}"
-            + (f", from {told} runs" if told > 1 else "; one run tells nothing of the next"),
+            f"readings scatter as in {record.id}, runs by a standard error more (within a run / its zero / "
+            "its gain): "
+            f"{between}" + (f", from {told} runs" if told > 1 else "; one run tells nothing of the next"),
             f"the equations are those of {record.id}, and the cells answer as they did then",
             "readings are independent of each other but for the zero and the gain of their run",
             "what the record's budget takes from statements (reference, resolution, creep, zero) stays",
@@ -210,12 +211,12 @@ class _Finished:
     def _gives_up(self, design: Design, outlook: tuple[Outlook, ...]) -> tuple[str, ...]:
         fewer = self.knowledge.loads.rows - len(design.run)
         wider = [
-            f"{load.load} by {100 * (load.U / load.U_repeated - 1):.1f} %"
+            f"{load.load} +{100 * (load.U / load.U_repeated - 1):.1f} %"
             for load in outlook
             if load.U_repeated < load.U
         ]
         seen = ", ".join(
-            f"{load.load} {load.visible_misfit:.3g} {load.unit}"
+            f"{load.load} {load.visible_misfit:.3g} {load.unit.replace('*', '·')}"
             for load in outlook
             if load.visible_misfit is not None
         )

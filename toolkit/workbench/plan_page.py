@@ -9,7 +9,7 @@ from starlette.responses import RedirectResponse, Response
 
 from toolkit.inputs import RESULT_FILE, read_regular
 from toolkit.lab.jobs import start_job
-from toolkit.lab.kept_plans import KINDS, plan_words, read_plan
+from toolkit.lab.kept_plans import KINDS, plan_words, read_plan, titles_of
 from toolkit.lab.previews import templates_of
 from toolkit.workbench.page import page
 
@@ -53,7 +53,7 @@ def plan(request: Request) -> Response:
     kept = read_plan(folder)
     return page(
         request, "plan", kept=kept, answer=kept.answer, plan_id=plan_id,
-        chart=_risk_chart(kept.answer) if kept.kind == "interval" else None,
+        chart=_risk_chart(kept.answer) if kept.kind == "interval" else None, characteristics=titles_of(kept),
         place_of=request.app.state.bench.holdings().places["plan"][plan_id],
     )  # fmt: skip
 

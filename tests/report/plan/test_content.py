@@ -46,4 +46,7 @@ def test_a_sheet_speaks_the_language_of_its_style(language: str, title: str, ste
     assert content.tables["plan_steps"].rows[0][2] == step
     assert content.tables["plan_assumptions"].rows == ((assumed,),)
     assert content.tables["plan_uncertainties"].rows[0][3:6] == ("0,25", "0,3", "0,27")
+    assert content.tables["plan_uncertainties"].rows[0][6] == {
+        "de": "< 0,31 in 9 von 10", "fr": "< 0,31 dans 9 cas sur 10"
+    }[language]  # fmt: skip
     assert "1393,8" in str(content.tables["plan_steps"].rows[1][3])
