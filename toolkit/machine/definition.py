@@ -32,6 +32,7 @@ from toolkit.files import parse_toml
 from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine.correction import Correction
 from toolkit.machine.default import DEFAULT_MACHINE
+from toolkit.machine.hub import Hub
 from toolkit.machine.protocol import Protocol
 from toolkit.units import unit
 
@@ -46,7 +47,7 @@ _DIMENSIONS: dict[Role, tuple[str, ...]] = {
     "angle": ("angle",),
 }
 _INDICATIONS = Names(of="column.symbol", role="indication")
-_LOADS = Names("MY", *(c.symbol for c in CHANNELS.values() if c.dimension in ("force", "moment")))
+_LOADS = Names(*(c.symbol for c in CHANNELS.values() if c.dimension in ("force", "moment")))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,6 +218,9 @@ class Machine:
     cells: Annotated[
         tuple[CellPolarity, ...], Distinct("name"), Entry("signs that a cell must have", key="cell")
     ] = ()
+    hub: Annotated[
+        Hub | None, Entry("what its cells measure beside FY and MZ, where a record calibrates it")
+    ] = None
     rated_loads: Annotated[
         tuple[tuple[str, float], ...], Keyed(), Unit("N", "N*m"), Above(0),
         Entry("rated value by load", key="rated_load", example={"FY": {"value": 6000, "unit": "N"}}),
