@@ -46,6 +46,7 @@ _ALL = (
         symbol="FZ", name="normal force", si="N", dimension="force", tydex="FZW", aliases=("FZ load", "Fz")
     ),
     Channel(symbol="MX", name="overturning moment", si="N*m", dimension="moment", tydex="MXW"),
+    Channel(symbol="MY", name="rolling resistance moment", si="N*m", dimension="moment", tydex="MYW"),
     Channel(symbol="MZ", name="aligning moment", si="N*m", dimension="moment", tydex="MZW", aliases=("Mz",)),
     Channel(
         symbol="SA",
@@ -112,6 +113,21 @@ def signs(source: Axes, target: Axes, rotation: Rotation = "forward") -> dict[st
     """
     one, other = _from_sae(source, rotation), _from_sae(target, rotation)
     return {symbol: one[symbol] * other[symbol] for symbol in one}
+
+
+def hub_signs(source: Axes, rotation: Rotation = "forward") -> dict[str, int]:
+    """Return the factor (+1 or -1) of FX, FZ, MX and MY of a hub from an axis system to SAE.
+
+    As vectors: unlike an angle or slip, the hub's forces turn with the half turn of a reversed drum.
+
+    >>> hub_signs("ISO-W")
+    {'FX': 1, 'FZ': 1, 'MX': 1, 'MY': -1}
+    >>> hub_signs("machine", "reverse")
+    {'FX': -1, 'FZ': 1, 'MX': -1, 'MY': -1}
+    """
+    along = -1 if source == "machine" and rotation == "reverse" else 1
+    across = -1 if source == "ISO-W" else along
+    return {"FX": along, "FZ": 1, "MX": along, "MY": across}
 
 
 def seen_by_cells(rotation: Rotation, reversal: Reversal) -> Rotation:

@@ -20,9 +20,12 @@ from toolkit.lab.answers import (
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from toolkit.characteristics.model import Point
     from toolkit.estimate import Estimate
     from toolkit.lab.resolve import Resolved
-    from toolkit.lab.tire_answer_types import ReducedTest
+    from toolkit.lab.tire_answer_types import Condition, HubValue, ReducedTest
+    from toolkit.reduction.model import Condition as ReducedCondition
+    from toolkit.reduction.model import HubLoad
     from toolkit.report.style import Style
 
 
@@ -62,33 +65,7 @@ def process_payload(resolved: Resolved) -> ReducedTest:
             }
             for component in reduced.stated
         ],
-        "conditions": [
-            {
-                "file": c.file,
-                "rotation": c.rotation,
-                "rows": [c.first_row, c.last_row],
-                "step_SA_rad": c.step_SA,
-                "step_FZ_N": c.step_FZ,
-                "SA_rad": c.SA,
-                "FZ_N": c.FZ,
-                "FY_N": c.FY,
-                "MZ_Nm": c.MZ,
-                "u_FY_N": points[c.file, c.first_row].u_FY if c.used else None,
-                "u_FY_repeatability_N": c.u_FY,
-                "u_MZ_Nm": points[c.file, c.first_row].u_MZ if c.used else None,
-                "u_MZ_repeatability_Nm": c.u_MZ,
-                "FY_file_N": c.FY_file,
-                "MZ_file_Nm": c.MZ_file,
-                "FZ_common_N": c.FZ_common,
-                "FY_common_N": c.FY_common,
-                "MZ_common_Nm": c.MZ_common,
-                "u_FY_common_N": math.hypot(c.u_FY_common, c.u_FY_zero),
-                "u_MZ_common_Nm": math.hypot(c.u_MZ_common, c.u_MZ_zero),
-                "used": c.used,
-                "calibration_sha256": c.calibration_sha256,
-            }
-            for c in reduced.conditions
-        ],
+        "conditions": [_condition(c, points.get((c.file, c.first_row))) for c in reduced.conditions],
         "characteristics": {
             **{
                 name: [_entry(entry) for entry in entries]
@@ -109,6 +86,41 @@ def process_payload(resolved: Resolved) -> ReducedTest:
         "impossible": [finding.as_dict() for finding in reduced.impossible],
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
+
+
+def _condition(c: ReducedCondition, point: Point | None) -> Condition:
+    entry: Condition = {
+        "file": c.file,
+        "rotation": c.rotation,
+        "rows": [c.first_row, c.last_row],
+        "step_SA_rad": c.step_SA,
+        "step_FZ_N": c.step_FZ,
+        "SA_rad": c.SA,
+        "FZ_N": c.FZ,
+        "FY_N": c.FY,
+        "MZ_Nm": c.MZ,
+        "u_FY_N": point.u_FY if point is not None and c.used else None,
+        "u_FY_repeatability_N": c.u_FY,
+        "u_MZ_Nm": point.u_MZ if point is not None and c.used else None,
+        "u_MZ_repeatability_Nm": c.u_MZ,
+        "FY_file_N": c.FY_file,
+        "MZ_file_Nm": c.MZ_file,
+        "FZ_common_N": c.FZ_common,
+        "FY_common_N": c.FY_common,
+        "MZ_common_Nm": c.MZ_common,
+        "u_FY_common_N": math.hypot(c.u_FY_common, c.u_FY_zero),
+        "u_MZ_common_Nm": math.hypot(c.u_MZ_common, c.u_MZ_zero),
+        "used": c.used,
+        "calibration_sha256": c.calibration_sha256,
+    }
+    if c.hub:
+        entry["hub"] = {load.load: _hub_value(load) for load in c.hub}
+    return entry
+
+
+def _hub_value(entry: HubLoad) -> HubValue:
+    unit = CHANNELS[entry.load].si
+    return {"value": entry.value, "u": entry.u, "U": 2 * entry.u, "k": 2, "unit": unit}
 
 
 def _entry(entry: dict[str, Any]) -> dict[str, Any]:

@@ -59,6 +59,16 @@ class StatedComponent(TypedDict):
     source: str
 
 
+class HubValue(TypedDict):
+    """A calibrated load of the hub beside FY and MZ, SAE J670; MX and MY where [hub] puts them."""
+
+    value: Annotated[float, "mean of the block, by the record"]
+    u: Annotated[float, "standard uncertainty: scatter, record, zeros, arm"]
+    U: Annotated[float, "expanded uncertainty"]
+    k: Annotated[int, "coverage factor"]
+    unit: Annotated[str, "N or N*m"]
+
+
 class Condition(TypedDict):
     """The mean of one block of a recording: one slip angle under one load."""
 
@@ -84,6 +94,7 @@ class Condition(TypedDict):
     u_MZ_common_Nm: Annotated[float, "as u_FY_common_N"]
     used: Annotated[bool, "false where a later block of the same condition stands for it"]
     calibration_sha256: Annotated[str, "of the record that computed it"]
+    hub: NotRequired[Annotated[Mapping[str, HubValue], "loads of the hub by symbol, where it has any"]]
 
 
 class Budget(TypedDict):

@@ -2,12 +2,14 @@
 
 from toolkit.machine.correction import Correction
 from toolkit.machine.definition import Column, Drum, Machine, TypeB, load_machine, machine_names
+from toolkit.machine.hub import Hub
 from toolkit.machine.protocol import Protocol, read_protocol
 
 __all__ = [
     "Column",
     "Correction",
     "Drum",
+    "Hub",
     "Machine",
     "Protocol",
     "TypeB",

@@ -32,9 +32,11 @@ from toolkit.files import parse_toml
 from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine.correction import Correction
 from toolkit.machine.default import DEFAULT_MACHINE
+from toolkit.machine.hub import Hub
 from toolkit.machine.protocol import Protocol
 from toolkit.units import unit
 
+Road = Literal["convex", "concave", "flat"]
 Role = Literal["load", "indication", "slip_angle", "acquired", "time", "angle", "covariate"]
 
 _PACKAGED = Path(__file__).parent
@@ -46,7 +48,7 @@ _DIMENSIONS: dict[Role, tuple[str, ...]] = {
     "angle": ("angle",),
 }
 _INDICATIONS = Names(of="column.symbol", role="indication")
-_LOADS = Names("MY", *(c.symbol for c in CHANNELS.values() if c.dimension in ("force", "moment")))
+_LOADS = Names(*(c.symbol for c in CHANNELS.values() if c.dimension in ("force", "moment")))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,9 +73,17 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drum:
-    """The road: circumference [m], None of a flat belt or a track, surface speed and its tolerance [m/s]."""
+    """The road: circumference [m], None of a flat belt or a track, surface speed and its tolerance [m/s].
+
+    ``road`` None is the outside of a drum where there is a circumference, and flat where there is none.
+    """
 
     surface: Annotated[str, Entry("what the road is like", example="convex")]
+    road: Annotated[
+        Road | None,
+        Entry("convex: outside a drum; concave: inside a drum; flat: a belt or a trailer's road; "
+              "default: convex with a circumference, flat without"),
+    ] = None  # fmt: skip
     circumference_m: Annotated[
         float | None, Unit("m"), Above(0),
         Entry("of a drum's surface; a flat belt has none", key="circumference"),
@@ -82,6 +92,46 @@ class Drum:
     speed_tolerance_m_s: Annotated[
         float, Unit("km/h"), AtLeast(0), Entry("about that speed", key="speed_tolerance")
     ]
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield a drum without its circumference, and a flat road with one."""
+        if self.road in ("convex", "concave") and self.circumference_m is None:
+            yield Fault(
+                key=("circumference",), got=None, expected='{ value = NUMBER, unit = "m" }',
+                what=f"is not stated, and a {self.road} road is a drum's",
+            )  # fmt: skip
+        if self.road == "flat" and self.circumference_m is not None:
+            yield Fault(
+                key=("circumference",), got=self.circumference_m, expected="none of a flat road",
+                what="is that of a drum, and the road is flat",
+            )  # fmt: skip
+
+    @property
+    def curvature_per_m(self) -> float:
+        """Curvature of the road [1/m]: positive on a drum, negative inside one, 0 where it is flat."""
+        return (-1 if self.road == "concave" else 1) / self.radius_m
+
+    def contact_length_factor(self, tire_radius_m: float) -> float:
+        """Return the length of the contact patch over that on a flat road, at one deflection of the tire.
+
+        Circles of radii Rt and Rd that enter each other by a small depth d meet over a chord of
+        2 sqrt(2 d / (1/Rt + k)), with k the road's curvature: sqrt(Rd / (Rd + Rt)) of Pacejka (Tire and
+        Vehicle Dynamics, 3rd ed. 2012, 3.2) on a drum, sqrt(Rd / (Rd - Rt)) inside one.
+
+        Raises
+        ------
+        ValueError
+            the tire does not fit into the drum
+
+        >>> inside = Drum(surface="steel", road="concave", circumference_m=4 * math.pi, speed_m_s=1.0,
+        ...               speed_tolerance_m_s=0.1)
+        >>> round(inside.contact_length_factor(0.56) ** 2, 9), inside.curvature_per_m  # 1 / 0.72
+        (1.388888889, -0.5)
+        """
+        relative = 1 + self.curvature_per_m * tire_radius_m
+        if relative <= 0:
+            raise ValueError(f"a tire of {tire_radius_m:g} m does not fit into a drum of {self.radius_m:g} m")
+        return 1 / math.sqrt(relative)
 
     @property
     def radius_m(self) -> float:
@@ -217,6 +267,9 @@ class Machine:
     cells: Annotated[
         tuple[CellPolarity, ...], Distinct("name"), Entry("signs that a cell must have", key="cell")
     ] = ()
+    hub: Annotated[
+        Hub | None, Entry("what its cells measure beside FY and MZ, where a record calibrates it")
+    ] = None
     rated_loads: Annotated[
         tuple[tuple[str, float], ...], Keyed(), Unit("N", "N*m"), Above(0),
         Entry("rated value by load", key="rated_load", example={"FY": {"value": 6000, "unit": "N"}}),

@@ -6,11 +6,12 @@ force acts at the road, a loaded radius below the hub, so that
     MX = lever FY + offset FZ + const,          lever between the bounds of `limits.LEVER`
 
 With the force in cell i, f_i = (dFY/d indication_i) indication_i by the record, and its lever in the machine
-definition, MX = sum lever_i f_i; without levers MX is the record's own. The tire's own overturning moment,
-its load times its lateral deflection, takes up to an eighth of the radius from the lever and leaves a
-twentieth of MX beside the line. A cell that was turned round, exchanged or is dead breaks this or another
-law; which single change of a cell puts all of them right is searched among the turns and the exchanges of
-two.
+definition, MX = sum lever_i f_i; without levers MX is the record's own. A hub that has
+MX among its loads has it right-handed: the record's own, turned where z points down. The tire's own
+overturning moment, its load times its lateral deflection, takes up to an eighth of the radius from the lever
+and leaves a twentieth of MX beside the line. A cell that was turned round, exchanged or is dead breaks
+this or another law; which single change of a cell puts all of them right is searched among the turns and the
+exchanges of two.
 
 Every single turn, exchange and dead cell is seen in a whole test. Not seen, because a tire could do it: all
 cells or all loads wrong by one factor that stays within the bounds, one cell's sensitivity wrong by a third
@@ -186,7 +187,7 @@ def _cells(
         indications=np.array([c.indications for c in conditions]),
         per_FY=per_FY,
         per_MZ=_linear(record, "MZ"),
-        per_MX=_overturning(record, per_FY, levers),
+        per_MX=_overturning(record, per_FY, levers, machine),
         radius_m=free_radius_m(info.tire_size),
         tares=np.array([zeros[c.file] for c in conditions]),
         FY_sign=np.array([float(turn["FY"]) for turn in turns]),
@@ -195,8 +196,11 @@ def _cells(
 
 
 def _overturning(
-    record: CalibrationRecord, per_FY: NDArray[np.float64], levers: Mapping[str, float]
+    record: CalibrationRecord, per_FY: NDArray[np.float64], levers: Mapping[str, float], machine: Machine
 ) -> NDArray[np.float64] | None:
+    # A right-handed MX about the spindle falls with FY by the loaded radius where z points down.
+    if machine.hub is not None and "MX" in machine.hub.loads:
+        return _linear(record, "MX") * (1.0 if machine.axes == "ISO-W" else -1.0)
     # By the drawing, which the record did not touch; else by the record's own fit.
     if set(record.indications) <= set(levers):
         return per_FY * [levers[name] for name in record.indications]

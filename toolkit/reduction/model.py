@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.channels import Rotation
@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class HubLoad:
+    """One calibrated load of the hub in SAE J670 [N, N*m] and its standard uncertainty, every source."""
+
+    load: str
+    value: float
+    u: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
     """One load block of one file, averaged.
 
@@ -29,6 +38,7 @@ class Condition:
     ``indications`` are the cells' means minus tare, in the record's order and units.
     ``FY_file`` and ``MZ_file`` are the acquisition program's own values, None where the file has none.
     ``first_row`` and ``last_row`` count from 1 at the first data row of the file.
+    ``hub`` holds the loads of the hub beside FY and MZ, as measured; empty where the machine has none.
     """
 
     file: str
@@ -58,6 +68,7 @@ class Condition:
     u_MZ_zero: float
     used: bool
     calibration_sha256: str
+    hub: tuple[HubLoad, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,12 +117,21 @@ class ReducedTest:
         return tuple(c for c in self.conditions if c.used and rotation in (None, c.rotation))
 
     def table(self) -> pd.DataFrame:
-        """Return the conditions as a table, one row each, in SI."""
+        """Return the conditions as a table, one row each, in SI; of the hub ``hub_FX``, ``u_hub_FX``."""
         import dataclasses
 
         import pandas as pd
 
-        return pd.DataFrame([dataclasses.asdict(c) for c in self.conditions])
+        return pd.DataFrame([_row(dataclasses.asdict(c), c.hub) for c in self.conditions])
 
 
-__all__ = ["CalibrationUse", "Condition", "ReducedTest", "Tare"]
+def _row(fields: dict[str, Any], hub: tuple[HubLoad, ...]) -> dict[str, Any]:
+    del fields["hub"]
+    return (
+        fields
+        | {f"hub_{entry.load}": entry.value for entry in hub}
+        | {f"u_hub_{entry.load}": entry.u for entry in hub}
+    )
+
+
+__all__ = ["CalibrationUse", "Condition", "HubLoad", "ReducedTest", "Tare"]

@@ -14,6 +14,7 @@ from toolkit.recording.digits import rounding
 from toolkit.reduction.averaging import ROLLING_RATIO, Window, free_radius_m, revolutions, window
 from toolkit.reduction.blocks import Block, find_blocks, find_rests, is_tare
 from toolkit.reduction.corrections import corrected
+from toolkit.reduction.hub import check_hub
 from toolkit.reduction.model import Tare
 from toolkit.units import from_si, si_scale
 
@@ -118,7 +119,8 @@ class OpenedFile:
     ``name`` is its path inside the test's folder, which tells it from every other file; ``channels``
     (4, rows) SI: SA, FZ, and FY and MZ by the record, in machine axes with the machine's corrections;
     ``indications`` minus tare, in the record's order and units; ``blocks`` its load blocks and ``windows``
-    the rows of each that are averaged; ``differences`` what the acquisition program computed otherwise.
+    the rows of each that are averaged; ``differences`` what the acquisition program computed otherwise;
+    ``hub`` the loads of the hub by the record, SI and machine axes, FY among them, each (rows,).
     """
 
     name: str
@@ -130,6 +132,7 @@ class OpenedFile:
     windows: tuple[Window, ...]
     differences: tuple[Difference, ...]
     tare: Tare
+    hub: Mapping[str, NDArray[np.float64]]
 
 
 def check_record(record: CalibrationRecord, machine: Machine) -> None:
@@ -155,6 +158,7 @@ def check_record(record: CalibrationRecord, machine: Machine) -> None:
                 next_step="use a record that was fitted to FY and MZ",
                 rule="record-loads",
             )
+    check_hub(record, machine)
 
 
 def split_blocks(recording: Recording, machine: Machine) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
@@ -257,7 +261,8 @@ def open_file(
     indications = {name: recording[name].values for name in record.indications}
     units = {name: recording[name].unit for name in record.indications}
     offsets = dict(tare.values) if tare.source != "none" else None
-    loads = apply_record(record, indications, units=units, tare=offsets, only=("FY", "MZ"))
+    hub = () if machine.hub is None else machine.hub.loads
+    loads = apply_record(record, indications, units=units, tare=offsets, only=("FY", "MZ", *hub))
     channels = corrected(
         machine,
         {"SA": recording["SA"].si, "FZ": recording["FZ"].si, "FY": loads["FY"], "MZ": loads["MZ"]},
@@ -277,6 +282,7 @@ def open_file(
         ),
         differences=compare(recording, record, file=name, indications=indications, units=units, tare=offsets),
         tare=tare,
+        hub={"FY": channels["FY"]} | {load: loads[load] for load in hub},
     )
 
 

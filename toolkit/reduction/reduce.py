@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.records.use import not_asked
+from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
@@ -16,6 +17,7 @@ from toolkit.reduction.averaging import Window, means, turning
 from toolkit.reduction.cells import physics_findings
 from toolkit.reduction.common_load import at_one_angle, carry, slopes
 from toolkit.reduction.corrections import correction_findings
+from toolkit.reduction.hub import HubBlock, hub_findings, hub_means
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
 from toolkit.reduction.remarks import drift_findings
@@ -23,6 +25,8 @@ from toolkit.reduction.tare import choose_tares, zero_shifts
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine, TypeB
     from toolkit.recording.model import Recording, TestInfo
@@ -86,6 +90,7 @@ def reduce_test(
         *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
         *drift_findings(conditions, protocol),
         *correction_findings(machine),
+        *hub_findings(machine),
         *remarks.machine_findings(info, machine),
         *remarks.pressure_findings(info, machine),
         *remarks.speed_findings(files, machine),
@@ -127,13 +132,20 @@ def _conditions(
 ) -> tuple[list[Condition], list[plan.Placed], tuple[int, ...]]:
     conditions: list[Condition] = []
     placed: list[plan.Placed] = []
+    covariance = record_covariance(record) if machine.hub is not None else {}
     for order, file in enumerate(files):
         step = plan.nearest_step(float(np.mean(file.channels[0])), machine.protocol)
         for block, rows in zip(file.blocks, file.windows, strict=True):
             if machine.protocol.acquisition == "continuous":
                 step = plan.nearest_step(float(np.mean(file.channels[0][rows.rows])), machine.protocol)
             condition = _condition(
-                file, rows, step_SA=step, machine=machine, record=record, reversal=reversal
+                file,
+                rows,
+                step_SA=step,
+                machine=machine,
+                record=record,
+                reversal=reversal,
+                covariance=covariance,
             )
             conditions.append(condition)
             placed.append(
@@ -161,9 +173,11 @@ def _condition(
     machine: Machine,
     record: CalibrationRecord,
     reversal: Reversal,
+    covariance: Mapping[str, NDArray[np.float64]],
 ) -> Condition:
     recording, rows = file.recording, window.rows
-    sign = signs(machine.axes, "SAE", seen_by_cells(file.rotation, reversal))
+    seen = seen_by_cells(file.rotation, reversal)
+    sign = signs(machine.axes, "SAE", seen)
     load = file.channels[1, rows]
     SA, FZ = means(file.channels[:2, rows])
     # FY and MZ follow the load at which their means are stated, and the tire's own turn has no mean.
@@ -203,6 +217,19 @@ def _condition(
         u_MZ_zero=zero["MZ"],
         used=True,
         calibration_sha256=record.sha256,
+        hub=hub_means(
+            HubBlock(
+                loads={name: values[rows] for name, values in file.hub.items()},
+                cells=cells,
+                u_zero=tuple(u for _, u in file.tare.u),
+                tared=file.tare.source != "none",
+                explained=explained,
+            ),
+            machine=machine,
+            record=record,
+            covariance=covariance,
+            seen=seen,
+        ),
     )
 
 

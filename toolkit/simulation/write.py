@@ -146,6 +146,7 @@ def test_toml(test: VirtualTest) -> str:
         **dict(plan.label),
     }
     speed = float(from_si(plan.machine.drum.speed_m_s, "km/h"))
+    road = " (simulated)" if plan.machine.drum.circumference_m is None else " drum (simulated)"
     lines = [
         "schema = 1",
         f"date = {plan.date}",
@@ -153,7 +154,7 @@ def test_toml(test: VirtualTest) -> str:
         "simulated = true",
         'operator = "virtual operator"',
         'requestor = "simulated test"',
-        f"surface = {_text(plan.machine.drum.surface + ' drum (simulated)')}",
+        f"surface = {_text(plan.machine.drum.surface + road)}",
         f"special = {_text('simulated: ' + plan.title)}",
         f"rotation = {_text(first)}",
         f'speed = {{ value = {round(speed, 6)!r}, unit = "km/h" }}',

@@ -35,9 +35,14 @@ SHEETS = (
     "raw",
 )
 
-_UNITS = {"SA": "rad", "FZ": "N", "FY": "N", "MZ": "N*m"}
+_UNITS = {"SA": "rad", "FX": "N", "FZ": "N", "FY": "N", "MX": "N*m", "MY": "N*m", "MZ": "N*m"}
+HUB = "hub_"
 
-CONDITION_FIELDS: tuple[str, ...] = tuple(field.name for field in dataclasses.fields(Condition))
+_SEVERAL = ("indications", "hub")  # of one column each: the cells, the loads of the hub
+CONDITION_FIELDS: tuple[str, ...] = tuple(
+    field.name for field in dataclasses.fields(Condition) if field.name not in _SEVERAL
+)
+"""The fields of a condition that are one column of the sheet ``reduced``."""
 
 
 def header(field: str) -> str:
@@ -75,6 +80,11 @@ def content_hash(result: TestResult) -> str:
         "reduced": dataclasses.asdict(result.reduced),
         "characteristics": _characteristics(result.characteristics),
     }
+    for condition in content["reduced"][
+        "conditions"
+    ]:  # nor has a test of a hub that measures FY and MZ alone
+        if not condition["hub"]:
+            del condition["hub"]
     for name in ("stated", "machine_title"):  # a file from before there were any keeps its hash
         if not content["reduced"][name]:
             del content["reduced"][name]

@@ -21,9 +21,10 @@ from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.recording.model import TestInfo
 from toolkit.recording.safe_open import check_workbook
-from toolkit.reduction.model import Condition, ReducedTest, Tare
+from toolkit.reduction.model import Condition, HubLoad, ReducedTest, Tare
 from toolkit.testfile.layout import (
     CONDITION_FIELDS,
+    HUB,
     KIND,
     SCHEMA,
     SHEETS,
@@ -182,11 +183,14 @@ def _as(kind: Any, value: Any) -> Any:
 
 def _condition(row: Cells) -> Condition:
     hints = get_type_hints(Condition)
-    conditions = {
-        name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"
-    }
+    conditions = {name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS}
     cells = tuple(number(value) for key, value in row.items() if key.startswith("indication_"))
-    return Condition(**conditions, indications=cells)
+    hub = tuple(
+        HubLoad(load=load, value=number(row[name]), u=number(row[header(f"u_{HUB}{load}")]))
+        for name in row
+        if name.startswith(HUB) and (load := name.removeprefix(HUB).partition(" ")[0])
+    )
+    return Condition(**conditions, indications=cells, hub=hub)
 
 
 def _findings(rows: list[Cells]) -> tuple[Finding, ...]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import Characteristic
     from toolkit.estimate import Estimate
     from toolkit.pipeline import TestResult
+    from toolkit.reduction.model import HubLoad
 
 PAGE, CONDITIONS, RESULTS = "test", "conditions", "results"
 _GUIDE = (
@@ -134,8 +135,20 @@ def _with_U(estimate: Estimate, characteristic: Characteristic) -> tuple[Shown, 
 
 
 def _conditions(result: TestResult) -> Sheet:
-    head = ("direction", "slip angle", "load FZ", "FY", "± U of FY", "MZ", "± U of MZ", "used", "recording")
+    head: tuple[str, ...] = (
+        "direction",
+        "slip angle",
+        "load FZ",
+        "FY",
+        "± U of FY",
+        "MZ",
+        "± U of MZ",
+        "used",
+        "recording",
+    )
     points = {(point.file, point.first_row): point for point in result.characteristics.points}
+    hub = [entry.load for entry in result.reduced.conditions[0].hub] if result.reduced.conditions else []
+    head += tuple(text for load in hub for text in (f"hub {load}", f"± U of hub {load}"))
     rows = []
     for c in result.reduced.conditions:
         point = points.get((c.file, c.first_row))
@@ -145,9 +158,20 @@ def _conditions(result: TestResult) -> Sheet:
                 c.rotation, in_unit(math.degrees(c.SA), "deg", 2), in_unit(c.FZ, "N", 0),
                 in_unit(c.FY, "N", 1), in_unit(U_FY, "N", 1), in_unit(c.MZ, "N*m", 2),
                 in_unit(U_MZ, "N*m", 2), "yes" if c.used else "no", c.file,
+                *(cell for entry in c.hub for cell in _hub_cells(entry)),
             )
         )  # fmt: skip
-    return Sheet(name=CONDITIONS, head=head, rows=tuple(rows), widths=(11, 12, 12, 14, 12, 14, 13, 8, 34))
+    return Sheet(
+        name=CONDITIONS,
+        head=head,
+        rows=tuple(rows),
+        widths=(11, 12, 12, 14, 12, 14, 13, 8, 34, *(16,) * (2 * len(hub))),
+    )
+
+
+def _hub_cells(entry: HubLoad) -> tuple[Shown, Shown]:
+    unit, digits = ("N", 1) if entry.load.startswith("F") else ("N*m", 2)
+    return in_unit(entry.value, unit, digits), in_unit(2 * entry.u, unit, digits)
 
 
 def _results(result: TestResult) -> Sheet:

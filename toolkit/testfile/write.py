@@ -15,7 +15,7 @@ from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
 from toolkit.publication import write_result
 from toolkit.recording.marks import mark_workbook
-from toolkit.testfile.layout import CONDITION_FIELDS, KIND, SCHEMA, cell, content_hash, header
+from toolkit.testfile.layout import CONDITION_FIELDS, HUB, KIND, SCHEMA, cell, content_hash, header
 from toolkit.testfile.readable import Sheet, Shown, readable_sheets
 
 if TYPE_CHECKING:
@@ -207,10 +207,15 @@ def _provenance(result: TestResult, digest: str) -> Rows:
 def _reduced(result: TestResult) -> Rows:
     conditions = result.reduced.conditions
     cells = len(conditions[0].indications) if conditions else 0
-    plain = [name for name in CONDITION_FIELDS if name != "indications"]
-    yield [*(header(name) for name in plain), *(f"indication_{i + 1}" for i in range(cells))]
+    hub = [entry.load for entry in conditions[0].hub] if conditions else []
+    yield [
+        *(header(name) for name in CONDITION_FIELDS),
+        *(f"indication_{i + 1}" for i in range(cells)),
+        *(header(f"{lead}{HUB}{load}") for load in hub for lead in ("", "u_")),
+    ]
     for condition in conditions:
-        yield [*(getattr(condition, name) for name in plain), *condition.indications]
+        loads = [number for entry in condition.hub for number in (entry.value, entry.u)]
+        yield [*(getattr(condition, name) for name in CONDITION_FIELDS), *condition.indications, *loads]
 
 
 def _all_fits(result: TestResult) -> list[tuple[str, float, CurveFit]]:

@@ -48,7 +48,7 @@ EFFECT = Effect(
         EffectParameter(
             name="reduction",
             unit="1",
-            text="reduction of the cornering stiffness",
+            text="reduction of the cornering stiffness; negative inside a drum: a longer patch",
             typical=(0.03, 0.25),
             bounds=(-0.5, 0.9),
         ),
