@@ -149,3 +149,12 @@ def test_an_fmu_that_cannot_be_is_refused_before_anything_is_fitted(table, tmp_p
         run(fit.command, table, *(target if option == "x.fmu" else option for option in options))
     assert caught.value.rule == rule
     assert not target.exists()
+
+
+def test_the_fmu_of_a_file_without_longitudinal_coefficients_says_so(table, tmp_path):
+    tir = tmp_path / "x.tir"
+    run(fit.command, table, "--model", "mf61", "--tir", tir)
+    code, text = run(convert.command, tir, tmp_path / "x.fmu", "--json")
+    notes = [finding for finding in json.loads(text)["findings"] if finding["rule"] == "tir-no-coefficients"]
+    assert code == 0
+    assert "FX holds nothing" in notes[0]["message"]

@@ -88,7 +88,7 @@ def evaluate_tir(
     result = Forces(FX=FX, FY=FY, MZ=MZ)
     _refuse_infinite(tir, result)
     inputs = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
-    findings += [*tir.findings(), *_lacking(tir, p), *_beyond(tir, inputs)]
+    findings += [*tir.findings(), *lacking_findings(tir, p), *_beyond(tir, inputs)]
     return result, tuple(findings)
 
 
@@ -148,7 +148,8 @@ def _pressure_change(
     return inflation / nominal - 1, [_note("tir-pressure", tir, text)]
 
 
-def _lacking(tir: TirFile, p: Mapping[str, float]) -> list[Finding]:
+def lacking_findings(tir: TirFile, p: Mapping[str, float]) -> list[Finding]:
+    """Return which forces of a file hold nothing, or little, for want of coefficients."""
     findings = []
     for channel, names in _MAKES.items():
         absent = [name for name in names if name not in p]
