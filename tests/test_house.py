@@ -26,6 +26,7 @@ APART = {
 }
 """Folders that test more than the package, or measure it."""
 OF_THE_CHECKOUT = {
+    "test_containerfile",
     "test_docs",
     "test_front_door",
     "test_house",

@@ -95,7 +95,8 @@ def test_linear_responses_of_an_equation_are_its_simulations_for_a_small_force(t
     model = model_of(read_case(write_case(tmp_path, SWINGS, simulator=PENDULUM, r0__csv=rows)), None)
     (run,), p = model.case.runs, {"k": 25.0, "c": 0.6}
 
-    def pattern(x, _):
+    def pattern(signals):
+        x = signals["position"]
         return np.stack([np.sin(2 * np.pi * x / period), np.cos(2 * np.pi * x / period)], axis=1)
 
     linear = model.capability.motion.pushed(run, p, (), "om", pattern)["TH"]
@@ -117,7 +118,9 @@ def test_a_channel_that_is_saturated_shows_nothing_of_a_small_force(tmp_path):
     level = float(np.quantile(np.abs(plain), 0.6))
     stop = AppliedEffect(effect=effects()["saturation"], channel="TH", values={"level": level})
     free, stopped = (
-        model.capability.motion.pushed(run, p, active, "om", lambda x, _: np.ones((len(x), 1)))["TH"][:, 0]
+        model.capability.motion.pushed(run, p, active, "om", lambda seen: np.ones((len(seen["om"]), 1)))[
+            "TH"
+        ][:, 0]
         for active in ((), (stop,))
     )
     beyond = np.abs(plain) > level

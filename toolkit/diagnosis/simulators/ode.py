@@ -55,9 +55,7 @@ class OdeModel:
     ) -> None:
         self.case, self._equation = case, Equation(case, rhs, outputs, initial)
         self.parameters = case.parameters
-        self.outputs = tuple(
-            Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
-        )
+        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self._drivers = tuple(driver.name for driver in case.drivers)
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
@@ -73,25 +71,18 @@ class OdeModel:
         names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
         if len(names) != len(start):
             raise ConfigError(
-                "states and initial do not agree",
-                where=f"{case.path}: simulation.states",
-                got=f"{len(names)} names, {len(start)} initial values",
-                expected="one name for each",
-                next_step="correct the list of states",
-                rule="case",
-            )
+                "states and initial do not agree", where=f"{case.path}: simulation.states",
+                got=f"{len(names)} names, {len(start)} initial values", expected="one name for each",
+                next_step="correct the list of states", rule="case",
+            )  # fmt: skip
         self.states = names
         terms = dict(case.simulation.force_terms)
         unknown = [name for name in terms if name not in names]
         if unknown:
             raise ConfigError(
-                "a force term names no state",
-                where=f"{case.path}: simulation.force_terms",
-                got=", ".join(unknown),
-                expected=", ".join(names),
-                next_step="correct the name",
-                rule="case",
-            )
+                "a force term names no state", where=f"{case.path}: simulation.force_terms",
+                got=", ".join(unknown), expected=", ".join(names), next_step="correct the name", rule="case",
+            )  # fmt: skip
         self._derivative_of = self._equation.kinematics(p)
         self.force_units = terms or {
             name: "" for i, name in enumerate(names) if i not in self._derivative_of.values()
