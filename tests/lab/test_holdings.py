@@ -28,7 +28,8 @@ def test_tests_audits_and_diagnoses_are_told_by_their_files(tmp_path: Path) -> N
     holdings = holdings_of(home)
     places = {kind: list(held.values()) for kind, held in holdings.places.items()}
     assert places == {
-        "test": ["tests/a", "tests/b"], "audit": ["audits/x", "audits/y"], "diagnosis": ["d"], "case": [], "plan": [],
+        "test": ["tests/a", "tests/b"], "audit": ["audits/x", "audits/y"], "diagnosis": ["d"], "case": [],
+        "plan": [],
     }  # fmt: skip
 
 
