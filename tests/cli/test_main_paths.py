@@ -96,7 +96,7 @@ OTHER_LINES = {
     ("compare", "laboratories"): "",
 }
 WRITTEN = {
-    "out", "figures", "figure", "tir", "csv", "case", "repair", "parquet", "request", "target",
+    "out", "figures", "figure", "tir", "fmu", "csv", "case", "repair", "parquet", "request", "target",
     "init folder", "template new file", "person key file", "ledger witness folder",
     *(f"{kind} new file" for kind in ("machine", "session", "test", "case", "plan")),
 }  # fmt: skip
