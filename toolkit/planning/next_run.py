@@ -3,7 +3,8 @@
 A run is a recording of the case with factors changed one by one (`exchange`): how fast its inputs
 go, how far, which of them alone moves, a condition such as the way the drum turns or how the tire stands on
 its hub. Inputs stay within what was recorded, or within limits that are given. A channel that is another
-one's rate of change stays that.
+one's rate of change stays that. A covariate is measured and not set: it goes on as it was recorded, unless a
+limit is given, which says that it can be set.
 """
 
 from __future__ import annotations
@@ -103,13 +104,12 @@ class RunSearch:
     def best(self) -> Change:
         """Return the change of a recording that parts the members furthest."""
         start = Change(run=self.problem.runs[0].name)
-        factors = range(len(self._factors(start)))
+        factors = range(len(self.factors(start)))
         return exchanged(start, self._alternatives, lambda: factors, sweeps=_ROUNDS)
 
     def _alternatives(self, change: Change, factor: int) -> Alternatives[Change]:
-        changes = (change, *self._factors(change)[factor])
-        # Each once: a run that is learned twice is known by two numbers.
-        runs = [self._run(new) for new in dict.fromkeys(changes) if new not in self.judged]
+        changes = (change, *self.factors(change)[factor])
+        runs = [self._run(new) for new in changes if new not in self.judged]
         if self.until() or not self.judged:
             self.learn([run for run in runs if run is not None])
         losses = np.array([-self.value(alternative) for alternative in changes])
@@ -150,9 +150,9 @@ class RunSearch:
             if a is not b
         )
 
-    def _factors(self, change: Change) -> list[tuple[Change, ...]]:
+    def factors(self, change: Change) -> list[tuple[Change, ...]]:
         """Return what each factor of a change may be instead: the recording first."""
-        names = [name for name, source in movable(self.problem) if source is None]
+        names = [name for name, source in movable(self.problem, self.limits) if source is None]
         factors = [
             tuple(dataclasses.replace(change, run=run.name) for run in self.problem.runs),
             # Faster, and where a rate of change is limited, as much less far.
@@ -216,18 +216,19 @@ def conditions(problem: Problem) -> dict[str, tuple[str, ...]]:
     return values
 
 
-def movable(problem: Problem) -> tuple[tuple[str, str | None], ...]:
-    """Return the inputs that go up and down, each with the one whose rate of change it is.
+def movable(problem: Problem, limits: Limits) -> tuple[tuple[str, str | None], ...]:
+    """Return the channels that a run may move, each with the one whose rate of change it is.
 
-    A channel that only grows, such as a shaft's angle, goes on as it was recorded.
+    Inputs that go up and down, what they are the rates of change of or have for one, and what has a limit. A
+    channel that only grows, such as a shaft's angle, goes on as it was recorded.
     """
     run = max(problem.runs, key=lambda run: run.rows)
-    names = [
-        channel.name
-        for channel in problem.case.drivers
-        if channel.name in run.columns and _goes_back(run.columns[channel.name])
-    ]
-    return tuple((name, _source(run, name, names)) for name in names)
+    present = [channel for channel in problem.case.drivers if channel.name in run.columns]
+    names = [c.name for c in present if c.name in limits or _goes_back(run.columns[c.name])]
+    sources = {name: _source(run, name, names) for name in names}
+    settable = {c.name for c in present if c.role == "input" or c.name in limits}
+    families = {_root(name, sources) for name in settable.intersection(names)}
+    return tuple((name, sources[name]) for name in names if _root(name, sources) in families)
 
 
 def _goes_back(column: Array) -> bool:
@@ -258,7 +259,7 @@ def changed(problem: Problem, change: Change, limits: Limits) -> Run | None:
     back = phase > 1.0
     at = run.t[0] + span * np.where(back, 2.0 - phase, phase)
     sizes, columns = dict(change.sizes), dict(run.columns)
-    sources = dict(movable(problem))
+    sources = dict(movable(problem, limits))
     for name, source in sources.items():
         column = run.columns[name]
         depth, root = 0, source
