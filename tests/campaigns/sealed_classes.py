@@ -44,8 +44,7 @@ from toolkit.planning.next_run import Change, RunSearch, changed
 
 PROOFS = Path(__file__).parents[2] / "proof"
 KINDS = ("proposed", "random", "repeat")
-DIAGNOSIS_S, SEARCH_S = 600.0, 45.0  # of the clock; of the processor
-LATER_S = 60.0  # after the last recording
+DIAGNOSIS_S, SEARCH_S = 600.0, 20.0  # of the clock; of the processor
 Kind = tuple[str, str, tuple[str, ...]]  # bucket, family or the class it is drawn for, effects
 
 
@@ -99,18 +98,16 @@ def carried_out(
     s = drawn.scenario
     base = next(known for known in s.runs if known.name == name)
     fine = dict(base.fine)
+    later = float(run.t[0] - base.rows[0])  # as the plan has it: after all that was recorded
     for channel, declared in s.channels.items():
         if declared.role in ("input", "covariate") and channel in fine and channel in run.columns:
-            fine[channel] = np.interp(fine["t"], run.t, run.columns[channel])
+            fine[channel] = np.interp(fine["t"], run.t - later, run.columns[channel])
     if s.family == "drive-force":  # the path is not recorded: it follows the velocity
         fine["x"] = np.cumsum(fine["v"]) * (fine["t"][1] - fine["t"][0])
-    later = max(float(known.fine["t"][-1]) for known in s.runs) + LATER_S - float(fine["t"][0])
     fine["t"] = fine["t"] + later
-    conditions = {**base.conditions, **{k: v for k, v in run.conditions.items() if k in run.declared}}
     there = dataclasses.replace(
-        base, name="next.csv", fine=fine, rows=base.rows + later,
-        conditions={k: v for k, v in conditions.items() if k not in ("order", "file")},
-    )  # fmt: skip
+        base, name="next.csv", fine=fine, rows=base.rows + later, conditions=run.conditions
+    )
     alone = dataclasses.replace(s, runs=(there,))
     before = draw._before_converter(alone, s.true_parameters(), drawn.effects)  # noqa: SLF001
     if s.driven:

@@ -47,10 +47,32 @@ def test_inputs_stay_within_what_was_recorded_or_the_limits(search: RunSearch) -
     )
 
 
+def test_an_input_is_moved_to_an_end_of_its_limits(search: RunSearch) -> None:
+    run = changed(search.problem, Change(run="r1.csv", levels=(("u", "high"),)), {"u": (-5.0, 9.0)})
+    assert run is not None
+    recorded = search.problem.runs[1].columns["u"]
+    np.testing.assert_allclose(run.columns["u"], recorded + 9.0 - recorded.max())
+    assert Change(run="r1.csv", levels=(("u", "low"),)).words()[1] == "u as low as its limits allow"
+
+
+def test_the_next_run_comes_after_the_last_where_one_clock_goes_on(tmp_path: Path) -> None:
+    case = write_case(tmp_path)
+    for number, path in enumerate(sorted(tmp_path.glob("r*.csv"))):
+        run = pd.read_csv(path)
+        run.assign(t=run["t"] + 25.0 * number).to_csv(path, index=False)
+    posed = problem(case)
+    following = changed(posed, Change(run="r0.csv"), {})
+    assert following is not None
+    pause = posed.runs[1].t[0] - posed.runs[0].t[-1]
+    assert following.t[0] == pytest.approx(posed.runs[1].t[-1] + pause)
+    np.testing.assert_allclose(following.columns["t"], following.t)
+
+
 def test_a_change_of_nothing_is_a_repeat(search: RunSearch) -> None:
     run = changed(search.problem, Change(run="r1.csv"), {})
     assert run is not None
     np.testing.assert_allclose(run.columns["u"], search.problem.runs[1].columns["u"], atol=1e-12)
+    np.testing.assert_array_equal(run.t, search.problem.runs[1].t)  # each run has a clock of its own here
 
 
 def test_faster_inputs_come_again_there_and_back(search: RunSearch) -> None:

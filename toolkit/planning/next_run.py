@@ -13,13 +13,15 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.simulators.setting import pauses
 from toolkit.planning.exchange import Alternatives, exchanged
 from toolkit.planning.members import Member, Predicted, expected_log_evidence, predict
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,8 +32,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Limits = Mapping[str, tuple[float, float]]
 
+Level = Literal["low", "high"]
+
 _RATES = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SIZES = (0.0, 0.5, 1.0, 2.0, 4.0)
+_LEVELS: tuple[Level, ...] = ("low", "high")
+_OF_A_RECORDING = ("phase", "date", "order", "repeat_of", "file")  # and of no other run
 _IS_RATE = 0.98  # of the variance of a channel that another one's derivative explains
 _ROUNDS = 2
 _CERTAIN = 2 * VERDICT.close
@@ -43,12 +49,14 @@ _TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
 class Change:
     """What is changed of a recording: nothing by default.
 
-    ``rate`` of the inputs, ``sizes`` of each about its middle, ``conditions`` that differ.
+    ``rate`` of the inputs, ``sizes`` of each about its middle, ``levels`` of those that are moved to an end of
+    their limits, ``conditions`` that differ.
     """
 
     run: str
     rate: float = 1.0
     sizes: tuple[tuple[str, float], ...] = ()
+    levels: tuple[tuple[str, Level], ...] = ()
     conditions: tuple[tuple[str, str], ...] = ()
 
     def words(self) -> tuple[str, ...]:
@@ -61,6 +69,7 @@ class Change:
                 statements.append(
                     f"{name} held at its middle" if size == 0 else f"{name} {size:g} times as far"
                 )
+        statements += [f"{name} as {level} as its limits allow" for name, level in self.levels]
         statements += [f"{key}: {value}" for key, value in self.conditions]
         return tuple(statements)
 
@@ -167,6 +176,9 @@ class RunSearch:
             factors.append(
                 tuple(dataclasses.replace(change, sizes=(*others, (name, size))) for size in _SIZES)
             )
+            flat = tuple(entry for entry in change.levels if entry[0] != name)
+            moved = (dataclasses.replace(change, levels=(*flat, (name, level))) for level in _LEVELS)
+            factors.append((dataclasses.replace(change, levels=flat), *moved))
         for key, values in conditions(self.problem).items():
             rest = tuple(entry for entry in change.conditions if entry[0] != key)
             turned = (dataclasses.replace(change, conditions=(*rest, (key, value))) for value in values)
@@ -209,7 +221,7 @@ def conditions(problem: Problem) -> dict[str, tuple[str, ...]]:
     values: dict[str, tuple[str, ...]] = {}
     for run in problem.case.runs:
         for key, value in run.conditions.items():
-            if key not in ("phase", "date", "order", "repeat_of", "file"):
+            if key not in _OF_A_RECORDING:
                 values[key] = tuple(dict.fromkeys((*values.get(key, ()), value)))
     if problem.case.simulation.kind == "machine":
         values |= _TURNS
@@ -258,7 +270,7 @@ def changed(problem: Problem, change: Change, limits: Limits) -> Run | None:
     phase = np.mod((run.t - run.t[0]) * change.rate / span, 2.0) if span > 0 else np.zeros(run.rows)
     back = phase > 1.0
     at = run.t[0] + span * np.where(back, 2.0 - phase, phase)
-    sizes, columns = dict(change.sizes), dict(run.columns)
+    sizes, levels, columns = dict(change.sizes), dict(change.levels), dict(run.columns)
     sources = dict(movable(problem, limits))
     for name, source in sources.items():
         column = run.columns[name]
@@ -269,16 +281,35 @@ def changed(problem: Problem, change: Change, limits: Limits) -> Run | None:
         moved = np.interp(at, run.t, column)
         turn = np.where(back, -1.0, 1.0) ** depth * change.rate**depth
         size = sizes.get(_root(name, sources), 1.0)
-        columns[name] = middle + size * (moved * turn - middle)
+        column = middle + size * (moved * turn - middle)
         low, high = limits.get(name, reach(problem, name))
+        if name in levels:
+            column = column + (low - column.min() if levels[name] == "low" else high - column.max())
+        columns[name] = column
         slack = 1e-9 * max(abs(low), abs(high), 1e-300)
-        if columns[name].min() < low - slack or columns[name].max() > high + slack:
+        if column.min() < low - slack or column.max() > high + slack:
             return None
-    declared = {**run.declared, **dict(change.conditions)}
+    later = _later(problem, run)
+    for channel in problem.case.channels:
+        if channel.role == "time":
+            columns[channel.name] = run.columns[channel.name] + later / unit(channel.unit).factor
+    kept = {key: value for key, value in run.conditions.items() if key not in _OF_A_RECORDING}
     return dataclasses.replace(
-        run, name="next.csv", columns=columns, conditions={**run.conditions, **dict(change.conditions)},
-        declared=declared,
+        run, name="next.csv", t=run.t + later, columns=columns,
+        conditions=kept | dict(change.conditions), declared={**run.declared, **dict(change.conditions)},
     )  # fmt: skip
+
+
+def _later(problem: Problem, run: Run) -> float:
+    """Return how much later than a recording the next run is [s]; 0 where each run has a clock of its own.
+
+    After the last one, by the pause that runs had on average.
+    """
+    runs = problem.case.runs
+    between = pauses(runs)
+    if between is None or not len(between):
+        return 0.0
+    return float(runs[-1].t[-1] + np.median(between) - run.t[0])
 
 
 def _root(name: str, sources: Mapping[str, str | None]) -> str:
