@@ -63,7 +63,7 @@ def outside(sealed: Mapping[str, Any]) -> str:
 
 
 def kinds() -> tuple[list[Kind], Counter[str]]:
-    """Return the kinds of the classes that sealed batches left, as often as they did, and what is left out."""
+    """Return the kinds of the classes that sealed batches left, as often, and what is left out."""
     drawn: list[Kind] = []
     absent: Counter[str] = Counter()
     for path in sorted(PROOFS.glob("proof-*.jsonl.gz")):
@@ -109,10 +109,10 @@ def carried_out(
         base, name="next.csv", fine=fine, rows=base.rows + later, conditions=run.conditions
     )
     alone = dataclasses.replace(s, runs=(there,))
-    before = draw._before_converter(alone, s.true_parameters(), drawn.effects)  # noqa: SLF001
+    before = draw._before_converter(alone, s.true_parameters(), drawn.effects)
     if s.driven:
         there = s.driven(there, drawn.effects)
-    return there, draw._recorded(alone, before[0], drawn.effects, 0.0, rng)  # noqa: SLF001
+    return there, draw._recorded(alone, before[0], drawn.effects, 0.0, rng)
 
 
 def with_run(drawn: draw.Drawn, run: Run, name: str, folder: Path, rng: np.random.Generator) -> Problem:
@@ -157,7 +157,7 @@ class Outcome:
 def one(kind: Kind, number: int, seed: int, folder: Path) -> Outcome | str:
     """Return the outcome of a case, or why it does not count."""
     bucket, family, effects = kind
-    # Of one effect the sizes of two: a tenth of the noise, which a single one may be, leaves no answer at all.
+    # Of one effect the sizes of two: a tenth of the noise, as a single one may be, leaves no answer.
     sizes = "confounded" if bucket == "confounded" else "two"
     drawn = draw.draw_case(seed, number, sizes, compare=False, picked=(family, effects))
     write_case(drawn.scenario, drawn.measured, folder / "before")
@@ -183,7 +183,9 @@ def _after(
     # What has a temperature was set in these plants: a limit says that it can be set again.
     set_again = {"T", "TA"} & {channel.name for channel in posed.case.drivers}
     limits = {name: _recorded(posed, name) for name in set_again}
-    search = RunSearch(problem=posed, members=members, limits=limits, until=lambda: time.process_time() < ends)
+    search = RunSearch(
+        problem=posed, members=members, limits=limits, until=lambda: time.process_time() < ends
+    )
     best = search.best()
     chosen = search.judge(best)
     if chosen is None:

@@ -170,9 +170,15 @@ def test_a_load_that_nothing_makes_is_named(knowledge: Knowledge, feasible: Feas
 
 def with_one_weight(text: str) -> str:
     """Return fixtures of one weight each that pull one way."""
-    for weights, weight in (("2000, 4000, 6200", "6200"), ("130, 260, 400", "400"), ("800, 1600, 2370", "2370")):
+    for weights, weight in (
+        ("2000, 4000, 6200", "6200"),
+        ("130, 260, 400", "400"),
+        ("800, 1600, 2370", "2370"),
+    ):
         text = text.replace(f"[{weights}]", f"[{weight}]")
-    return text.replace("minutes = 2\n", "minutes = 2\nboth = false\n").replace("= 3\n", "= 3\nboth = false\n")
+    return text.replace("minutes = 2\n", "minutes = 2\nboth = false\n").replace(
+        "= 3\n", "= 3\nboth = false\n"
+    )
 
 
 def test_loads_of_two_levels_are_refused_unless_that_is_asked_for(

@@ -92,8 +92,8 @@ def session(
     The fewest loads that keep a stated U, or the least U in a stated time or number of loads; without any of
     these today's U within a twentieth. U is that of 'toolkit calibration budget', with what the record knows
     of the scatter within runs and between them. Every load has three levels and some rows are repeated, so
-    that a misfit of an equation is seen: loads that cannot end with 2, unless --two-levels. Check loads verify
-    the sign of every coefficient by five tolerances.
+    that a misfit of an equation is seen: loads that cannot end with 2, unless --two-levels. Check loads
+    verify the sign of every coefficient by five tolerances.
 
     --out gets SESSION.toml, loads.csv and check.csv, which 'toolkit calibrate' reads once the readings are
     filled in, and the operator's sheet; with --template as Word and PDF too.

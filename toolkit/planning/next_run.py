@@ -49,8 +49,8 @@ _TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
 class Change:
     """What is changed of a recording: nothing by default.
 
-    ``rate`` of the inputs, ``sizes`` of each about its middle, ``levels`` of those that are moved to an end of
-    their limits, ``conditions`` that differ.
+    ``rate`` of the inputs, ``sizes`` of each about its middle, ``levels`` of those that are moved to
+    an end of their limits, ``conditions`` that differ.
     """
 
     run: str

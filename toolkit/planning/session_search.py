@@ -82,10 +82,11 @@ class SessionSearch:
         self.place = np.concatenate([np.arange(len(feasible.loads)), down])
         self.loads = feasible.loads[self.place]
         self.up = np.arange(len(self.place)) < len(feasible.loads)
-        self.responses = knowledge.responses(self.loads, self.up)
         self._bent = [
-            knowledge.responses(self.loads, self.up, misfits=size) for size in _MISFITS[: 1 if demand.two_levels else None]
+            knowledge.responses(self.loads, self.up, misfits=size)
+            for size in _MISFITS[: 1 if demand.two_levels else None]
         ]
+        self.responses = self._bent[0]
         self.asked = np.array([dict(demand.U).get(name, math.inf) for name in knowledge.names])
         self.today = np.array([budget.U for budget in knowledge.repeated()])
         if not demand.U and not self.limited:
@@ -148,7 +149,7 @@ class SessionSearch:
         return [name for name, size, count in named if size is None or count < FEWEST_LEVELS]
 
     def repeats(self, chosen: NDArray[np.intp]) -> int:
-        """Return how many rows repeat another run's: the degrees of freedom that tell a misfit from scatter."""
+        """Return how many rows repeat another run's: by these a misfit is told from scatter."""
         return len(chosen) - len(np.unique(chosen))
 
     def _shows_misfit(self, design: Design) -> bool:

@@ -1,4 +1,4 @@
-"""The worker of a case's own code answers for the run that it is asked about, whatever runs it has learned."""
+"""The worker of a case's own code answers for the run that it is asked about, whatever it has learned."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ def test_runs_that_come_twice_are_still_told_apart(tmp_path: Path, calls: list[t
     case = read_case(write_case(tmp_path))
     first = case.runs[0]
     further = [
-        dataclasses.replace(first, name=f"{size}.csv", columns={**first.columns, "u": size * np.ones(first.rows)})
+        dataclasses.replace(
+            first, name=f"{size}.csv", columns={**first.columns, "u": np.full(first.rows, size)}
+        )
         for size in (3.0, 5.0, 7.0, 9.0)
-    ]  # fmt: skip
+    ]
     with running(case, WORKER_LIMITS) as code:
         assert code is not None
         model = model_of(case, None, code)

@@ -70,7 +70,7 @@ def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
 
 
 def pauses(runs: Sequence[Run]) -> NDArray[np.float64] | None:
-    """Return the time between runs whose clocks go on from one to the next [s]; None where one begins anew."""
+    """Return the time between runs whose clocks go on [s]; None where a clock begins anew."""
     spans = np.array([(run.t[0], run.t[-1]) for run in runs if run.rows]).reshape(-1, 2)
     between = spans[1:, 0] - spans[:-1, 1]
     return between if (between >= 0).all() else None
