@@ -64,9 +64,9 @@ def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
     time is that within the run: what passed between runs is not known.
     """
     starts = [known.t[0] for known in case.runs if known.rows]
-    if starts and pauses(case.runs) is not None:
-        return run.t - starts[0]
-    return run.t - (run.t[0] if run.rows else 0.0)
+    if not starts or pauses(case.runs) is None:
+        starts = [run.t[0] if run.rows else 0.0]
+    return run.t - float(starts[0])
 
 
 def pauses(runs: Sequence[Run]) -> NDArray[np.float64] | None:
