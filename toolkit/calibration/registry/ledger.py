@@ -170,8 +170,9 @@ class Entry:
     ``discarded``: ``known_on``, ``by``, ``reason``: the end of a candidate that was never approved.
     ``issued``: ``by``, ``document``: what left the laboratory, its ``name``, the hash ``content`` of what it
     says, and the hashes of its files (`registry.issuing`).
-    ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file); the first one has ``heads``:
-    count and last hash of every ledger until then, whose lines need no signature.
+    ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file), ``heads``: count and last hash
+    of every ledger until then, nothing of one that was damaged; older lines but the first have none. Lines
+    before the first one need no signature.
 
     ``clock``: whether a time server kept the clock of the computer that wrote the line; older lines have
     none.

@@ -81,6 +81,10 @@ class Registry:
         self.travel = travel
         self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
 
+    def travelling(self, travel: Travel) -> Registry:
+        """Return the same registry with another way to the keys elsewhere."""
+        return Registry(self.folder, lock_file=self.lock_file, signers=self.signers, travel=travel)
+
     def now(self) -> str:
         """Return the time of what is decided: of its request, where answers came back."""
         return self.travel.answers[0].time if self.travel.answers else now()

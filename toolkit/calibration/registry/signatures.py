@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
@@ -11,6 +12,7 @@ from toolkit.calibration.records.use import UNSIGNED
 from toolkit.calibration.registry.clock import check_after, clock_state, day_of
 from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
 from toolkit.errors import TrustError
+from toolkit.inputs import read_regular
 from toolkit.publication import publication
 from toolkit.trust.decisions import SignedLine, action_of, signature_row, statement, unsigned, violations
 from toolkit.trust.merkle import Growing, leaf_hash
@@ -77,8 +79,7 @@ def signed_event(
     path = signing.travel.request
     request = Request(message=message, people=version.text, file=file, operators=operators, path=path)
     if path is not None:
-        with publication(path.parent) as stage:
-            (stage / path.name).write_text(request.text, encoding="utf-8")
+        _write(request, path, signing.travel.files)
         raise Requested(request)
     rows: list[Mapping[str, str]] = []
     publics = [signer.public for signer in signing.signers]
@@ -91,6 +92,16 @@ def signed_event(
         owner = version.people.owner(signer.public)
         rows += [signature_row("" if owner is None else owner.id, signer, message.encode())]
     return {**stated, "signatures": rows}
+
+
+def _write(request: Request, path: Path, files: Sequence[Path]) -> None:
+    """Write a request and what it has hashes of, together: nobody should sign what cannot be read."""
+    with publication(path.parent) as stage:
+        (stage / path.name).write_text(request.text, encoding="utf-8")
+        for file in files:
+            documents = stage / f"{path.stem}.documents"
+            documents.mkdir(exist_ok=True)
+            (documents / file.name).write_bytes(read_regular(file))
 
 
 def unproved(
