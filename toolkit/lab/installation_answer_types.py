@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, NotRequired, TypedDict
+from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
 from toolkit.declared.answers import merged
 from toolkit.findings import FindingEntry
@@ -32,6 +32,30 @@ class DoctorAnswer(TypedDict):
 
     checks: list[MachineNeed]
     mend: Annotated[str | None, "command that mends it; null where nothing is missing"]
+
+
+FileState = Literal["current", "to migrate", "migrated", "own", "newer", "refused"]
+
+
+class KeptFileEntry(TypedDict):
+    """A file of a home that the toolkit reads again."""
+
+    place: Annotated[str, "in the home"]
+    kind: str
+    version: Annotated[int | str | None, "schema of the file, or release that shipped it; null where neither"]
+    written_by: Annotated[str | None, "version of the toolkit; null where the file does not say"]
+    state: Annotated[FileState, "own: the laboratory's; a home with newer files is refused as a whole"]
+    reason: Annotated[str | None, "why it is refused"]
+
+
+class MigrateAnswer(TypedDict):
+    """A home, checked whole and brought to this version."""
+
+    home: Path
+    dry_run: Annotated[bool, "nothing was written"]
+    files: Annotated[list[KeptFileEntry], "empty with --undo"]
+    migration: Annotated[str | None, "folder of what was replaced; null where nothing was"]
+    undone: Annotated[list[str], "places that --undo put back"]
 
 
 class DocsAnswer(TypedDict):
