@@ -34,7 +34,7 @@ def test_what_nobody_gave_is_missing_and_nothing_is_made_up(cls: type) -> None:
 
 
 def test_a_note_stands_beside_its_entry() -> None:
-    from toolkit.recording.details import StatedTest
+    from toolkit.recording.folder import StatedTest
 
     text = outline(StatedTest, {"machine": "belt-2"}, {"machine": "guessed from run_01.csv"})
     assert '# guessed from run_01.csv\nmachine = "belt-2"' in text

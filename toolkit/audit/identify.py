@@ -404,15 +404,12 @@ def _in_columns(group: Group, term: str) -> str:
 
 def _scale(group: Group, columns: Columns, term: str) -> float:
     # From the record's indication units to the file's, so that records in other units compare.
-    from toolkit.calibration.terms import parse_term
+    from toolkit.calibration.terms import evaluate, parse_term
 
     have = dict(zip(columns.names, columns.units, strict=True))
     units = dict(zip(group.record.indications, group.record.indication_units, strict=True))
-    factor = 1.0
-    parsed = parse_term(term)
-    for name, power in (*parsed.powers, *((name, 1) for name in parsed.absolutes)):
-        factor *= (si_scale(have[name]) / si_scale(units[name])) ** power
-    return factor
+    ratios = {name: si_scale(have[name]) / si_scale(text) for name, text in units.items()}
+    return float(evaluate(parse_term(term), ratios, 1.0))
 
 
 def _constant(record: CalibrationRecord, load: str, coefficients: NDArray[np.float64]) -> float:

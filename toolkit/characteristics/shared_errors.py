@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.apply import coefficient_jacobian
-from toolkit.calibration.uncertainty.propagation import record_covariance
+from toolkit.calibration.uncertainty.common_errors import record_covariance
 from toolkit.channels import seen_by_cells, signs
 from toolkit.characteristics.uncertain import Part
 from toolkit.machine import TypeB

@@ -18,8 +18,9 @@ from toolkit.errors import ConfigError, OutputError, UnreadableError
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.recording.columns import rig
 from toolkit.recording.extras import needed
-from toolkit.recording.formats.vectors import Vector, Vectors, series_of
-from toolkit.recording.formats.write import Written, mdf_bytes, tdms_bytes
+from toolkit.recording.formats.mdf import mdf_bytes
+from toolkit.recording.formats.tdms import tdms_bytes
+from toolkit.recording.formats.vectors import Vector, Vectors, Written, series_of
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, STAMP
 from toolkit.recording.model import Series
 from toolkit.recording.read import read_recording

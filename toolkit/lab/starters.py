@@ -28,7 +28,7 @@ from toolkit.inputs import RECORDING_FILE, read_input
 FORMS = {
     "session": "toolkit.calibration.session.session_file:SessionFile",
     "machine": "toolkit.machine.definition:Machine",
-    "test": "toolkit.recording.details:StatedTest",
+    "test": "toolkit.recording.folder:StatedTest",
     "case": "toolkit.diagnosis.case.case_file:CaseFile",
     "plan": "toolkit.simulation.plan_file:PlanFile",
 }

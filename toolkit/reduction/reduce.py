@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.records.use import not_asked
-from toolkit.calibration.uncertainty.propagation import record_covariance
+from toolkit.calibration.uncertainty.common_errors import record_covariance
 from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks

@@ -10,11 +10,11 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration.session.bridge import Bridge, bridges_of, per
-from toolkit.calibration.session.polarity import polarity_readings
-from toolkit.calibration.session.reading_entries import (
+from toolkit.calibration.session.indications import Bridge, bridges_of, per
+from toolkit.calibration.session.readings import (
     Scope,
     creep_entries,
+    polarity_readings,
     shunt_entry,
     zero_entries,
 )
