@@ -17,14 +17,13 @@ from fnmatch import fnmatchcase
 from functools import cache, partial
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from toolkit.declared import read_text
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import RESULT_FILE, SETTINGS_FILE, TEMPLATE_FILE, Form, read_input
 from toolkit.lab.home import TEMPLATES, packaged_home
-from toolkit.lab.installation_answer_types import FileState
 from toolkit.recording.marks import is_own_output
 
 MIGRATIONS = "migrations"
@@ -35,6 +34,7 @@ _REDUCED = "reduced test"
 _TODAY = "today's"
 
 Version = int | str | None
+FileState = Literal["current", "to migrate", "migrated", "own", "newer", "refused"]
 Step = Callable[[str, bytes], bytes]
 """From the name and the content of a file to the content in the next version."""
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, TypedDict
 
 from toolkit.declared import Entry, Format, read_text, toml_text
 from toolkit.errors import ConfigError
@@ -21,8 +21,7 @@ from toolkit.files import sha256_bytes
 from toolkit.inputs import SETTINGS_FILE, TEMPLATE_FILE, is_regular, read_input
 from toolkit.lab.answers import table
 from toolkit.lab.home import find_home
-from toolkit.lab.installation_answer_types import MigrateAnswer
-from toolkit.lab.kept_files import MIGRATIONS, KeptFile, kept_files
+from toolkit.lab.kept_files import MIGRATIONS, FileState, KeptFile, kept_files
 from toolkit.publication import publication, settle
 from toolkit.version import __version__
 
@@ -48,6 +47,27 @@ class Migration:
     done: Annotated[str, Entry("UTC", example="2026-11-24T10:11:12Z")]
     undone: Annotated[str | None, Entry("UTC; nothing while it stands")] = None
     file: Annotated[tuple[Replaced, ...], Entry("each file that was replaced")] = ()
+
+
+class KeptFileEntry(TypedDict):
+    """A file of a home that the toolkit reads again."""
+
+    place: Annotated[str, "in the home"]
+    kind: str
+    version: Annotated[int | str | None, "schema of the file, or release that shipped it; null where neither"]
+    written_by: Annotated[str | None, "version of the toolkit; null where the file does not say"]
+    state: Annotated[FileState, "own: the laboratory's; a home with newer files is refused as a whole"]
+    reason: Annotated[str | None, "why it is refused"]
+
+
+class MigrateAnswer(TypedDict):
+    """A home, checked whole and brought to this version."""
+
+    home: Path
+    dry_run: Annotated[bool, "nothing was written"]
+    files: Annotated[list[KeptFileEntry], "empty with --undo"]
+    migration: Annotated[str | None, "folder of what was replaced; null where nothing was"]
+    undone: Annotated[list[str], "places that --undo put back"]
 
 
 def migrate(folder: Path, *, dry_run: bool = False) -> tuple[MigrateAnswer, str]:
