@@ -247,7 +247,7 @@ def _read_job(path: Path) -> str | None:
 
 
 def _read_test(path: Path) -> str | None:
-    from toolkit.recording.details import StatedTest
+    from toolkit.recording.folder import StatedTest
 
     read_text(StatedTest, read_input(path, SETTINGS_FILE), where=path)
     return None
