@@ -7,7 +7,6 @@ version, so that a second one finds nothing to do.
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -125,7 +124,7 @@ def undo(folder: Path) -> tuple[MigrateAnswer, str]:
     undone = replace(migration, undone=_now())
     with publication(home) as stage:
         for file in migration.file:
-            _copy(before / file.place, stage / file.place)
+            _write(stage / file.place, read_input(before / file.place, TEMPLATE_FILE))
         _write(stage / MIGRATIONS / name / FILE, toml_text(undone).encode())
     answer = _answer(home, (), name, dry_run=False)
     answer["undone"] = [file.place for file in migration.file]
@@ -140,9 +139,10 @@ def _replaced(home: Path, files: Sequence[KeptFile]) -> str:
         for file in files:
             if file.content is None:
                 continue
-            _copy(home / file.place, kept := stage / MIGRATIONS / name / BEFORE / file.place)
+            original = read_input(home / file.place, TEMPLATE_FILE)
+            _write(stage / MIGRATIONS / name / BEFORE / file.place, original)
             _write(stage / file.place, file.content)
-            before, after = sha256_bytes(kept.read_bytes()), sha256_bytes(file.content)
+            before, after = sha256_bytes(original), sha256_bytes(file.content)
             rows.append(Replaced(place=file.place, before=before, after=after))
         migration = Migration(toolkit=__version__, done=_now(), file=tuple(rows))
         _write(stage / MIGRATIONS / name / FILE, toml_text(migration).encode())
@@ -160,11 +160,6 @@ def _last(home: Path) -> tuple[str, Migration]:
         "no migration of this home stands", where=home / MIGRATIONS, got="none, or all undone",
         expected="one that 'toolkit migrate' did", next_step="nothing is to be undone", rule="no-migration",
     )  # fmt: skip
-
-
-def _copy(source: Path, target: Path) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, target)
 
 
 def _write(path: Path, data: bytes) -> None:
