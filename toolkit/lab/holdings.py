@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Kind = Literal["test", "audit", "diagnosis", "case", "plan"]
 
 ANSWER, CASE, PLAN = "diagnosis.json", "case.toml", "plan.json"
-_ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "node_modules"))
+_ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "migrations", "node_modules"))
 
 _WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses", "models", "plans"))
 
@@ -119,8 +119,7 @@ def rows_of_tests(
     from toolkit.errors import ToolkitError
     from toolkit.files import sha256_bytes
     from toolkit.inputs import SETTINGS_FILE, read_input
-    from toolkit.recording.details import StatedTest
-    from toolkit.recording.folder import TEST_FILE
+    from toolkit.recording.folder import TEST_FILE, StatedTest
 
     for test_id in ids:
         place = holdings.places["test"][test_id]

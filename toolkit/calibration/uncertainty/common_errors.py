@@ -1,0 +1,204 @@
+"""Errors that all rows of one record share: what its session states of them, and the covariance they make.
+
+A test is a weighted sum of loads that one record computed. Errors of the record do not average out over its
+rows; the covariance of its coefficients carries them, J V J^T (JCGM 100 eq. 13), and lets them cancel in
+differences where they must. Beside the scatter of the fit, which V_fit holds, follow from the record alone:
+
+- *scale*: had the reference applied (1 + e) times the load it states, least squares, linear in the loads,
+  would have returned (1 + e) c: every coefficient, the intercept too. So V_scale = u(e)^2 c c^T, and the
+  error of a load is e f(x): it grows with the load, is zero at zero load, and stays in every sum that is
+  not zero. u(e) is u(reference) over the largest calibrated load, where the stated U is meant, whether it
+  was stated as an amount or as a share of the load; the budget reads it so too. Creep, a part of the load as
+  well, is added to it.
+- *offset*: a stated uncertainty of an indication, and the drift of its zero over the session, are taken as
+  one shift common to all rows of a test: V_offset has them on the intercept. It cancels in slopes and in
+  differences, and with a tare where the record's intercept does (``zero = "included"``).
+
+Loads are taken one at a time. A shared reference (``shared_group``) makes the scale errors of two loads the
+same, and a cell's shift moves both; that matters to a sum of forces with moments only. The fits' scatter is
+correlated too, as far as one cell's noise feeds both loads: V_ab = rho s_a s_b (X'X)^-1 with rho of the joint
+residuals, which `calibrate` tells (``residual_correlation``) and no record keeps. The one characteristic of
+two loads is the residual torque, MZ where FY is zero: of its variance by the two fits, u_a^2 + u_b^2, the
+correlation can change at most the share |rho|, since 2 |rho| u_a u_b <= |rho| (u_a^2 + u_b^2).
+
+Not in it: misfit and reversal, which are local in the load, need the session's rows and do not follow from
+the record alone; they stand in the budget. Resolution averages out over a block of readings.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.session.readings import creep_entries, zero_entries
+from toolkit.calibration.session.settings import zero_readings
+from toolkit.calibration.session.statements import scope_of, statements_of
+from toolkit.calibration.terms import INTERCEPT, term_matrix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.statements import Statements
+
+
+_STEP = 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IndicationError:
+    """Errors of one indication in its unit: ``readings`` roundings of ``half_width``, and a normal ``u``."""
+
+    name: str
+    half_width: float
+    readings: int
+    u: float
+
+
+def indication_errors(record: CalibrationRecord, statements: Statements) -> tuple[IndicationError, ...]:
+    """Return what is stated of every indication; zeros where nothing is.
+
+    A load from a tared record is a difference of two readings, each rounded by itself: the standard
+    uncertainty of the rounding is then r/sqrt(6) of a resolution r, as in ISO 376 annex C, else r/sqrt(12).
+    """
+    readings = 1 if record.zero == "included" else 2
+    return tuple(
+        IndicationError(
+            name=cell.name,
+            half_width=(cell.resolution or 0.0) / 2,
+            readings=readings,
+            u=cell.u or 0.0,
+        )
+        for cell in statements.cells
+    )
+
+
+def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[float]) -> NDArray[np.float64]:
+    """Return d load / d indication (indications,) at a point, by central differences."""
+    steps = np.array(
+        [_STEP * _extent(cell.minimum, cell.maximum, x) for cell, x in zip(record.cells, point, strict=True)]
+    )
+    at = np.asarray(point, dtype=np.float64)[:, None]
+    moved = np.hstack([at + np.diag(steps), at - np.diag(steps)])
+    values = term_matrix(load.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
+        load.coefficients
+    )
+    slopes: NDArray[np.float64] = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
+    return slopes
+
+
+def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
+    """Return after minus before of each indication's zero, in its unit; else why it is not known.
+
+    The last reading whose ``when`` begins with *after* is held against the first that begins with *before*;
+    without such words the last reading against the first. Readings with the shunt connected are no zeros.
+    """
+    scope = scope_of(record)
+    entries = [e for e in zero_entries(zero_readings(json.loads(record.settings)), scope) if not e.shunt]
+    if len(entries) < 2:
+        return "no zero before and after the session is stated"
+    moments = [entry.when.casefold() for entry in entries]
+    before = next((i for i, text in enumerate(moments) if text.startswith("before")), 0)
+    after = max((i for i, text in enumerate(moments) if text.startswith("after")), default=len(moments) - 1)
+    first, last = dict(entries[before].values), dict(entries[after].values)
+    missing = [name for name in record.indications if name not in first or name not in last]
+    if missing:
+        return f"the zero readings lack {', '.join(missing)}"
+    return tuple(last[name] - first[name] for name in record.indications)
+
+
+def left_at_zero(record: CalibrationRecord, load: LoadFit) -> float:
+    """Return the load that tared indications of zero would mean [unit of the load]; 0 where it is none.
+
+    An intercept under ``zero = "tared"`` beyond twice its standard uncertainty is no scatter: a gate lets it
+    pass inside the check loads' tolerance, and every reading has it.
+    """
+    if record.zero != "tared" or INTERCEPT not in load.terms:
+        return 0.0
+    at = load.terms.index(INTERCEPT)
+    size = abs(load.coefficients[at])
+    return size if size > 2 * load.standard_errors[at] else 0.0
+
+
+def creep(record: CalibrationRecord, load: LoadFit) -> float | str:
+    """Return the creep of a load as a ratio of the load, |last - first reading|; else why it is not known.
+
+    ISO 376 relates the change of the deflection between 30 s and 300 s to the deflection at the largest
+    force. A reading after unloading is related to the largest load too; of several series the largest counts.
+    """
+    series: dict[str, list[tuple[float, float]]] = {}
+    slope = None
+    for entry in creep_entries(json.loads(record.settings).get("creep", []), scope_of(record)):
+        if entry.load != load.load and len(record.loads) > 1:
+            continue
+        if entry.shown is not None:
+            value = entry.shown[1]
+        else:
+            if slope is None:
+                slope = dict(
+                    zip(record.indications, sensitivities(record, load, _middle(record)), strict=True)
+                )
+            value = sum(float(slope[name]) * reading for name, reading in entry.values)
+        key = f"{entry.load} {' '.join(name for name, _ in entry.values)}"
+        series.setdefault(key, []).append((entry.seconds, value))
+    moved = [
+        abs(max(one_series)[1] - min(one_series)[1]) for one_series in series.values() if len(one_series) > 1
+    ]
+    return max(moved) / load.largest if moved else "no two creep readings of this load are stated"
+
+
+def _middle(record: CalibrationRecord) -> tuple[float, ...]:
+    return tuple(((cell.minimum or 0.0) + (cell.maximum or 0.0)) / 2 for cell in record.cells)
+
+
+def _extent(low: float | None, high: float | None, x: float) -> float:
+    return max(abs(low or 0.0), abs(high or 0.0), abs(x)) or 1.0
+
+
+def record_covariance(record: CalibrationRecord) -> dict[str, NDArray[np.float64]]:
+    """Return load -> covariance of its coefficients (terms, terms), with what the session stated.
+
+    A legacy record, which has no covariance, gives none; a session that states nothing gives the fit's own.
+    """
+    statements = statements_of(record)
+    return {load.load: _covariance(record, load, statements) for load in record.loads if load.covariance}
+
+
+def scale_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -> float:
+    """Return the relative standard uncertainty of a load's scale: reference standard and creep."""
+    # A generalised fit of one shared reference has its error in the covariance already.
+    counted = load.method == "gls" and statements.reference.shared_group is not None
+    u = 0.0 if counted else statements.reference.u(load.load) or load.reference_u or 0.0
+    crept = creep(record, load)
+    relative = 0.0 if isinstance(crept, str) else crept / math.sqrt(3.0)
+    return math.hypot(u / load.largest if load.largest > 0 else 0.0, relative)
+
+
+def offset_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -> float:
+    """Return the standard uncertainty of a shift of all rows [the unit of the load]: cells, zeros."""
+    stated = [cell.u or 0.0 for cell in statements.cells]
+    drift = zero_drift(record)
+    tared = left_at_zero(record, load) / math.sqrt(3.0)
+    if not any(stated) and isinstance(drift, str):
+        return tared
+    middle = [((c.minimum or 0.0) + (c.maximum or 0.0)) / 2 for c in record.cells]
+    slope = sensitivities(record, load, middle)
+    moved = 0.0 if isinstance(drift, str) else float(slope @ np.asarray(drift)) / math.sqrt(3.0)
+    return math.hypot(tared, float(np.linalg.norm(slope * np.asarray(stated))), moved)
+
+
+def _covariance(record: CalibrationRecord, load: LoadFit, statements: Statements) -> NDArray[np.float64]:
+    total = np.array(load.covariance)
+    scale = scale_u(record, load, statements)
+    if scale > 0:
+        c = np.asarray(load.coefficients)
+        total += scale**2 * np.outer(c, c)
+    if INTERCEPT in load.terms:
+        at = load.terms.index(INTERCEPT)
+        total[at, at] += offset_u(record, load, statements) ** 2
+    return total
