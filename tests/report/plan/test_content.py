@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import datetime as dt
+import re
+import zipfile
+from pathlib import Path
 
 import pytest
 
 from tests.report.plan.plan_factory import sheet
 from toolkit.report.plan.content import build_plan_content
 from toolkit.report.style import Style
+from toolkit.words.phrasebook import phrasebook
+
+TEMPLATE = Path(__file__).parents[3] / "report_templates" / "plan.docx"
+MARGINS_TWIPS = 140  # of a cell, both sides
+LETTER_POINTS = 0.52 * 8.5  # of the heads' bold, on average
 
 
 def test_steps_are_numbered_with_room_for_a_mark() -> None:
@@ -50,3 +58,19 @@ def test_a_sheet_speaks_the_language_of_its_style(language: str, title: str, ste
         "de": "< 0,31 in 9 von 10", "fr": "< 0,31 dans 9 cas sur 10"
     }[language]  # fmt: skip
     assert "1393,8" in str(content.tables["plan_steps"].rows[1][3])
+
+
+@pytest.mark.parametrize("language", ["en", "de", "fr"])
+def test_no_word_of_a_head_is_wider_than_its_cell(language: str) -> None:
+    """A word that does not fit is broken in its middle: Schri-tt."""
+    book = phrasebook(language)
+    document = zipfile.ZipFile(TEMPLATE).read("word/document.xml").decode()
+    heads = re.findall(r"<w:tr>(?:(?!</w:tr>).)*<w:tblHeader/>.*?</w:tr>", document)
+    assert len(heads) > 3
+    broken = []
+    for head in heads:
+        for width, text in re.findall(r'<w:tcW w:w="(\d+)".*?<w:t xml:space="preserve">([^<]*)</w:t>', head):
+            room = (int(width) - MARGINS_TWIPS) / 20
+            words = (book.say(text) if book is not None else text).split()
+            broken += [word for word in words if LETTER_POINTS * len(word) > room]
+    assert broken == []
