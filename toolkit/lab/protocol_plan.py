@@ -100,7 +100,7 @@ def plan_test(
         energy_J=1e3 * order.sliding_kJ, rise_K=order.rise_K,
     )  # fmt: skip
     plan = plan_protocol(
-        earlier, demands, _loads(order.loads, earlier), own=own, like=like, minutes=order.minutes,
+        earlier, demands, _loads(order.loads, earlier), machine=own, like=like, minutes=order.minutes,
         tread=tread, tell=tell,
     )  # fmt: skip
     if not plan.feasible:

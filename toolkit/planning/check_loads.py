@@ -43,14 +43,14 @@ def choose_check_loads(
     Loads to ``avoid`` are those of the fit; they are taken where nothing else verifies a term.
     """
 
-    def lacking(chosen: Points) -> float:
-        return -_value(knowledge, loads, list(chosen))
+    def lacking(points: Points) -> float:
+        return -_value(knowledge, loads, list(points))
 
     every = range(len(loads))
-    chosen: Points = ()
+    points: Points = ()
     for pool in ([at for at in every if at not in avoid], every):
-        chosen = grown(chosen, pool, lacking)
-    order = np.array(shrunk(chosen, lacking), dtype=np.intp)
+        points = grown(points, pool, lacking)
+    order = np.array(shrunk(points, lacking), dtype=np.intp)
     return order, verification(knowledge, loads[order])
 
 
@@ -76,15 +76,15 @@ def verification(knowledge: Knowledge, check: NDArray[np.float64]) -> tuple[Veri
     return tuple(results)
 
 
-def _value(knowledge: Knowledge, loads: NDArray[np.float64], chosen: list[int]) -> float:
-    """Return how far check loads are on their way: rank, and each term's movement up to what is asked."""
+def _value(knowledge: Knowledge, loads: NDArray[np.float64], points: list[int]) -> float:
+    """Return how far check loads are on their way: rank, and each term's movement up to what is needed."""
     total = 0.0
     for fit in knowledge.record.loads:
-        if not chosen:
+        if not points:
             continue
-        terms = knowledge.terms(fit, loads[chosen])
-        asked = MARGIN * VERIFIED * (fit.tolerance or 1e-3 * fit.largest)
-        moved = np.abs(fit.coefficients) * np.ptp(terms, axis=0) / asked
+        terms = knowledge.terms(fit, loads[points])
+        needed = MARGIN * VERIFIED * (fit.tolerance or 1e-3 * fit.largest)
+        moved = np.abs(fit.coefficients) * np.ptp(terms, axis=0) / needed
         slopes = [size for term, size in zip(fit.terms, moved.tolist(), strict=True) if term != INTERCEPT]
         total += _rank(terms) + sum(min(size, 1.0) for size in slopes)
     return total

@@ -109,12 +109,12 @@ def _factor(written: str, declared: str) -> float | None:
     if len(wanted) != len(parts):
         return None
     try:
-        given = [unit(part.strip()) for part in parts]
+        units = [unit(part.strip()) for part in parts]
     except UnitError:
         return None
-    if [part.dimension for part in given] != [unit(part).dimension for part in wanted]:
+    if [part.dimension for part in units] != [unit(part).dimension for part in wanted]:
         return None
-    return given[0].factor / (given[1].factor if len(given) > 1 else 1.0)
+    return units[0].factor / (units[1].factor if len(units) > 1 else 1.0)
 
 
 def _wrong(what: str, got: str, expected: str, hint: str = "") -> ConfigError:

@@ -160,10 +160,10 @@ class PointSearch:
         return best_of((tuple(sorted(start)) for start in starts), self.improved, self.loss)
 
     def _alternatives(self, design: Points, place: int) -> Alternatives[Points]:
-        rest = _without(design, place)
+        remaining = _without(design, place)
 
         def with_point(point: int) -> Points:
-            return tuple(sorted((*rest, point)))
+            return tuple(sorted((*remaining, point)))
 
         losses = self.losses([with_point(point) for point in range(self.candidates)])
         return Alternatives(losses=losses, present=design[place], design=with_point)

@@ -255,8 +255,8 @@ def _cells(conditions: Sequence[Condition], machine: Machine, result: TestResult
         rows.append([sign["FY"] * condition.FY, sign["MZ"] * condition.MZ, condition.FZ, 1.0])
     table = np.array(rows)
     scale = np.maximum(np.abs(table).max(axis=0), 1e-300)
-    shown = np.array([condition.indications for condition in conditions])
-    solution = np.linalg.lstsq(table / scale, shown, rcond=None)[0]
+    indications = np.array([condition.indications for condition in conditions])
+    solution = np.linalg.lstsq(table / scale, indications, rcond=None)[0]
     return np.asarray(solution / scale[:, None])
 
 

@@ -172,8 +172,8 @@ def loads_of_record(record: CalibrationRecord, tables: list[Table]) -> FeasibleL
     _, first = np.unique(parts, axis=0, return_index=True)
     loads = np.concatenate([table.matrix(names) for table in tables])[np.sort(first)]
     size = np.abs(loads / largest).max(axis=1)
-    used = size > _SAME_DIRECTION
-    loads, size = loads[used], size[used]
+    loaded = size > _SAME_DIRECTION
+    loads, size = loads[loaded], size[loaded]
     mounts = [_direction(load, names) for load in loads / largest / size[:, None]]
     return FeasibleLoads(
         source=f"the loads of {record.id}'s own session",

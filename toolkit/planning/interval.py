@@ -208,8 +208,8 @@ def plan_interval(
             rule="plan-history",
         )  # fmt: skip
     drifts = [drift_of(path) for path in paths]
-    seen = max(int(np.max(np.diff(path.years)) * YEAR + 0.5) for path in paths)
-    most = min(max(int(STEP * seen), SHORTEST), LONGEST)
+    longest = max(int(np.max(np.diff(path.years)) * YEAR + 0.5) for path in paths)
+    most = min(max(int(STEP * longest), SHORTEST), LONGEST)
     days = 0
     for candidate in range(SHORTEST, most + 1):
         if max(drift.beyond(candidate / YEAR) for drift in drifts) > 1 - reliability:
@@ -225,7 +225,7 @@ def plan_interval(
         paths=len(paths),
         trend_per_year=limiting.trend_per_year,
         walk_per_root_year=limiting.walk_per_root_year,
-        seen_days=seen,
+        seen_days=longest,
         capped=days == most,
         risks=tuple(_risk(drifts, table_days, tests_a_year) for table_days in (91, 183, 365, 548, 731)),
         chosen=_risk(drifts, days or SHORTEST, tests_a_year),

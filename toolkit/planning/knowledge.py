@@ -71,17 +71,17 @@ class Knowledge:
         size = np.maximum(np.abs(design).max(axis=0), 1e-300)
         plane = np.linalg.lstsq(design / size, loads.matrix(record.indications), rcond=None)[0]
         scatter = tuple(scatter_of(record, loads, fit) for fit in record.loads)
-        for fit, own in zip(record.loads, scatter, strict=True):
-            if own.runs.within <= _REPEATABLE * fit.largest:
+        for fit, noise in zip(record.loads, scatter, strict=True):
+            if noise.runs.within <= _REPEATABLE * fit.largest:
                 raise _unfit(
-                    record, fit, f"scatter {own.runs.within:.3g} {fit.unit}", "readings that scatter"
+                    record, fit, f"scatter {noise.runs.within:.3g} {fit.unit}", "readings that scatter"
                 )
         return cls(
             record=record, loads=loads, check=check, plane=plane / size[:, None], scatter=scatter,
-            runs=tuple(cautious(own) for own in scatter),
+            runs=tuple(cautious(noise) for noise in scatter),
             today=tuple(
-                calibration_budget(record, loads, check, fit.load, scatter=own)
-                for fit, own in zip(record.loads, scatter, strict=True)
+                calibration_budget(record, loads, check, fit.load, scatter=noise)
+                for fit, noise in zip(record.loads, scatter, strict=True)
             ),
         )  # fmt: skip
 
@@ -122,8 +122,8 @@ class Knowledge:
         misfits : times that size of the misfit
         """
         return tuple(
-            _response(self.terms(fit, loads), loads[:, at] / fit.largest, up, own, self.runs[at], misfits)
-            for at, (fit, own) in enumerate(self._pairs())
+            _response(self.terms(fit, loads), loads[:, at] / fit.largest, up, noise, self.runs[at], misfits)
+            for at, (fit, noise) in enumerate(self._pairs())
         )
 
     def expected(self, table: Table) -> tuple[Budget, ...]:
@@ -144,11 +144,11 @@ class Knowledge:
         """Return the budgets of one session of planned rows, its scatter drawn and estimated anew."""
         values = table.values.copy()
         run = np.asarray(table.run, dtype=np.intp) - 1
-        for fit, own in zip(self.record.loads, self.runs, strict=True):
+        for fit, sizes in zip(self.record.loads, self.runs, strict=True):
             at, runs = table.names.index(fit.load), int(run.max()) + 1
             relative = table.values[:, at] / fit.largest
-            zero, gain = (rng.normal(size=runs) * sd for sd in (own.zero, own.gain))
-            noise = rng.normal(size=table.rows) * own.within
+            zero, gain = (rng.normal(size=runs) * sd for sd in (sizes.zero, sizes.gain))
+            noise = rng.normal(size=table.rows) * sizes.within
             values[:, at] += zero[run] + gain[run] * relative + noise
         drawn = dataclasses.replace(table, values=values)
         scatters = [
@@ -164,7 +164,7 @@ class Knowledge:
         the zeros of the runs make; None where the rows have too few levels for any.
         """
         sizes: list[float | None] = []
-        for fit, own in self._pairs():
+        for fit, noise in self._pairs():
             design = term_matrix(fit.terms, table.columns(self.record.indications))
             run = np.asarray(table.run)
             zeros = (run[:, None] == np.unique(run)).astype(np.float64)
@@ -173,7 +173,7 @@ class Knowledge:
             relative = table.column(fit.load) / fit.largest
             rests = [relative**power - q @ (q.T @ relative**power) for power in _POWERS]
             squares = [float(rest @ rest) for rest in rests if rest @ rest > _DEPENDENT * table.rows]
-            sizes.append(own.runs.within * math.sqrt(DETECTABLE / squares[0]) if squares else None)
+            sizes.append(noise.runs.within * math.sqrt(DETECTABLE / squares[0]) if squares else None)
         return tuple(sizes)
 
     def weights(self, table: Table) -> NDArray[np.float64]:
@@ -200,12 +200,12 @@ class Knowledge:
         return list(zip(self.record.loads, self.scatter, strict=True))
 
     def _planned(self, at: int, table: Table) -> Scatter:
-        fit, own = self.record.loads[at], self.scatter[at]
+        fit, noise = self.record.loads[at], self.scatter[at]
         design = term_matrix(fit.terms, table.columns(self.record.indications))
         rows = SessionRows.of(design, table.column(fit.load), table, self.record.zero)
         runs = dataclasses.replace(self.runs[at], groups=rows.groups, dof=rows.dof)
         return dataclasses.replace(
-            own, runs=runs, spread=spread(rows, runs), rows=rows_of(design, rows.load, rows.group)
+            noise, runs=runs, spread=spread(rows, runs), rows=rows_of(design, rows.load, rows.group)
         )
 
     def _budgets(self, scatters: list[Scatter]) -> tuple[Budget, ...]:
@@ -237,16 +237,16 @@ def _response(
     terms: NDArray[np.float64],
     relative: NDArray[np.float64],
     up: NDArray[np.bool_],
-    own: Scatter,
+    noise: Scatter,
     runs: RunScatter,
     misfits: float,
 ) -> Response:
     """Return the model of one load, in units of its repeatability."""
-    within = own.runs.within
+    within = noise.runs.within
     side = np.where(up, 1.0, -1.0)
     bent = np.stack([relative**power for power in range(2, HIGHEST_POWER + 1)], axis=1)
     apart = np.stack([side, side * relative, side * relative**2], axis=1)
-    misfit, reversal = (max(size, within) / within for size in (own.misfit, own.reversal))
+    misfit, reversal = (max(size, within) / within for size in (noise.misfit, noise.reversal))
     misfit *= misfits
     zero, gain = (max(size, within) / within for size in (runs.zero, runs.gain))
     wanted = terms.shape[1]

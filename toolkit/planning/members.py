@@ -177,7 +177,7 @@ def _simulated(
     return numbers if all(np.isfinite(column).all() for column in numbers.values()) else None
 
 
-def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, other: Predicted) -> float:
+def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, rival: Predicted) -> float:
     """Return the mean log-evidence of a true member over another one, in a run that is yet to be made.
 
     The divergence of two Gaussians with covariances I + W W^T in the noise's standard deviations (Woodbury's
@@ -188,16 +188,16 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
     ----------
     members : those of the two predictions
     """
-    return min(_divergence(run, member.fit.noise, true, other) for member in members)
+    return min(_divergence(run, member.fit.noise, true, rival) for member in members)
 
 
-def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, other: Predicted) -> float:
-    gap = _white(run, {name: true.outputs[name] - column for name, column in other.outputs.items()}, noise)
-    own, others = _white(run, true.spread, noise), _white(run, other.spread, noise)
-    inner, of_own = (np.eye(w.shape[1]) + w.T @ w for w in (others, own))
-    through, crossed = others.T @ gap, others.T @ own
+def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, rival: Predicted) -> float:
+    gap = _white(run, {name: true.outputs[name] - column for name, column in rival.outputs.items()}, noise)
+    own, rivals = _white(run, true.spread, noise), _white(run, rival.spread, noise)
+    inner, of_own = (np.eye(w.shape[1]) + w.T @ w for w in (rivals, own))
+    through, crossed = rivals.T @ gap, rivals.T @ own
     squares = float(gap @ gap - through @ np.linalg.solve(inner, through))
-    trace = float(np.sum(own**2) - np.sum(others * (others @ np.linalg.inv(inner))))
+    trace = float(np.sum(own**2) - np.sum(rivals * (rivals @ np.linalg.inv(inner))))
     trace -= float(np.sum(crossed * np.linalg.solve(inner, crossed)))
     logs = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(of_own)[1])
     return 0.5 * (squares + trace + logs)

@@ -91,7 +91,7 @@ class NextRun:
     @property
     def together(self) -> tuple[tuple[str, str], ...]:
         """Pairs that stay: whichever of both is true, the other is not expected to fall behind it."""
-        apart = {(true, other): gain for true, other, gain in self.pairs}
+        apart = {(true, rival): gain for true, rival, gain in self.pairs}
         return tuple((a, b) for a, b in apart if a < b and min(apart[a, b], apart[b, a]) <= VERDICT.close)
 
 
@@ -143,7 +143,7 @@ class RunSearch:
         apart = [gain for _, _, gain in self._pairs(run, predictions)]
         # Beyond certainty nothing is won: a run that parts further pairs is better than one that parts one
         # pair further.
-        return float(np.mean([_CERTAIN * (1 - math.exp(-max(one, 0.0) / _CERTAIN)) for one in apart]))
+        return float(np.mean([_CERTAIN * (1 - math.exp(-max(gain, 0.0) / _CERTAIN)) for gain in apart]))
 
     def _predictions(self, run: Run) -> tuple[Predicted, ...] | None:
         predictions = tuple(predict(self.problem, member, run) for member in self.members)
@@ -153,9 +153,9 @@ class RunSearch:
     def _pairs(self, run: Run, predictions: Sequence[Predicted]) -> tuple[tuple[str, str, float], ...]:
         named = list(zip(self.members, predictions, strict=True))
         return tuple(
-            (a.label, b.label, expected_log_evidence(run, (a, b), true, other))
+            (a.label, b.label, expected_log_evidence(run, (a, b), true, rival))
             for a, true in named
-            for b, other in named
+            for b, rival in named
             if a is not b
         )
 
@@ -172,9 +172,9 @@ class RunSearch:
             ),
         ]
         for name in names:
-            others = tuple(entry for entry in change.sizes if entry[0] != name)
+            sizes = tuple(entry for entry in change.sizes if entry[0] != name)
             factors.append(
-                tuple(dataclasses.replace(change, sizes=(*others, (name, size))) for size in _SIZES)
+                tuple(dataclasses.replace(change, sizes=(*sizes, (name, size))) for size in _SIZES)
             )
             flat = tuple(entry for entry in change.levels if entry[0] != name)
             moved = (dataclasses.replace(change, levels=(*flat, (name, level))) for level in _LEVELS)
@@ -251,14 +251,14 @@ def _goes_back(column: Array) -> bool:
 def _source(run: Run, name: str, names: Sequence[str]) -> str | None:
     """Return the channel of which another one is the rate of change; None for none."""
     column = run.columns[name] - run.columns[name].mean()
-    for other in names:
-        if other == name or run.rows < 3:
+    for source in names:
+        if source == name or run.rows < 3:
             continue
-        rate = np.gradient(run.columns[other], run.t)
+        rate = np.gradient(run.columns[source], run.t)
         rate = rate - rate.mean()
         size = float(np.sum(rate**2) * np.sum(column**2))
         if size > 0 and float(np.sum(rate * column)) ** 2 / size > _IS_RATE:
-            return other
+            return source
     return None
 
 
@@ -293,10 +293,10 @@ def changed(problem: Problem, change: Change, limits: Limits) -> Run | None:
     for channel in problem.case.channels:
         if channel.role == "time":
             columns[channel.name] = run.columns[channel.name] + later / unit(channel.unit).factor
-    kept = {key: value for key, value in run.conditions.items() if key not in _OF_A_RECORDING}
+    unchanged = {key: value for key, value in run.conditions.items() if key not in _OF_A_RECORDING}
     return dataclasses.replace(
         run, name="next.csv", t=run.t + later, columns=columns,
-        conditions=kept | dict(change.conditions), declared={**run.declared, **dict(change.conditions)},
+        conditions=unchanged | dict(change.conditions), declared={**run.declared, **dict(change.conditions)},
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from toolkit.declared import Entry, toml_text
 from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, ordered, standard
 from toolkit.planning.printed_units import PrintedUnits, units_of
-from toolkit.planning.protocol_search import Found, ProtocolSearch, Question, least_plan
+from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan
 from toolkit.planning.reach import Reach
 from toolkit.planning.tread import Tread, tread_statement
 from toolkit.tires.fit import MIN_POINTS
@@ -86,7 +86,7 @@ def plan_protocol(
     demands: tuple[Demand, ...],
     loads_N: tuple[float, ...],
     *,
-    own: Machine,
+    machine: Machine,
     tread: Tread,
     like: str,
     minutes: float = math.inf,
@@ -98,7 +98,7 @@ def plan_protocol(
     ----------
     earlier : what is known of the tire, the machine and their scatter
     demands, loads_N : what is asked for, at which nominal loads of the earlier test
-    own : the machine with its own protocol, which the plan is compared with
+    machine : the machine with its own protocol, which the plan is compared with
     tread : what the tire's tread may be put to
     minutes : the time on the machine at most
 
@@ -107,15 +107,15 @@ def plan_protocol(
     ConfigError
         ``plan-infeasible``: the time does not hold the smallest design
     """
-    units = units_of(own.protocol)
-    protocol = protocol_design(earlier, own)
+    units = units_of(machine.protocol)
+    protocol = protocol_design(earlier, machine)
     question = Question.beside(protocol, earlier=earlier, demands=demands, loads_N=loads_N)
     tell("the protocol")
     # The protocol itself has no limits, and so no pauses but its own.
     free = dataclasses.replace(tread, energy_J=math.inf, rise_K=math.inf)
-    of_protocol = Found(design=protocol, reaches=question.reaches(protocol), minutes=free.minutes(protocol))
-    found = least_plan(question, tread, minutes=minutes, tell=tell)
-    alike, same_time = (found, in_time(question, free, protocol)) if found.feasible else (None, None)
+    of_protocol = Judged(design=protocol, reaches=question.reaches(protocol), minutes=free.minutes(protocol))
+    plan = least_plan(question, tread, minutes=minutes, tell=tell)
+    alike, same_time = (plan, in_time(question, free, protocol)) if plan.feasible else (None, None)
     open_demands = tuple(Demand(name=demand.name, SA_rad=demand.SA_rad) for demand in demands)
     limited = not all(map(math.isinf, (minutes, tread.energy_J, tread.rise_K)))
     if alike is not None and (open_demands != demands or limited):
@@ -123,28 +123,28 @@ def plan_protocol(
         as_protocol = Question.beside(protocol, earlier=earlier, demands=open_demands, loads_N=loads_N)
         alike = least_plan(as_protocol, free, tell=tell)
     return ProtocolPlan(
-        feasible=found.feasible,
-        machine=own.name,
+        feasible=plan.feasible,
+        machine=machine.name,
         like=like,
         calibration=None if earlier.shared.record is None else earlier.shared.record.id,
-        plan=_shown(found.design, tread),
+        plan=_shown(plan.design, tread),
         protocol=_shown(protocol, free, in_order=True),
         alike=None if alike is None or not alike.feasible else _shown(alike.design, free),
         same_time=None if same_time is None else _shown(same_time.design, free),
-        values=_values(question, found, of_protocol, same_time),
+        values=_values(question, plan, of_protocol, same_time),
         assumptions=_assumptions(earlier, tread, units),
-        gives_up=_gives_up(found.design, protocol, units),
+        gives_up=_gives_up(plan.design, protocol, units),
     )
 
 
-def protocol_design(earlier: EarlierTest, own: Machine) -> Design:
+def protocol_design(earlier: EarlierTest, machine: Machine) -> Design:
     """Return the design of the machine's protocol, at the earlier test's loads where these are others."""
-    design = standard(own, own.rotations)
+    design = standard(machine, machine.rotations)
     known = set(design.loads_N) <= set(earlier.loads_N)
     return design if known else dataclasses.replace(design, loads_N=earlier.loads_N)
 
 
-def in_time(question: Question, tread: Tread, protocol: Design) -> Found | None:
+def in_time(question: Question, tread: Tread, protocol: Design) -> Judged | None:
     """Return the best design at the protocol's loads that takes no longer; None where it has no curve."""
     search = ProtocolSearch(question, tread, tuple(sorted(protocol.loads_N)))
     most = search.most_within(tread.minutes(protocol))
@@ -167,10 +167,10 @@ def _shown(design: Design, tread: Tread, *, in_order: bool = False) -> PlannedDe
 
 
 def _values(
-    question: Question, found: Found, protocol: Found, same_time: Found | None
+    question: Question, plan: Judged, protocol: Judged, same_time: Judged | None
 ) -> tuple[PlannedValue, ...]:
-    low = {_key(reach): reach.U for reach in question.reaches(found.design, shift=-1.0)}
-    high = {_key(reach): reach.U for reach in question.reaches(found.design, shift=1.0)}
+    low = {_key(reach): reach.U for reach in question.reaches(plan.design, shift=-1.0)}
+    high = {_key(reach): reach.U for reach in question.reaches(plan.design, shift=1.0)}
     by_protocol = {_key(reach): reach.U for reach in protocol.reaches}
     in_same_time = {} if same_time is None else {_key(reach): reach.U for reach in same_time.reaches}
     return tuple(
@@ -189,7 +189,7 @@ def _values(
             same_time_U=in_same_time.get(_key(reach)),
             sources=reach.sources,
         )
-        for reach in found.reaches
+        for reach in plan.reaches
     )
 
 
@@ -253,23 +253,23 @@ def _gives_up(design: Design, protocol: Design, units: PrintedUnits) -> tuple[st
     return tuple(lost)
 
 
-def protocol_text(plan: ProtocolPlan, own: Protocol) -> str:
+def protocol_text(plan: ProtocolPlan, standard_protocol: Protocol) -> str:
     """Return the protocol file of a plan, as ``process --protocol`` and ``test.toml`` read it."""
     lines = "# Planned by `toolkit plan test`: measure the slip angles in this order, in each direction.\n"
     protocol = dataclasses.replace(
-        own,
-        source=f"planned from {plan.like}; all else as in: {own.source}",
+        standard_protocol,
+        source=f"planned from {plan.like}; all else as in: {standard_protocol.source}",
         slip_angles_rad=tuple(math.radians(a) for a in plan.plan.slip_angles_deg),
-        loads_N=_written(plan.plan.loads_N, own.loads_N),
+        loads_N=_written(plan.plan.loads_N, standard_protocol.loads_N),
         rotations=plan.plan.rotations,
         repeats=1,
     )
     return lines + toml_text(protocol)
 
 
-def _written(loads_N: Sequence[float], own: Sequence[float]) -> tuple[float, ...]:
+def _written(loads_N: Sequence[float], as_in: Sequence[float]) -> tuple[float, ...]:
     """Return loads as the machine's protocol writes them, in its unit."""
-    by_size = {float(load): load for load in own}
+    by_size = {float(load): load for load in as_in}
     return tuple(by_size.get(load, load) for load in loads_N)
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # A curve that a report prints is measured to its peak, or to the end of the range: within this part of it.
 _PEAK_SHARE = 0.99
 _SAME_RAD = 1e-9
-_MOST = 30  # slip angles in each direction
+_LARGEST = 30  # slip angles in each direction
 _BEYOND = 1e3  # what a design that goes beyond its limits pays for as much again
 _STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
@@ -96,30 +96,30 @@ class Question:
     @cached_property
     def _at_peak(self) -> NDArray[np.bool_]:
         """Which candidates measure the peak: (loads and sides, candidates)."""
-        every = np.array(self.candidates_rad)
+        angles = np.array(self.candidates_rad)
         rows = []
         for load in self.loads_N:
-            force = np.abs(self.earlier.force(every, load, "forward"))
+            force = np.abs(self.earlier.force(angles, load, "forward"))
             rows += [
                 side & (force >= _PEAK_SHARE * force[side].max(initial=0.0))
-                for side in (every < 0, every > 0)
+                for side in (angles < 0, angles > 0)
             ]
         return np.array(rows)
 
     @cached_property
     def _at_angles(self) -> NDArray[np.bool_]:
         """Which candidates are the slip angle of a demand at one: (demands at slip angles, candidates)."""
-        every = np.array(self.candidates_rad)
+        steps = np.array(self.candidates_rad)
         angles = [demand.SA_rad for demand in self.demands if demand.SA_rad is not None]
-        return np.asarray(np.abs(every - np.array(angles)[:, None]) < _SAME_RAD)
+        return np.asarray(np.abs(steps - np.array(angles)[:, None]) < _SAME_RAD)
 
     def covers(self, points: Points) -> bool:
         """Tell whether candidates give a curve: enough places, to the peak on either side, all demanded."""
-        chosen = list(dict.fromkeys(points))
-        if len(chosen) < MIN_POINTS:
+        places = list(dict.fromkeys(points))
+        if len(places) < MIN_POINTS:
             return False
         needed = np.concatenate([self._at_peak, self._at_angles])
-        return bool(needed[:, chosen].any(axis=1).all())
+        return bool(needed[:, places].any(axis=1).all())
 
     def refuse_what_no_design_has(self) -> None:
         """Refuse a demand at a slip angle where the machine cannot stand or the earlier test has no curve.
@@ -142,7 +142,7 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class Judged:
     """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth."""
 
     design: Design
@@ -182,7 +182,7 @@ class ProtocolSearch:
             energy_limit_J=tread.energy_J,
             minutes_limit=minutes,
         )
-        self.full = self.found(full)
+        self.full = self.judged(full)
         self._screen = screen_of(question.earlier, full, self.full.reaches)
         self._points = PointSearch(self._criterion, len(self.candidates))
         self._best: dict[int, Points] = {}
@@ -192,22 +192,22 @@ class ProtocolSearch:
         angles = tuple(self.candidates[i] for i in points)
         return Design(slip_angles_rad=angles, loads_N=self.loads_N, rotations=self.question.rotations)
 
-    def found(self, design: Design) -> Found:
+    def judged(self, design: Design) -> Judged:
         """Return a design with what it reaches."""
         points = [self.candidates.index(angle) for angle in design.slip_angles_rad]
-        return Found(
+        return Judged(
             design=design, reaches=self.question.reaches(design), minutes=self.tread.minutes(design),
             excess=self.exposure.excess(points),
         )  # fmt: skip
 
-    def best(self, size: int) -> Found:
+    def best(self, size: int) -> Judged:
         """Return the best design of a number of recordings in each direction."""
         if size not in self._best:
             self._tell(f"{size} slip angles")
             larger = min((n for n in self._best if n > size), default=None)
             start = self._best[larger] if larger else tuple(range(len(self.candidates)))
             self._best[size] = self._points.best((self._points.resized(start, size), *self._drawn(size)))
-        return self.found(self.design(self._best[size]))
+        return self.judged(self.design(self._best[size]))
 
     def _drawn(self, size: int) -> Iterator[Points]:
         """Yield designs of a size drawn at random, the same for the same size."""
@@ -215,9 +215,9 @@ class ProtocolSearch:
         for _ in range(_STARTS):
             yield tuple(rng.integers(len(self.candidates), size=size).tolist())
 
-    def least(self, most: int) -> Found | None:
+    def least(self, largest: int) -> Judged | None:
         """Return the best design of the fewest slip angles, at most so many, that meets every demand."""
-        low, high = MIN_POINTS, most
+        low, high = MIN_POINTS, largest
         if high < low or not self.best(high).feasible:
             return None
         while low < high:
@@ -227,7 +227,7 @@ class ProtocolSearch:
 
     def most_within(self, minutes: float) -> int:
         """Return how many slip angles fit into a time."""
-        return int(min(minutes / self.exposure.minutes.min() + 1e-9, _MOST))
+        return int(min(minutes / self.exposure.minutes.min() + 1e-9, _LARGEST))
 
     def _criterion(self, designs: Sequence[Points]) -> NDArray[np.float64]:
         losses = np.full(len(designs), math.inf)
@@ -244,7 +244,7 @@ def least_plan(
     *,
     minutes: float = math.inf,
     tell: Callable[[str], None] = lambda _text: None,
-) -> Found:
+) -> Judged:
     """Return the shortest design that meets every demand, or the nearest to it that the time allows.
 
     Further loads beside those that are asked for are tried, nearest first: by its neighbours a block is
@@ -278,7 +278,7 @@ def least_plan(
             "of a curve",
             next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
         )  # fmt: skip
-    return met or cast("Found", missed)
+    return met or cast("Judged", missed)
 
 
 def load_sets(question: Question) -> tuple[tuple[float, ...], ...]:

@@ -60,9 +60,9 @@ class Response:
         rows[..., start : start + effects] = of_run
         return rows
 
-    def information(self, chosen: NDArray[np.intp], run: NDArray[np.intp], runs: int) -> NDArray[np.float64]:
+    def information(self, points: NDArray[np.intp], run: NDArray[np.intp], runs: int) -> NDArray[np.float64]:
         """Return the information of rows, with what is known beforehand."""
-        rows = np.concatenate([self.row(chosen[run == r], r, runs) for r in range(runs)])
+        rows = np.concatenate([self.row(points[run == r], r, runs) for r in range(runs)])
         precision = np.concatenate([self.precision, np.tile(self.run_precision, runs)])
         return np.asarray(rows.T @ rows + np.diag(precision))
 
@@ -85,18 +85,18 @@ class Price:
         absent = ~np.isin(self.mount, self.mount[rows]) & (self.mount >= 0)
         return self.weight * (self.minutes + self.setup * absent)
 
-    def total(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> float:
+    def total(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> float:
         """Return the minutes of a design."""
         pairs = {
-            (r, self.mount[at]): self.setup[at] for r, at in zip(run.tolist(), chosen.tolist(), strict=True)
+            (r, self.mount[at]): self.setup[at] for r, at in zip(run.tolist(), points.tolist(), strict=True)
         }
         mounted = sum(float(setup) for (_, mount), setup in pairs.items() if mount >= 0)
-        return float(self.minutes[chosen].sum()) + mounted
+        return float(self.minutes[points].sum()) + mounted
 
 
 def loss(
     responses: Sequence[Response],
-    chosen: NDArray[np.intp],
+    points: NDArray[np.intp],
     run: NDArray[np.intp],
     by: Criterion,
     ridge: float = 0.0,
@@ -109,7 +109,7 @@ def loss(
     runs = int(run.max()) + 1
     values = []
     for response in responses:
-        information = response.information(chosen, run, runs)
+        information = response.information(points, run, runs)
         information = information + ridge * np.eye(len(information))
         if np.linalg.matrix_rank(information, hermitian=True) < len(information):
             return float("inf")
@@ -158,32 +158,34 @@ class _Rows:
         )
         return np.asarray(first[np.argsort(np.argsort(self.run, kind="stable"))])
 
-    def loss(self, chosen: NDArray[np.intp]) -> float:
-        value = loss(self.responses, chosen, self.run, self.by, _RIDGE)
-        return value + (0.0 if self.price is None else self.price.weight * self.price.total(chosen, self.run))
+    def loss(self, points: NDArray[np.intp]) -> float:
+        value = loss(self.responses, points, self.run, self.by, _RIDGE)
+        return value + (0.0 if self.price is None else self.price.weight * self.price.total(points, self.run))
 
-    def alternatives(self, chosen: NDArray[np.intp], at: int) -> Alternatives[NDArray[np.intp]]:
-        rest, run_of_rest = np.delete(chosen, at), np.delete(self.run, at)
-        losses = self._losses(rest, run_of_rest, int(self.run[at]))
-        beside = rest[run_of_rest == self.run[at]]
+    def alternatives(self, points: NDArray[np.intp], at: int) -> Alternatives[NDArray[np.intp]]:
+        remaining, run_of_rest = np.delete(points, at), np.delete(self.run, at)
+        losses = self._losses(remaining, run_of_rest, int(self.run[at]))
+        beside = remaining[run_of_rest == self.run[at]]
         if self.price is not None:
             losses = losses + self.price.added(beside)
         if self.once:
             losses[beside] = np.inf
 
         def exchanged_for(candidate: int) -> NDArray[np.intp]:
-            design = chosen.copy()
+            design = points.copy()
             design[at] = candidate
             return design
 
-        return Alternatives(losses=losses, present=int(chosen[at]), design=exchanged_for)
+        return Alternatives(losses=losses, present=int(points[at]), design=exchanged_for)
 
-    def _losses(self, rest: NDArray[np.intp], run_of_rest: NDArray[np.intp], run: int) -> NDArray[np.float64]:
-        """Return the criterion (candidates,) of the rest of a design with each candidate added to a run."""
+    def _losses(
+        self, remaining: NDArray[np.intp], run_of_rest: NDArray[np.intp], run: int
+    ) -> NDArray[np.float64]:
+        """Return the criterion (candidates,) of what remains with each candidate added to a run."""
         runs = int(self.run.max()) + 1
         values = []
         for response in self.responses:
-            information = response.information(rest, run_of_rest, runs)
+            information = response.information(remaining, run_of_rest, runs)
             covariance = np.asarray(np.linalg.inv(information + _RIDGE * np.eye(len(information))))
             rows = response.row(np.arange(len(response.common)), run, runs)
             values.append(with_each_row(covariance, rows, response.targets, self.by))

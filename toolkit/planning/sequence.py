@@ -21,16 +21,16 @@ _STARTS = 16
 
 
 def visits(
-    rows: NDArray[np.intp], chosen: NDArray[np.intp], feasible: FeasibleLoads, up: NDArray[np.bool_]
+    rows: NDArray[np.intp], points: NDArray[np.intp], feasible: FeasibleLoads, up: NDArray[np.bool_]
 ) -> list[NDArray[np.intp]]:
     """Return the rows of a run by mount, each loaded from the smallest up and then down again.
 
-    ``chosen`` (rows of the session,) is the candidate of each row, ``up`` (rows,) its direction.
+    ``points`` (rows of the session,) is the candidate of each row, ``up`` (rows,) its direction.
     """
     by_mount: dict[str, list[int]] = {}
     for row in rows.tolist():
-        by_mount.setdefault(feasible.mount[chosen[row]], []).append(row)
-    size = feasible.amount[chosen]
+        by_mount.setdefault(feasible.mount[points[row]], []).append(row)
+    size = feasible.amount[points]
     return [
         np.array(sorted(group, key=lambda row: (not up[row], size[row] if up[row] else -size[row])))
         for group in by_mount.values()

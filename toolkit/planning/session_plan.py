@@ -114,8 +114,8 @@ class _Finished:
         """Return the plan of a design."""
         knowledge, feasible = self.knowledge, self.feasible
         rng = np.random.default_rng([self.demand.seed, 1])
-        load, up = self.search.place[design.chosen], self.search.up[design.chosen]
-        table = self.search.table(design.chosen, design.run)
+        load, up = self.search.place[design.points], self.search.up[design.points]
+        table = self.search.table(design.points, design.run)
         runs = [
             visits(np.flatnonzero(design.run == number), load, feasible, up) for number in range(design.runs)
         ]
@@ -133,7 +133,7 @@ class _Finished:
             instrument=knowledge.record.instrument,
             source=feasible.source,
             criterion=self.demand.criterion,
-            criterion_value=loss(self.search.responses, design.chosen, design.run, self.demand.criterion),
+            criterion_value=loss(self.search.responses, design.points, design.run, self.demand.criterion),
             runs=design.runs,
             rows=tuple(
                 self._row(int(load[at]), int(design.run[at]) + 1, bool(up[at])) for at in order.tolist()
@@ -144,7 +144,7 @@ class _Finished:
             minutes=minutes,
             rows_today=knowledge.loads.rows,
             check_today=0 if knowledge.check is None else knowledge.check.rows,
-            replicates=self.search.repeats(design.chosen),
+            replicates=self.search.repeats(design.points),
             simulated=self.demand.simulated,
             assumptions=self._assumptions(),
             gives_up=self._gives_up(design, outlook),
@@ -157,7 +157,7 @@ class _Finished:
         """Return check loads, what they verify, all minutes; none of the fit where that takes no longer."""
         search = self.search
         apart, verified = choose_check_loads(self.knowledge, self.feasible.loads, frozenset(load.tolist()))
-        minutes = search.minutes(design.chosen, design.run, apart)
+        minutes = search.minutes(design.points, design.run, apart)
         if minutes is not None and design.minutes is not None and minutes > design.minutes:
             return search.check, search.verified, design.minutes
         return apart, verified, minutes
@@ -182,9 +182,10 @@ class _Finished:
                 share=float(np.mean(drawn[:, at] <= self.asked[at] * (1 + 1e-9)))
                 if math.isfinite(self.asked[at]) else None,
                 floor=knowledge.floor(at), visible_misfit=misfits[at],
-                drift=float(answers[at, 0]) * own.runs.within, creep=float(answers[at, 1]) * own.runs.within,
+                drift=float(answers[at, 0]) * noise.runs.within,
+                creep=float(answers[at, 1]) * noise.runs.within,
             )
-            for at, (fit, own, budget) in enumerate(
+            for at, (fit, noise, budget) in enumerate(
                 zip(knowledge.record.loads, knowledge.scatter, knowledge.today, strict=True)
             )
         )  # fmt: skip
@@ -192,14 +193,14 @@ class _Finished:
     def _assumptions(self) -> tuple[str, ...]:
         knowledge, record = self.knowledge, self.knowledge.record
         between = ", ".join(
-            f"{fit.load} {own.within:.3g} / {own.zero:.3g} / {own.gain:.3g} {fit.unit.replace('*', '·')}"
-            for fit, own in zip(record.loads, knowledge.runs, strict=True)
+            f"{fit.load} {size.within:.3g} / {size.zero:.3g} / {size.gain:.3g} {fit.unit.replace('*', '·')}"
+            for fit, size in zip(record.loads, knowledge.runs, strict=True)
         )
-        told = knowledge.scatter[0].runs.groups
+        groups = knowledge.scatter[0].runs.groups
         return (
             f"readings scatter as in {record.id}, runs by a standard error more (within a run / its zero / "
             "its gain): "
-            f"{between}" + (f", from {told} runs" if told > 1 else "; one run tells nothing of the next"),
+            f"{between}" + (f", from {groups} runs" if groups > 1 else "; one run tells nothing of the next"),
             f"the equations are those of {record.id}, and the cells answer as they did then",
             "readings are independent of each other but for the zero and the gain of their run",
             "what the record's budget takes from statements (reference, resolution, creep, zero) stays",
@@ -245,7 +246,7 @@ class _Finished:
             for entry in verified
             if not entry.verified
         ]  # fmt: skip
-        for load, own in zip(outlook, self.knowledge.scatter, strict=True):
+        for load, noise in zip(outlook, self.knowledge.scatter, strict=True):
             sizes = {"drift": load.drift, "creep": load.creep}
             findings += [
                 Finding(
@@ -254,6 +255,6 @@ class _Finished:
                     f"{load.unit}: read the zeros before and after each run",
                 )
                 for name, size in sizes.items()
-                if size > _LARGE * own.runs.within
+                if size > _LARGE * noise.runs.within
             ]  # fmt: skip
         return tuple(findings)

@@ -56,7 +56,7 @@ class Demand:
 class Design:
     """Chosen candidates of the doubled list (up, then down) and the run of each row."""
 
-    chosen: NDArray[np.intp]
+    points: NDArray[np.intp]
     run: NDArray[np.intp]
     U: NDArray[np.float64]
     minutes: float | None
@@ -141,22 +141,22 @@ class SessionSearch:
                 rule="plan-infeasible",
             )  # fmt: skip
 
-    def _blind(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> list[str]:
+    def _blind(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> list[str]:
         """Return the loads of which rows show no misfit of the equation."""
-        visible = self.knowledge.visible_misfit(self.table(chosen, run))
-        levels = [len(np.unique(column)) for column in self.loads[chosen].T]
+        visible = self.knowledge.visible_misfit(self.table(points, run))
+        levels = [len(np.unique(column)) for column in self.loads[points].T]
         named = zip(self.knowledge.names, visible, levels, strict=True)
         return [name for name, size, count in named if size is None or count < FEWEST_LEVELS]
 
-    def repeats(self, chosen: NDArray[np.intp]) -> int:
+    def repeats(self, points: NDArray[np.intp]) -> int:
         """Return how many rows repeat another run's: by these a misfit is told from scatter."""
-        return len(chosen) - len(np.unique(chosen))
+        return len(points) - len(np.unique(points))
 
     def _shows_misfit(self, design: Design) -> bool:
         """Tell whether a misfit can be seen: levels enough, and repeats that say what scatter is."""
         if self.demand.two_levels:
             return True
-        return self.repeats(design.chosen) >= FEWEST_REPEATS and not self._blind(design.chosen, design.run)
+        return self.repeats(design.points) >= FEWEST_REPEATS and not self._blind(design.points, design.run)
 
     def design(self, runs: int, per_run: int, starts: int = _SEARCH_STARTS) -> Design:
         """Return the design of a number of runs and rows in each."""
@@ -166,18 +166,18 @@ class SessionSearch:
         run = np.repeat(np.arange(runs), per_run)
         rng = np.random.default_rng([self.demand.seed, runs, per_run])
         for responses in self._bent:
-            chosen = self._chosen(responses, run, rng, starts)
-            budgets = self.knowledge.expected(self.table(chosen, run))
+            points = self._points(responses, run, rng, starts)
+            budgets = self.knowledge.expected(self.table(points, run))
             design = Design(
-                chosen=chosen, run=run, U=np.array([budget.U for budget in budgets]),
-                minutes=self.minutes(chosen, run, self.check),
+                points=points, run=run, U=np.array([budget.U for budget in budgets]),
+                minutes=self.minutes(points, run, self.check),
             )  # fmt: skip
             if self._shows_misfit(design):
                 break
         self._designs[key] = design
         return design
 
-    def _chosen(
+    def _points(
         self, responses: Sequence[Response], run: NDArray[np.intp], rng: np.random.Generator, starts: int
     ) -> NDArray[np.intp]:
         """Return the rows of an exchange; where time is stated, with as few mounts as the runs allow."""
@@ -185,23 +185,23 @@ class SessionSearch:
         def exchanged(price: Price | None) -> NDArray[np.intp]:
             return exchange(responses, run, self.demand.criterion, rng, starts=starts, price=price, once=True)
 
-        chosen = exchanged(None)
+        points = exchanged(None)
         if self.feasible.setup_minutes is None:
-            return chosen
-        price = self._price(chosen, run)
+            return points
+        price = self._price(points, run)
         for share in _SHARES:
             cheaper = exchanged(dataclasses.replace(price, weight=share * price.weight))
             if self._seen_in_runs(cheaper, run):
                 return cheaper
-        return chosen
+        return points
 
-    def _seen_in_runs(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> bool:
+    def _seen_in_runs(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> bool:
         """Tell whether every load is large in as many runs as tell how runs differ."""
         largest = np.abs(self.feasible.loads).max(axis=0)
-        large = np.abs(self.loads[chosen]) >= _LARGE * largest
+        large = np.abs(self.loads[points]) >= _LARGE * largest
         return all(len(np.unique(run[column])) >= FEWEST_RUNS for column in large.T)
 
-    def _price(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> Price:
+    def _price(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> Price:
         """Return what a minute is worth: as much as it brings where it is spent on further rows."""
         feasible, by = self.feasible, self.demand.criterion
         setup = feasible.setup_minutes or {}
@@ -214,23 +214,23 @@ class SessionSearch:
             weight=1.0,
         )
         # n rows have a determinant as n^p and variances as 1/n: d(loss) for a share of n.
-        worth = loss(self.responses, chosen, run, by)
+        worth = loss(self.responses, points, run, by)
         if by == "D":
             worth = float(sum(response.wanted for response in self.responses))
-        return dataclasses.replace(price, weight=worth / max(price.total(chosen, run), 1e-9))
+        return dataclasses.replace(price, weight=worth / max(price.total(points, run), 1e-9))
 
-    def table(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> Table:
+    def table(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> Table:
         """Return a design as a session's table."""
-        return self.knowledge.table(self.loads[chosen], run, self.up[chosen])
+        return self.knowledge.table(self.loads[points], run, self.up[points])
 
     def minutes(
-        self, chosen: NDArray[np.intp], run: NDArray[np.intp], check: NDArray[np.intp]
+        self, points: NDArray[np.intp], run: NDArray[np.intp], check: NDArray[np.intp]
     ) -> float | None:
         """Return how long readings, mountings, runs and check loads take; None where nobody stated it."""
         feasible = self.feasible
         if feasible.minutes is None or feasible.setup_minutes is None or feasible.run_minutes is None:
             return None
-        load = self.place[chosen]
+        load = self.place[points]
         mounted = {(r, feasible.mount[at]) for r, at in zip(run.tolist(), load.tolist(), strict=True)}
         mounted |= {(-1, feasible.mount[at]) for at in check.tolist()}
         setup = sum(feasible.setup_minutes.get(mount, 0.0) for _, mount in mounted)
@@ -255,7 +255,7 @@ class SessionSearch:
         return min(MOST_ROWS // runs, len(self.place))
 
     def _shortest(self) -> Design:
-        kept: list[Design] = []
+        keeping: list[Design] = []
         floors = np.array([self.knowledge.floor(at) for at in range(len(self.asked))])
         if (self.asked < floors).any():  # not even known coefficients would do
             for runs in (FEWEST_RUNS, MOST_RUNS):
@@ -265,13 +265,13 @@ class SessionSearch:
             least = self._fewest(runs)
             if least > self._most(runs):
                 continue
-            if self.feasible.minutes is None and kept and min(map(self._cost, kept)) <= runs * least:
+            if self.feasible.minutes is None and keeping and min(map(self._cost, keeping)) <= runs * least:
                 continue
             design = self._shortest_of(runs, least)
-            kept += [] if design is None else [design]
-        if not kept:
+            keeping += [] if design is None else [design]
+        if not keeping:
             self._refuse_uncertainty()
-        best = min(kept, key=self._cost)
+        best = min(keeping, key=self._cost)
         if not self._within(best):
             nearest = self._least_within_limits(refuse=False)
             raise ConfigError(

@@ -72,11 +72,11 @@ class Tread:
 
     def rises_K(self, design: Design) -> Array:
         """Return how warm a recording makes a cold tread, the warmer direction's (slip angles, loads)."""
-        kept = math.exp(-self.pace.condition_s / _TREAD.tread_cooling_s)
+        cooled = math.exp(-self.pace.condition_s / _TREAD.tread_cooling_s)
         steady = _TREAD.tread_heating_K_J * _TREAD.tread_cooling_s * self.powers_W(design).max(axis=1)
         rise, rises = np.zeros(len(steady)), []
         for column in steady.T:
-            rise = rise * kept + column * (1 - kept)
+            rise = rise * cooled + column * (1 - cooled)
             rises.append(rise)
         return np.stack(rises, axis=1)
 
@@ -86,8 +86,8 @@ class Tread:
         if math.isinf(self.rise_K):
             return np.full(len(design.slip_angles_rad), pace.between_files_s)
         cooling = _TREAD.tread_cooling_s
-        kept = np.exp(-pace.condition_s / cooling * np.arange(1, len(design.loads_N) + 1))
-        start = ((self.rise_K - self.rises_K(design)) / kept).min(axis=1)
+        cooled = np.exp(-pace.condition_s / cooling * np.arange(1, len(design.loads_N) + 1))
+        start = ((self.rise_K - self.rises_K(design)) / cooled).min(axis=1)
         with np.errstate(divide="ignore"):
             waits = cooling * np.log(self.rise_K / np.maximum(start, 0.0))
         return np.asarray(np.maximum(waits, pace.between_files_s))
@@ -109,8 +109,8 @@ class Exposure:
 
     def excess(self, points: Sequence[int]) -> float:
         """Return by how much a design goes beyond its limits, as a share of each; 0 within them."""
-        chosen = list(points)
-        time, energy = float(self.minutes[chosen].sum()), float(self.energies_J[chosen].sum())
+        places = list(points)
+        time, energy = float(self.minutes[places].sum()), float(self.energies_J[places].sum())
         if math.isinf(time):
-            return float(np.isinf(self.minutes[chosen]).sum())
+            return float(np.isinf(self.minutes[places]).sum())
         return max(time / self.minutes_limit - 1, 0.0) + max(energy / self.energy_limit_J - 1, 0.0)
