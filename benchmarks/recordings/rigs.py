@@ -27,8 +27,8 @@ RIGS: tuple[Recording, ...] = (
             "0B.99-Step_Test_Data.csv": "a384e1747c09598070ba6451dd0c5febd091ffbad6c662c5842f41924d055633",
         },
         missing="the sensor follows its heater with a lag: the course goes from one state to two, heater "
-        "and sensor (recalled and not read again); simulated: one heated mass. The temperatures stand on steps "
-        "of 0.32 K, which is the converter and no answer to the lag",
+        "and sensor (recalled and not read again); simulated: one heated mass. The temperatures stand on "
+        "steps of 0.32 K, which is the converter and no answer to the lag",
     ),
     Recording(
         name="torsional_wheel", licence="MIT", kind="named", names=("viscous_damping",),
