@@ -30,15 +30,16 @@ def _answer_in_parts(payload: dict[str, Any]) -> None:
 
 def _check(payload: Mapping[str, Any], *, whole: bool) -> None:
     """Refuse an answer that departs; one that is printed for people may lack keys."""
+    from toolkit.cli.groups import declared_type
+    from toolkit.declared import json_value
     from toolkit.declared.answers import departures
-    from toolkit.lab.answer_types import declared_type
 
     context = typer._click.globals.get_current_context(silent=True)
     declared = None if context is None else getattr(context.command.callback, "answer", None)
     if context is None and "requested" in payload:  # a request is answered after its command has ended
-        declared = "toolkit.lab.decision_answer_types:RequestedAnswer"
+        declared = "toolkit.lab.signing:RequestedAnswer"
     if declared is not None:
-        document = {key: value for key, value in console._plain(payload).items() if key != "schema"}
+        document = {key: value for key, value in json_value(payload).items() if key != "schema"}
         departs = [
             fault
             for fault in departures(document, declared_type(declared))

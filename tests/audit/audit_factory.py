@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from toolkit.audit.columns import Columns
+from tests.recording.printed import half_last_place
+from toolkit.audit.model import Columns
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, sealed
-from toolkit.recording.digits import half_last_place
 
 TERMS = ("D51", "D52", "E5", "intercept")
 # Source document, chapter 4.1: Fy in lb, Mz in lb-ft; "the third term [..] was taken as negative".

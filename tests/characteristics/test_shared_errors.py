@@ -11,7 +11,7 @@ import pytest
 
 from tests.characteristics.weighted_sums import calibration_u
 from toolkit.calibration.registry.registry import Registry
-from toolkit.calibration.uncertainty.propagation import record_covariance
+from toolkit.calibration.uncertainty.common_errors import record_covariance
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.lab.home import packaged_home

@@ -193,7 +193,9 @@ def read_back(path: Path) -> dict[str, np.ndarray]:
 
 def stripped(path: Path, folder: Path) -> Path:
     """The file's indications alone, in its own format."""
-    from toolkit.recording.formats.write import Written, mdf_bytes, tdms_bytes
+    from toolkit.recording.formats.mdf import mdf_bytes
+    from toolkit.recording.formats.tdms import tdms_bytes
+    from toolkit.recording.formats.vectors import Written
 
     columns = {name: values for name, values in read_back(path).items() if name[0] in "gt"}
     target = folder / f"indications{path.suffix}"

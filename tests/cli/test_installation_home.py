@@ -84,7 +84,7 @@ def test_wrong_words_end_with_2(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_bug_ends_with_101(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(doctor, "mending_command", lambda: 1 / 0)
+    monkeypatch.setattr(doctor, "_mending_command", lambda: 1 / 0)
     monkeypatch.setenv("PATH", "/nonexistent")
     assert code_of("doctor") == 101
     assert "this is a bug" in capsys.readouterr().err

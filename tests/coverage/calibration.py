@@ -23,7 +23,7 @@ from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.stored import stored_loads
 from toolkit.calibration.uncertainty.budget import predict
-from toolkit.calibration.uncertainty.propagation import record_covariance
+from toolkit.calibration.uncertainty.common_errors import record_covariance
 
 FULL = 4000.0
 SENSITIVITY = 2000.0

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
 import pytest
 
-from toolkit.declared.answers import answer_reference, answer_schema, departures
+from toolkit.declared.answers import answer_reference, answer_schema, departures, entry_of
 
 
 class Row(TypedDict):
@@ -76,3 +78,50 @@ def test_schema_and_page_say_what_is_declared() -> None:
     assert "| `rows` | list of [`Row`](#row) | one a load |" in page
     assert "| `extra` | any value | not always: whatever it is |" in page
     assert "### Row\n\n`rows[]`: A row of the table." in page
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What an entry is filled from: more than it says, and a value that is computed."""
+
+    load_N: float
+    day: date
+    rows: tuple[object, ...] = ()
+    spare: str = ""
+
+    @property
+    def grade(self) -> str:
+        return "good" if self.load_N > 1 else "bad"
+
+
+class Series(TypedDict):
+    """Rows of a day."""
+
+    day: str
+    rows: list[Row]
+    ends: NotRequired[tuple[float, float]]
+
+
+def test_an_entry_is_filled_from_attributes_and_what_stands_inside_it() -> None:
+    inside = (Measured(4.0, date(2026, 3, 2)), Measured(0.5, date(2026, 3, 3)))
+    series = entry_of(Series, Measured(1.0, date(2026, 3, 1), inside))
+    assert series == {
+        "day": "2026-03-01",
+        "rows": [{"load_N": 4.0, "grade": "good"}, {"load_N": 0.5, "grade": "bad"}],
+    }
+    assert not list(departures(series, Series))
+
+
+def test_what_is_stated_stands_in_the_place_of_an_attribute() -> None:
+    assert entry_of(Row, Measured(4.0, date(2026, 3, 2)), grade="bad") == {"load_N": 4.0, "grade": "bad"}
+
+
+@pytest.mark.parametrize(
+    ("stated", "error"),
+    [({}, AttributeError), ({"load_N": 1.0, "grade": "good", "extra": 2}, TypeError)],
+)
+def test_an_entry_says_all_that_is_declared_and_nothing_else(
+    stated: dict[str, Any], error: type[Exception]
+) -> None:
+    with pytest.raises(error):
+        entry_of(Row, object(), **stated)

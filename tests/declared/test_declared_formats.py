@@ -12,7 +12,7 @@ from tests.house.pages import formats
 from toolkit.calibration.session.session_file import SessionFile
 from toolkit.declared import json_schema, plain, read, read_text, reference, starter, table_of, toml_text
 from toolkit.machine.definition import load_machine, machine_file, machine_names, machine_of_text
-from toolkit.recording.details import StatedTest
+from toolkit.recording.folder import StatedTest
 
 ROOT = Path(__file__).resolve().parents[2]
 FORMATS = formats()

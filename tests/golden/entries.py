@@ -63,7 +63,7 @@ def entries(*, quick: bool = False, only: Iterable[str] = ()) -> list[Entry]:
 def ask(entry: Entry, place: Workplace) -> Any:
     """Return today's answer as JSON would give it back, under the version that froze the others."""
     text = json.dumps(entry.question(place.room(entry.name)))
-    for form in ('"{}"', "toolkit {}"):
+    for form in ('"{}"', "toolkit {}", ">v{}<"):
         text = text.replace(form.format(__version__), form.format(FROZEN_BY))
     return json.loads(text)
 

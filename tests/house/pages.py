@@ -19,7 +19,7 @@ from typing import Any, get_args
 from tests.house import manual
 from tests.house.source import ROOT, read_package
 from toolkit.characteristics.catalogue import characteristics
-from toolkit.cli.groups import declared_answers
+from toolkit.cli.groups import declared_answers, declared_type
 from toolkit.cli.main import command_tree
 from toolkit.declared import Format, reference, starter, table_of
 from toolkit.declared.answers import answer_reference
@@ -27,7 +27,6 @@ from toolkit.declared.declaration import form_of
 from toolkit.declared.describe import _sections
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, Stage
-from toolkit.lab.answer_types import declared_type
 from toolkit.lab.rules import effect_keys, rules_catalogue
 from toolkit.report.kinds import write_manual
 

@@ -7,7 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from tests.recording.format_checks import whole
@@ -15,6 +15,7 @@ from tests.recording.workbook_factory import DATA, HEADERS
 from toolkit.errors import CellError, ColumnError, ToolkitError, UnreadableError
 from toolkit.machine import load_machine
 from toolkit.recording import csvfile, read_recording
+from toolkit.recording.read import LARGEST
 
 M15 = load_machine("m15")
 DIALECTS = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]
@@ -211,6 +212,7 @@ def number(cell: str, separator: str, decimal: str) -> float | None:
     ),
     dialect=st.sampled_from(DIALECTS),
 )
+@example(cells=["1E101"], dialect=(",", "."))
 def test_whatever_stands_in_the_cells_a_comma_is_one_thing_in_a_whole_file(read, cells, dialect):
     separator, decimal = dialect
     rows = text(separator=separator, decimal=decimal).splitlines()
@@ -219,7 +221,7 @@ def test_whatever_stands_in_the_cells_a_comma_is_one_thing_in_a_whole_file(read,
         fields[1] = cell
         rows[1 + i] = separator.join(fields)
     wanted = [number(cell, separator, decimal) for cell in cells]
-    if None in wanted:
+    if None in wanted or max(map(abs, wanted)) > LARGEST:
         with pytest.raises(ToolkitError) as caught:
             read("\n".join(rows))
         whole(caught.value)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from tests.recording.printed import half_last_place
 from toolkit.examples.fig4_4 import ROWS, SYMBOLS
-from toolkit.recording.digits import half_last_place
 
 
 def by_text(values: list[float]) -> list[float]:

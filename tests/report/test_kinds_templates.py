@@ -33,7 +33,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import Result
 from toolkit.errors import ConfigError
 from toolkit.lab.rules import rules_catalogue
-from toolkit.recording.details import read_details
+from toolkit.recording.folder import read_details
 from toolkit.report.audit.content import build_audit_content
 from toolkit.report.audit.page import AuditView
 from toolkit.report.certificate.collect import collect

@@ -19,10 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
-from toolkit.audit.model import CLEAN
+from toolkit.audit.model import CLEAN, columns_of
 from toolkit.calibration.registry.registry import instrument_of
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import OutputError, ToolkitError
@@ -30,7 +29,8 @@ from toolkit.files import real_path, sha256_file
 from toolkit.inputs import SETTINGS_FILE, read_input
 from toolkit.publication import publication, settle
 from toolkit.recording.folder import TEST_FILE, nearest_test_toml
-from toolkit.recording.formats.write import WRITERS, Written
+from toolkit.recording.formats import WRITERS
+from toolkit.recording.formats.vectors import Written
 from toolkit.recording.labview import write_labview
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
 from toolkit.recording.read import read_recording

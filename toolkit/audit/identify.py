@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.audit.candidates import Group, describe, group_of, unfit
-from toolkit.audit.columns import Columns
-from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
+from toolkit.audit.model import Columns, Grade, Identification, Repair, Segment, Skipped, worst
 from toolkit.audit.runs import Hit, Partition, Reach, Runs, products, reach_of, without_chance
 from toolkit.audit.screen import Key, Screen, probe_rows, screen_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
@@ -404,15 +403,12 @@ def _in_columns(group: Group, term: str) -> str:
 
 def _scale(group: Group, columns: Columns, term: str) -> float:
     # From the record's indication units to the file's, so that records in other units compare.
-    from toolkit.calibration.terms import parse_term
+    from toolkit.calibration.terms import evaluate, parse_term
 
     have = dict(zip(columns.names, columns.units, strict=True))
     units = dict(zip(group.record.indications, group.record.indication_units, strict=True))
-    factor = 1.0
-    parsed = parse_term(term)
-    for name, power in (*parsed.powers, *((name, 1) for name in parsed.absolutes)):
-        factor *= (si_scale(have[name]) / si_scale(units[name])) ** power
-    return factor
+    ratios = {name: si_scale(have[name]) / si_scale(text) for name, text in units.items()}
+    return float(evaluate(parse_term(term), ratios, 1.0))
 
 
 def _constant(record: CalibrationRecord, load: str, coefficients: NDArray[np.float64]) -> float:

@@ -1,7 +1,8 @@
 """Terms of a calibration equation: names such as ``D51``, ``D51^2``, ``D51*E5``, ``abs(D51)``.
 
 A term is a product of powers and absolute values of indications. The same text names it in sessions,
-records, tables and JSON, and the same function evaluates it on arrays and on exact rationals.
+records, tables and JSON, and the same function evaluates it on arrays and on exact rationals. The digits in
+which its coefficient is issued follow from how far the term reaches.
 """
 
 from __future__ import annotations
@@ -20,10 +21,13 @@ from toolkit.errors import SessionError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+
 INTERCEPT = "intercept"
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _FACTOR = re.compile(r"(?:(?P<name>[A-Za-z]\w*)(?:\^(?P<power>[1-9]))?|abs\((?P<abs>[A-Za-z]\w*)\))\Z")
 MODELS = ("linear", "polynomial", "balance")
+_FEWEST_DIGITS = 5
+_ROUNDING = 1e-5  # of the largest load
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +37,16 @@ class Term:
     name: str
     powers: tuple[tuple[str, int], ...]
     absolutes: tuple[str, ...]
+
+    @property
+    def indications(self) -> tuple[str, ...]:
+        """The indications that it takes."""
+        return (*(name for name, _ in self.powers), *self.absolutes)
+
+    @property
+    def degree(self) -> int:
+        """The power of a factor that all indications share."""
+        return sum(power for _, power in self.powers) + len(self.absolutes)
 
 
 @lru_cache(maxsize=4096)
@@ -152,3 +166,27 @@ def term_slopes(terms: Sequence[str], coefficients: Any, columns: Mapping[str, A
                 product = product if k == i else product * value
             found[name] = found[name] + product
     return found
+
+
+def issued_value(coefficient: float, extent: float, largest: float) -> float:
+    """Return a coefficient in as few digits as its use allows, at least five.
+
+    ``extent`` is the largest absolute value of its term in the session, ``largest`` the largest load: the
+    rounding may move a load by at most 1e-5 of the largest.
+
+    >>> issued_value(0.997193821, 500.0, 500.0)
+    0.99719
+    """
+    for digits in range(_FEWEST_DIGITS, 17):
+        value = float(f"{coefficient:.{digits}g}")
+        if abs(value - coefficient) * extent <= _ROUNDING * largest:
+            return value
+    return coefficient
+
+
+def term_reach(terms: NDArray[np.float64], has_constant: bool) -> NDArray[np.float64]:
+    """Return the range of each term over the rows; 1 for the constant."""
+    reach: NDArray[np.float64] = np.ptp(terms, axis=0)
+    if has_constant:
+        reach[-1] = 1.0
+    return reach

@@ -27,7 +27,7 @@ from toolkit.cli.console import (
 NAME = "audit"
 
 
-@answers("toolkit.lab.archive_answer_types:AuditAnswer")
+@answers("toolkit.lab.audit_answer:AuditAnswer")
 def command(
     archive: Annotated[Path, typer.Argument(help="A folder of recordings, in any depth.")],
     workers: Annotated[

@@ -39,7 +39,7 @@ Figures = Annotated[
 ]
 
 
-@answers("toolkit.lab.record_answer_types:CalibrateAnswer")
+@answers("toolkit.lab.session_answer:CalibrateAnswer")
 def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
     calibrations: NewCalibrations = None,

@@ -43,7 +43,7 @@ KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known 
 
 
 @app.command("list")
-@answers("toolkit.lab.record_answer_types:ListAnswer")
+@answers("toolkit.lab.registry_answer:ListAnswer")
 def list_records(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     everything: Annotated[bool, typer.Option("--all", help="Discarded candidates too.")] = False,
@@ -68,7 +68,7 @@ def list_records(
 
 
 @app.command()
-@answers("toolkit.lab.record_answer_types:ShowAnswer")
+@answers("toolkit.lab.registry_answer:ShowAnswer")
 def show(
     record_id: Id,
     known_at: KnownAt = None,
@@ -97,7 +97,7 @@ def show(
 
 
 @app.command()
-@answers("toolkit.lab.decision_answer_types:VerifyRegistryAnswer")
+@answers("toolkit.lab.decisions:VerifyRegistryAnswer")
 def verify(
     head: Annotated[str | None, typer.Option("--head", help="A ledger hash printed earlier.")] = None,
     calibrations: Calibrations = None,
@@ -124,7 +124,7 @@ def verify(
 
 
 @app.command()
-@answers("toolkit.lab.record_answer_types:HistoryAnswer")
+@answers("toolkit.lab.registry_answer:HistoryAnswer")
 def history(
     name: Annotated[str, typer.Argument(help="An instrument, or a record id.")],
     calibrations: Calibrations = None,
@@ -147,7 +147,7 @@ def history(
 
 
 @app.command("import")
-@answers("toolkit.lab.decision_answer_types:ImportAnswer")
+@answers("toolkit.lab.decisions:ImportAnswer")
 def import_record(
     file: Annotated[Path, typer.Argument(help="TOML with the coefficients and the source that names them.")],
     again: Annotated[
@@ -193,7 +193,7 @@ def import_record(
 
 
 @app.command()
-@answers("toolkit.lab.decision_answer_types:ApproveAnswer")
+@answers("toolkit.lab.decisions:ApproveAnswer")
 def approve(
     record_id: Id,
     in_force_from: Annotated[str, typer.Option("--in-force-from", help=IN_FORCE)],
@@ -268,7 +268,7 @@ def approve(
 
 
 @app.command()
-@answers("toolkit.lab.decision_answer_types:WithdrawAnswer")
+@answers("toolkit.lab.decisions:WithdrawAnswer")
 def withdraw(
     record_id: Id,
     on: Annotated[str, typer.Option("--on", help="Day on which the fault became known (YYYY-MM-DD).")],
@@ -308,7 +308,7 @@ def withdraw(
     return 0
 
 
-@answers("toolkit.lab.control_answer_types:DifferenceAnswer")
+@answers("toolkit.lab.registry_answer:DifferenceAnswer")
 def diff(
     one: Id,
     other: Id,
@@ -328,7 +328,7 @@ def diff(
     return 1 if differs else 0
 
 
-@answers("toolkit.lab.decision_answer_types:DiscardAnswer")
+@answers("toolkit.lab.decisions:DiscardAnswer")
 def discard(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
     reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
@@ -361,7 +361,7 @@ def discard(
     return 0
 
 
-@answers("toolkit.lab.control_answer_types:RecordReportAnswer")
+@answers("toolkit.lab.session_answer:RecordReportAnswer")
 def report(
     record_id: Id,
     figures: Figures = None,

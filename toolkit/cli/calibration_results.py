@@ -39,7 +39,7 @@ from toolkit.cli.console import (
 CERTIFICATE = "certificate"
 
 
-@answers("toolkit.lab.control_answer_types:BudgetAnswer")
+@answers("toolkit.lab.budget:BudgetAnswer")
 def budget(
     record_id: Id,
     load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
@@ -94,7 +94,7 @@ def budget(
     return exit_code(findings)
 
 
-@answers("toolkit.lab.control_answer_types:ApplyAnswer")
+@answers("toolkit.lab.applied:ApplyAnswer")
 def apply(
     record_id: Id,
     data: Annotated[
@@ -136,7 +136,7 @@ def apply(
     return exit_code(loads.findings)
 
 
-@answers("toolkit.lab.document_answer_types:CertificateAnswer")
+@answers("toolkit.lab.certificate:CertificateAnswer")
 def certificate(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
     template: Annotated[
@@ -211,14 +211,12 @@ def certificate(
             replaces=replaces, amendment=amendment_reason, dcc=dcc, sealing=sealing, asked=issue,
             named=issued_by or (), keep=keep, step=step,
         )  # fmt: skip
-    payload = certificate_payload(issued, delivered, sealing) | {
-        "timing": {"seconds": time.perf_counter() - started}
-    }
+    payload = certificate_payload(issued, delivered, sealing, {"seconds": time.perf_counter() - started})
     answer(payload, certificate_text(issued, delivered, sealing), as_json=json, quiet=quiet)
     return 1 if delivered.warnings else exit_code(issued.findings)
 
 
-@answers("toolkit.lab.control_answer_types:StandardAnswer")
+@answers("toolkit.lab.control_answer:StandardAnswer")
 def standard(
     record_id: Id,
     name: Annotated[str, typer.Option("--standard", help="e74 or iso376.")],
@@ -269,7 +267,7 @@ def standard(
     return 0
 
 
-@answers("toolkit.lab.control_answer_types:ChartAnswer")
+@answers("toolkit.lab.control_answer:ChartAnswer")
 def chart(
     instrument: Annotated[str, typer.Argument(help="The instrument.")],
     out: Annotated[
@@ -301,7 +299,7 @@ def chart(
     return exit_code(findings)
 
 
-@answers("toolkit.lab.control_answer_types:DueAnswer")
+@answers("toolkit.lab.control_answer:DueAnswer")
 def due(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     on: Annotated[

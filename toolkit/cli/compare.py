@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 NAME = "compare"
 
 
-@answers("toolkit.lab.tire_answer_types:CompareForms")
+@answers("toolkit.lab.compare_answer:CompareForms")
 def command(
     sources: Annotated[
         list[Path] | None,

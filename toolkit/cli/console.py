@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date, datetime
@@ -288,7 +287,7 @@ def open_travel(request: Path | None, answers: Sequence[Path] | None) -> Travel:
 def answers(declared: str | type) -> Callable[[_Command], _Command]:
     """Declare the JSON answer of a command: a type, or ``module:name`` of what is heavy to import.
 
-    `toolkit.lab.answer_types` prints it as page and schema; a test looks for commands without it.
+    `toolkit.cli.groups` prints it as page and schema; a test looks for commands without it.
     """
 
     def declare(command: _Command) -> _Command:
@@ -302,9 +301,10 @@ def answer(payload: Mapping[str, Any], text: str, *, as_json: bool, quiet: bool)
     """Print a command's result: the JSON document, or the text for people, or nothing."""
     with _printing():
         if as_json:
-            typer.echo(
-                json.dumps({"schema": 1, **_plain(payload)}, ensure_ascii=False, indent=2, allow_nan=False)
-            )
+            from toolkit.declared import json_value
+
+            document = {"schema": 1, **json_value(payload)}
+            typer.echo(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
         elif not quiet and text:
             typer.echo(text)
 
@@ -354,11 +354,13 @@ def _stream(payload: dict[str, Any]) -> None:
 
 
 def _json(value: Any) -> str:
-    text = json.dumps(_plain(value), ensure_ascii=False, allow_nan=False)
+    from toolkit.declared import json_value
+
+    text = json.dumps(json_value(value), ensure_ascii=False, allow_nan=False)
     try:
         text.encode()
     except UnicodeEncodeError:  # the name of a file that is no UTF-8
-        text = json.dumps(_plain(value), allow_nan=False)
+        text = json.dumps(json_value(value), allow_nan=False)
     return text
 
 
@@ -417,17 +419,3 @@ def progress(total: int | None, title: str, *, show: bool = True) -> Iterator[Ca
     ) as bar:
         task = bar.add_task(title, total=total, text="")
         yield lambda text: bar.update(task, advance=1, text=text)
-
-
-def _plain(value: Any) -> Any:
-    # JSON has no NaN and no infinity: what is not a number is null.
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "item") and not isinstance(value, str):
-        value = value.item() if getattr(value, "ndim", 0) == 0 else value.tolist()
-        return _plain(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypedDict
 
 import typer
 
@@ -21,11 +21,30 @@ from toolkit.cli.console import (
     exit_code,
     into_file,
 )
+from toolkit.findings import FindingEntry
+from toolkit.lab.answers import Timing
+
+ConvertAnswer = TypedDict(
+    "ConvertAnswer",
+    {
+        "in": str,
+        "out": str,
+        "from": Annotated[str, "kind of the source"],
+        "to": Annotated[str, "kind of the target"],
+        "axes": str,
+        "draft": bool,
+        "draft_reasons": list[str],
+        "findings": list[FindingEntry],
+        "timing": Timing,
+    },
+)
+ConvertAnswer.__doc__ = "A file, written in another format."
+
 
 NAME = "convert"
 
 
-@answers("toolkit.lab.tire_answer_types:ConvertAnswer")
+@answers(ConvertAnswer)
 def command(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A .tir, .tdx, .csv or reduced .xlsx.")],
     target: Annotated[

@@ -10,15 +10,35 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer, answers, into_folder
 from toolkit.estimate import plus_minus, round_uncertainty
+from toolkit.lab.answers import Timing
 
 if TYPE_CHECKING:
     from toolkit.lab.resolve import Resolved
+
+
+class DemoStep(TypedDict):
+    """A step of the demonstration."""
+
+    title: str
+    exit_code: int
+    told: Annotated[str, "its outcome"]
+
+
+class DemoAnswer(TypedDict):
+    """The demonstration: its steps and its files."""
+
+    out: Path
+    files: list[str]
+    steps: list[DemoStep]
+    report: Annotated[str, "outcome of the last step"]
+    timing: Timing
+
 
 NAME = "demo"
 
@@ -36,7 +56,7 @@ class Step:
     told: Callable[[Payload], str]
 
 
-@answers("toolkit.lab.document_answer_types:DemoAnswer")
+@answers(DemoAnswer)
 def command(
     context: typer.Context,
     out: Annotated[

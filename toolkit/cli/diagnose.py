@@ -24,7 +24,7 @@ from toolkit.cli.console import (
 NAME = "diagnose"
 
 
-@answers("toolkit.lab.simulation_answer_types:DiagnoseAnswer")
+@answers("toolkit.lab.diagnosis:DiagnoseAnswer")
 def command(
     case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Simulation and recordings.")],
     out: Annotated[
@@ -107,7 +107,7 @@ def command(
         warned = bool(document["warnings"])
         text += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"
         text += "".join(f"\n  warning {warning}" for warning in document["warnings"])
-    answer({**payload, "out": str(out)}, text, as_json=json, quiet=quiet)
+    answer(payload, text, as_json=json, quiet=quiet)
     return 0 if diagnosed.result.diagnosis.verdict == "nothing" and not warned else 1
 
 

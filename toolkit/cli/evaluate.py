@@ -3,17 +3,36 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypedDict
 
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer, answers, exit_code, into_file
+from toolkit.findings import FindingEntry
+from toolkit.lab.answers import Timing
+
+
+class EvaluateAnswer(TypedDict):
+    """A tire file, evaluated at every row of a grid."""
+
+    tire: str
+    model: Annotated[str, "mf52 or mf61"]
+    axes: Annotated[str, "of the grid and of the forces"]
+    angles: Annotated[str, "star: tan(alpha), sin(gamma); raw: the angles themselves"]
+    units: Annotated[Mapping[str, str], "of the columns"]
+    draft: bool
+    rows: Annotated[list[Mapping[str, float | None]], "each by column"]
+    out: Annotated[str | None, "file that was written"]
+    findings: list[FindingEntry]
+    timing: Timing
+
 
 NAME = "evaluate"
 
 
-@answers("toolkit.lab.tire_answer_types:EvaluateAnswer")
+@answers(EvaluateAnswer)
 def command(
     tire: Annotated[Path, typer.Argument(metavar="TIRE.tir", help="A tire property file, MF 5.2 or 6.x.")],
     grid: Annotated[

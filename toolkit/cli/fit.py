@@ -28,7 +28,7 @@ from toolkit.cli.console import (
 NAME = "fit"
 
 
-@answers("toolkit.lab.tire_answer_types:FitAnswer")
+@answers("toolkit.lab.fit_answer:FitAnswer")
 def command(
     source: Annotated[
         Path,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import inspect
-from collections.abc import Callable, Iterator, MutableMapping
+import json
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from typer import Typer
@@ -89,6 +91,33 @@ def declared_answers(group: Any) -> dict[str, Any]:
         for name, command in leaves(group)
         if any("--json" in parameter.opts for parameter in command.params)
     }
+
+
+def declared_type(declaration: Any) -> Any:
+    """Return the type that a declaration stands for, imported where it is ``module:name``."""
+    if not isinstance(declaration, str):
+        return declaration
+    module, _, name = declaration.partition(":")
+    return getattr(import_module(module), name)
+
+
+def schema_text(command: str, declared: Mapping[str, Any]) -> str:
+    """Return the JSON schema of a command's answer as text; ``declared`` has the declarations by command.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: there is no such command; those that answer are named
+    """
+    from toolkit.declared.answers import answer_schema
+    from toolkit.errors import ConfigError
+
+    if command not in declared:
+        raise ConfigError(
+            "no such command answers in JSON", where="--answer", got=command,
+            expected=" | ".join(declared), next_step="choose one of them", rule="usage",
+        )  # fmt: skip
+    return json.dumps(answer_schema(declared_type(declared[command])), indent=2, ensure_ascii=False)
 
 
 def _command(info: CommandInfo, finish: Finish) -> Any:

@@ -21,12 +21,12 @@ from toolkit.cli.console import (
 
 if TYPE_CHECKING:
     from toolkit.findings import Finding
-    from toolkit.lab.record_answer_types import Inspected, UnreadFile
+    from toolkit.lab.inspection_answer import Inspected, UnreadFile
 
 NAME = "inspect"
 
 
-@answers("toolkit.lab.record_answer_types:InspectForms")
+@answers("toolkit.lab.inspection_answer:InspectForms")
 def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, under any name.")],
     machine: Annotated[

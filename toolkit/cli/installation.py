@@ -5,14 +5,28 @@ from __future__ import annotations
 import json as jsonlib
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypedDict
 
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer, answers, into_file, into_folder
 
 
-@answers("toolkit.lab.installation_answer_types:InitAnswer")
+class InitAnswer(TypedDict):
+    """A laboratory's home."""
+
+    home: Path
+    written: Annotated[list[str], "what was not there before"]
+
+
+class DocsAnswer(TypedDict):
+    """Where the documentation is."""
+
+    page: Annotated[Path, "its first page"]
+    opened: Annotated[bool, "in a browser"]
+
+
+@answers(InitAnswer)
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", callback=into_folder, help="The home to make.")],
     json: Json = False,
@@ -37,31 +51,20 @@ def init(
     return 0
 
 
-@answers("toolkit.lab.installation_answer_types:DoctorAnswer")
+@answers("toolkit.lab.doctor:DoctorAnswer")
 def doctor(json: Json = False, quiet: Quiet = False) -> int:
     """Report what this computer lacks, and how to install it.
 
     Example: toolkit doctor
     """
-    from toolkit.lab.answers import table
-    from toolkit.lab.doctor import checks, mending_command
+    from toolkit.lab.doctor import doctor_answer
 
-    looked_for = checks()
-    mend = None if all(check.ok for check in looked_for) else mending_command()
-    rows = [["ok" if c.ok else "MISSING", c.name, c.found, c.needed_for] for c in looked_for]
-    text = table(["", "what", "found", "needed for"], rows, align="<<<<")
-    text += f"\n\nmend it with:\n  {mend}" if mend else "\n\nnothing is missing"
-    payload = {
-        "checks": [
-            {"name": c.name, "ok": c.ok, "found": c.found, "needed_for": c.needed_for} for c in looked_for
-        ],
-        "mend": mend,
-    }
+    payload, text = doctor_answer()
     answer(payload, text, as_json=json, quiet=quiet)
-    return 1 if mend else 0
+    return 1 if payload["mend"] else 0
 
 
-@answers("toolkit.lab.installation_answer_types:DocsAnswer")
+@answers(DocsAnswer)
 def docs(
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the place of its first page and open nothing.")
@@ -83,7 +86,7 @@ def docs(
     return 0
 
 
-@answers("toolkit.lab.installation_answer_types:QualifyAnswer")
+@answers("toolkit.lab.qualification_answer:QualifyAnswer")
 def qualify(
     out: Annotated[
         Path | None,
@@ -96,6 +99,7 @@ def qualify(
 
     Example: toolkit qualify --out qualification.json
     """
+    from toolkit.declared import json_value
     from toolkit.lab.home import packaged_home
     from toolkit.lab.qualification_answer import qualification_payload, qualification_text
     from toolkit.publication import write_result
@@ -104,14 +108,16 @@ def qualify(
     record = run(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
     payload, text = qualification_payload(record), qualification_text(record)
     if out is not None:
-        document = jsonlib.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False)
+        document = jsonlib.dumps(
+            {"schema": 1, **json_value(payload)}, ensure_ascii=False, indent=2, allow_nan=False
+        )
         write_result(out, (document if out.suffix.lower() == ".json" else text) + "\n")
         text += f"\nwritten: {out}"
     answer(payload, text, as_json=json, quiet=quiet)
     return 0 if record.passed else 1
 
 
-@answers("toolkit.lab.installation_answer_types:ExplainForms")
+@answers("toolkit.lab.rules:ExplainForms")
 def explain(
     context: typer.Context,
     rule: Annotated[
@@ -133,8 +139,7 @@ def explain(
     Examples: toolkit explain no-tare, toolkit explain relaxation, toolkit explain --answer process
     """
     if answer_of is not None:
-        from toolkit.cli.groups import declared_answers
-        from toolkit.lab.answer_types import schema_text
+        from toolkit.cli.groups import declared_answers, schema_text
 
         typer.echo(schema_text(answer_of, declared_answers(context.find_root().command)))
         return 0

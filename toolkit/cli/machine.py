@@ -4,20 +4,54 @@ from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer, answers, into_file
+from toolkit.findings import FindingEntry
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
+
+
+class CorrectionEntry(TypedDict):
+    """A correction of a machine, and the diagnosis that it comes from."""
+
+    effect: str
+    channel: str | None
+    source: str | None
+    parameter: str
+    value: Annotated[float, "machine axes"]
+    unit: str
+    u: Annotated[float, "standard uncertainty"]
+    reason: str
+    by: Annotated[str, "who decided it"]
+    date: str
+    answer_sha256: str
+    case_sha256: str
+    code_version: str
+    equivalent_to: Annotated[list[str], "effects that the diagnosis could not tell it from"]
+
+
+class MachineAnswer(TypedDict):
+    """A machine's definition and its corrections."""
+
+    path: Path
+    sha256: NotRequired[Annotated[str, "of the file; not of a new one"]]
+    name: str
+    title: str
+    version: int
+    supersedes: Annotated[str | None, "definition that it replaces"]
+    corrections: list[CorrectionEntry]
+    findings: list[FindingEntry]
+
 
 app = typer.Typer(help="Machine definitions: show one, correct one by an answer.", no_args_is_help=True)
 
 
 @app.command("show")
-@answers("toolkit.lab.installation_answer_types:MachineAnswer")
+@answers(MachineAnswer)
 def show(
     machine: Annotated[str, typer.Argument(help="Name of a packaged machine, or the path of a definition.")],
     json: Json = False,
@@ -39,7 +73,7 @@ def show(
 
 
 @app.command("correct")
-@answers("toolkit.lab.installation_answer_types:MachineAnswer")
+@answers(MachineAnswer)
 def correct(
     source: Annotated[
         Path, typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its model.toml.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, TypedDict, cast
 
 import typer
 
@@ -30,6 +30,15 @@ if TYPE_CHECKING:
     from toolkit.trust.people import Role
     from toolkit.trust.signing import Travel
 
+
+class KeyAnswer(TypedDict):
+    """A new key."""
+
+    key: Annotated[str, "file of the private half"]
+    public: Annotated[str, "line of the public half"]
+    fingerprint: str
+
+
 person = typer.Typer(help="The people of the laboratory, their keys and roles.", no_args_is_help=True)
 ledger = typer.Typer(help="The ledger, as documents and witnesses know it.", no_args_is_help=True)
 
@@ -41,7 +50,7 @@ Instrument = Annotated[str, typer.Argument(help="Instrument, such as rig, or peo
 
 
 @person.command()
-@answers("toolkit.lab.decision_answer_types:KeyAnswer")
+@answers(KeyAnswer)
 def key(
     file: Annotated[
         Path, typer.Argument(callback=into_file, help="New private key; its public half is FILE.pub.")
@@ -63,7 +72,7 @@ def key(
 
 
 @person.command()
-@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
+@answers("toolkit.lab.people:PeopleAnswer")
 def enrol(
     person_id: Annotated[str, typer.Argument(metavar="ID", help="Short name of the person.")],
     name: Annotated[str, typer.Option("--name", help="As documents print it.")],
@@ -102,7 +111,7 @@ def enrol(
 
 
 @person.command("list")
-@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
+@answers("toolkit.lab.people:PeopleAnswer")
 def list_people(
     calibrations: Calibrations = None, home: Home = None, as_json: Json = False, quiet: Quiet = False
 ) -> int:
@@ -117,7 +126,7 @@ def list_people(
 
 
 @person.command()
-@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
+@answers("toolkit.lab.people:PeopleAnswer")
 def revoke(
     person_id: Annotated[str, typer.Argument(metavar="ID", help="Whose key.")],
     since: Annotated[
@@ -150,7 +159,7 @@ def revoke(
 
 
 @person.command()
-@answers("toolkit.lab.decision_answer_types:PeopleAnswer")
+@answers("toolkit.lab.people:PeopleAnswer")
 def policy(
     action: Annotated[str, typer.Argument(help="enter, approve, withdraw, discard, import, issue or enrol.")],
     role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
@@ -218,7 +227,7 @@ def prove(
 
 
 @ledger.command()
-@answers("toolkit.lab.decision_answer_types:CheckLedgerAnswer")
+@answers("toolkit.lab.people:CheckLedgerAnswer")
 def check(
     against: Annotated[
         Path,
@@ -256,7 +265,7 @@ def check(
 
 
 @ledger.command()
-@answers("toolkit.lab.decision_answer_types:WitnessAnswer")
+@answers("toolkit.lab.people:WitnessAnswer")
 def witness(
     instrument: Instrument,
     folder: Annotated[

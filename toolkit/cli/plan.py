@@ -37,7 +37,7 @@ SheetTemplate = Annotated[
 
 
 @app.command("session")
-@answers("toolkit.lab.simulation_answer_types:PlanSessionAnswer")
+@answers("toolkit.lab.plan_session:PlanSessionAnswer")
 def session(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as rig: its record in force is the basis.")
@@ -122,7 +122,7 @@ def sheet_code(payload: Mapping[str, Any]) -> int:
 
 
 @app.command("interval")
-@answers("toolkit.lab.simulation_answer_types:PlanIntervalAnswer")
+@answers("toolkit.lab.plan_interval:PlanIntervalAnswer")
 def interval(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as rig: by the history of its check loads.")

@@ -28,7 +28,7 @@ from toolkit.cli.plan import SheetTemplate, app, sheet_code
 
 
 @app.command("test")
-@answers("toolkit.lab.simulation_answer_types:PlanTestAnswer")
+@answers("toolkit.lab.protocol_plan:PlanTestAnswer")
 def protocol(
     like: Annotated[
         Path | None,
@@ -102,7 +102,7 @@ def protocol(
 
 
 @app.command("next")
-@answers("toolkit.lab.simulation_answer_types:PlanNextAnswer")
+@answers("toolkit.lab.next_run:PlanNextAnswer")
 def following(
     source: Annotated[
         Path,

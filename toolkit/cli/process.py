@@ -29,12 +29,12 @@ from toolkit.cli.console import (
 from toolkit.cli.console import reader as choose_reader
 
 if TYPE_CHECKING:
-    from toolkit.lab.tire_answer_types import ProcessAnswer
+    from toolkit.lab.process_answer import ProcessAnswer
 
 NAME = "process"
 
 
-@answers("toolkit.lab.tire_answer_types:ProcessAnswer")
+@answers("toolkit.lab.process_answer:ProcessAnswer")
 def command(
     test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
     calibration: CalibrationId = None,

@@ -40,7 +40,7 @@ from toolkit.cli.console import reader as choose_reader
 NAME = "report"
 
 
-@answers("toolkit.lab.document_answer_types:ReportForms")
+@answers("toolkit.lab.reports:ReportForms")
 def command(
     tests: Annotated[
         list[Path],
@@ -210,7 +210,7 @@ def command(
             issuing=issuing,
         )
         delivered = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
-    payload = reports_payload(delivered) | {"timing": {"seconds": time.perf_counter() - started}}
+    payload = reports_payload(delivered, {"seconds": time.perf_counter() - started})
     answer(payload, "\n\n".join(report_text(report) for report in delivered), as_json=json, quiet=quiet)
     return max(
         2 if report.resolved is None or isinstance(report.outcome, Exception) else int(attention(report))

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypedDict
 
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer, answers, ask_passphrase, into_file
 from toolkit.errors import ConfigError
 
+
+class SignAnswer(TypedDict):
+    """A signed request."""
+
+    answer: Annotated[str, "file that goes back to where the request was made"]
+    by: Annotated[str, "person who signed"]
+    key: Annotated[str, "fingerprint"]
+
+
 NAME = "sign"
 
 
-@answers("toolkit.lab.decision_answer_types:SignAnswer")
+@answers(SignAnswer)
 def command(
     request: Annotated[Path, typer.Argument(help="What --request wrote, or the answer of another person.")],
     key: Annotated[

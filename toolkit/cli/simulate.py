@@ -24,7 +24,7 @@ from toolkit.cli.console import (
 NAME = "simulate"
 
 
-@answers("toolkit.lab.simulation_answer_types:SimulateForms")
+@answers("toolkit.lab.simulate:SimulateForms")
 def command(
     plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="What the machine does, and what it is.")],
     out: Annotated[

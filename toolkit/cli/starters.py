@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypedDict
 
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer, answers
+
+
+class StarterAnswer(TypedDict):
+    """A new file, and what is still open in it."""
+
+    path: Path
+    guessed: Annotated[Mapping[str, Any], "entries that a recording told"]
+    not_guessed: Annotated[list[str], "columns that it did not"]
+    open: Annotated[list[str], "required entries that a person fills in"]
+    lacking: Annotated[Mapping[str, str], "by entry, what the file that it names must still be given"]
+
 
 NEW = "new"
 _FILE = typer.Argument(metavar="FILE", help="A new .toml file; nothing is written over.")
@@ -43,7 +55,7 @@ def _group() -> None:
 
 
 @session.command(NEW)
-@answers("toolkit.lab.installation_answer_types:StarterAnswer")
+@answers(StarterAnswer)
 def new_session(
     file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
     json: Json = False, quiet: Quiet = False,
@@ -55,7 +67,7 @@ def new_session(
     return _begin("session", file, entries, recording, ask=ask, json=json, quiet=quiet)
 
 
-@answers("toolkit.lab.installation_answer_types:StarterAnswer")
+@answers(StarterAnswer)
 def new_machine(
     file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
     json: Json = False, quiet: Quiet = False,
@@ -68,7 +80,7 @@ def new_machine(
 
 
 @test.command(NEW)
-@answers("toolkit.lab.installation_answer_types:StarterAnswer")
+@answers(StarterAnswer)
 def new_test(
     file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
     quiet: Quiet = False,
@@ -81,7 +93,7 @@ def new_test(
 
 
 @case.command(NEW)
-@answers("toolkit.lab.installation_answer_types:StarterAnswer")
+@answers(StarterAnswer)
 def new_case(
     file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
     json: Json = False, quiet: Quiet = False,
@@ -93,7 +105,7 @@ def new_case(
     return _begin("case", file, entries, recording, ask=ask, json=json, quiet=quiet)
 
 
-@answers("toolkit.lab.installation_answer_types:StarterAnswer")
+@answers(StarterAnswer)
 def new_plan(
     file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
     quiet: Quiet = False,

@@ -2,18 +2,80 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NotRequired, TypedDict
 
 import typer
 
 from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, answers, into_file
 
+
+class LintEntry(TypedDict):
+    """What is wrong with a template at one place."""
+
+    rule: str
+    level: Annotated[str, "error, warning or note"]
+    part: Annotated[str, "part of the Word file"]
+    place: str
+    message: str
+
+
+class ListedTag(TypedDict):
+    """A tag that a template may use."""
+
+    tag: str
+    kind: Annotated[str, "text, number, date, figure, table or if"]
+    unit: str | None
+    required: bool
+    columns: Annotated[list[str], "of a table"]
+    available: Annotated[bool | None, "whether the test has it; null without a test"]
+    value: Annotated[str | bool | None, "as it would be printed"]
+    description: str
+
+
+class TemplateCheckAnswer(TypedDict):
+    """What is wrong with a template."""
+
+    template_sha256: str
+    tag_count: Annotated[int, "different tags"]
+    findings: list[LintEntry]
+
+
+class TagsAnswer(TypedDict):
+    """Every tag that a template may use."""
+
+    tags: list[ListedTag]
+    written: NotRequired[Annotated[list[str], "files"]]
+
+
+class MissingTranslation(TypedDict):
+    """A phrase that a language lacks."""
+
+    language: str
+    phrase: str
+
+
+class WordsAnswer(TypedDict):
+    """The phrases that documents print."""
+
+    languages: list[str]
+    phrases: Annotated[list[Mapping[str, str]], "phrase, and its translation under each language that has it"]
+    missing: list[MissingTranslation]
+
+
+class NewTemplateAnswer(TypedDict):
+    """A template and its style file, copied."""
+
+    template: Path
+    style: Path
+
+
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @app.command("check")
-@answers("toolkit.lab.document_answer_types:TemplateCheckAnswer")
+@answers(TemplateCheckAnswer)
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Word template, .docx or .dotx.")],
     json: Json = False,
@@ -47,7 +109,7 @@ def check(
 
 
 @app.command("tags")
-@answers("toolkit.lab.document_answer_types:TagsAnswer")
+@answers(TagsAnswer)
 def tags(
     test: Annotated[
         Path | None, typer.Option("--test", help="Show which tags this test has, and their values.")
@@ -115,7 +177,7 @@ def tags(
 
 
 @app.command("words")
-@answers("toolkit.lab.document_answer_types:WordsAnswer")
+@answers(WordsAnswer)
 def words(
     language: Annotated[
         str | None, typer.Option("--language", help="This language alone; default: all but English.")
@@ -171,7 +233,7 @@ def words(
 
 
 @app.command("new")
-@answers("toolkit.lab.document_answer_types:NewTemplateAnswer")
+@answers(NewTemplateAnswer)
 def new(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", callback=into_file, help="Where to write it: NAME.docx.")

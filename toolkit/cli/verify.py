@@ -12,7 +12,7 @@ from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, answers
 NAME = "verify"
 
 
-@answers("toolkit.lab.decision_answer_types:VerifyForms")
+@answers("toolkit.lab.verification:VerifyForms")
 def command(
     files: Annotated[
         list[Path],

@@ -16,7 +16,7 @@ from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, answers
 NAME = "watch"
 
 
-@answers("toolkit.lab.document_answer_types:WatchAnswer")
+@answers("toolkit.lab.watch:WatchAnswer")
 def command(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", help="Folder in which tests arrive, each with test.toml.")
@@ -79,7 +79,7 @@ def command(
     from toolkit.lab.home import home_template
     from toolkit.lab.reports import Options
     from toolkit.lab.resolve import resolve_test
-    from toolkit.lab.watch import WatchAnswer, alone, watcher_of
+    from toolkit.lab.watch import WatchLog, alone, watcher_of
     from toolkit.report.word.office import find_soffice
     from toolkit.report.word.package import read_template
 
@@ -98,7 +98,7 @@ def command(
     )
     target = out or folder / "reports"
     say = (lambda _text: None) if json or quiet else typer.echo
-    watched = WatchAnswer(keep=json)
+    watched = WatchLog(keep=json)
     with alone(target), _stopping() as stop:
         watcher = watcher_of(
             folder, target, options, settle_s=settle, patience_s=patience, units=units,

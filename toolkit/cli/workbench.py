@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NotRequired, TypedDict
 
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer, answers
 
+
+class OpenAnswer(TypedDict):
+    """Where the workbench is served."""
+
+    address: Annotated[str | None, "of whoever sits at this computer"]
+    home: Path
+    people: NotRequired[Annotated[Mapping[str, str], "address of each person, with --host"]]
+
+
 NAME = "open"
 
 
-@answers("toolkit.lab.installation_answer_types:OpenAnswer")
+@answers(OpenAnswer)
 def command(
     home: Annotated[
         Path | None,

@@ -23,6 +23,11 @@ The largest force.
 >>> list(departures({"FY_N": "much"}, Peak))
 ["FY_N: 'much' is no number", 'at_rad: missing']
 
+An entry that repeats an object's attributes is filled from it: its keys stand in the declaration alone.
+
+>>> entry_of(Peak, object(), FY_N=4000.0, at_rad=None)
+{'FY_N': 4000.0, 'at_rad': None}
+
 A text beside a type in ``Annotated`` says what the entry means. Keys that not every answer has are
 `NotRequired`. A dataclass that `declared.answer` prints declares its answer as it is; `merged` joins the keys
 of several declarations, and an answer of several forms is a union of them.
@@ -32,17 +37,30 @@ from __future__ import annotations
 
 import dataclasses
 import datetime as dt
+import functools
 import inspect
 import pathlib
 import re
 import types
 import typing
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, TypedDict, Union, get_args, get_origin, is_typeddict
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    TypedDict,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    is_typeddict,
+)
 
 from toolkit.declared.declaration import keys_of
 from toolkit.declared.marks import Entry
 
+T = TypeVar("T")
 _WORDS: dict[Any, tuple[str, str]] = {
     str: ("text", "string"),
     float: ("number", "number"),
@@ -65,6 +83,51 @@ def merged(*tables: Any, name: str | None = None) -> Any:
     joined = TypedDict(name or tables[0].__name__, entries)  # type: ignore[misc]
     joined.__doc__ = tables[0].__doc__
     return joined
+
+
+def entry_of(declared: type[T], source: object, /, **stated: Any) -> T:
+    """Return an entry of an answer: its keys as attributes of the source, but for those that are stated.
+
+    What stands inside is filled alike; dates and paths are texts where the declaration says so.
+
+    Raises
+    ------
+    AttributeError
+        the source has no attribute for a key that every answer has
+    TypeError
+        something is stated that is not declared
+    """
+    entry, kind = dict(stated), cast("Any", declared)
+    for key, held, required in _declared(kind):
+        if key not in entry and (required or hasattr(source, key)):
+            entry[key] = _filled(getattr(source, key), held)
+    if surplus := entry.keys() - {key for key, _, _ in _declared(kind)}:
+        raise TypeError(f"{kind.__name__} declares no {', '.join(sorted(surplus))}")
+    return cast("T", {key: entry[key] for key, _, _ in _declared(kind) if key in entry})
+
+
+@functools.cache
+def _declared(cls: Hashable) -> tuple[tuple[str, Any, bool], ...]:
+    return tuple(_entries(cls))
+
+
+def _filled(value: Any, annotation: Any) -> Any:
+    """Return a value as its declaration holds it."""
+    annotation = _bare(annotation)[0]
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if origin in (Union, types.UnionType):
+        forms = [form for form in inner if form is not type(None)]
+        return value if value is None or len(forms) > 1 else _filled(value, forms[0])
+    if is_typeddict(annotation) and not isinstance(value, Mapping):
+        return value.as_dict() if hasattr(value, "as_dict") else entry_of(annotation, value)
+    if _is_mapping(origin):
+        return {key: _filled(entry, inner[1]) for key, entry in dict(value).items()}
+    if _is_list(origin):
+        fixed = origin is tuple and inner[-1] is not Ellipsis
+        return [_filled(entry, inner[at] if fixed else inner[0]) for at, entry in enumerate(value)]
+    if annotation is str and isinstance(value, dt.date | pathlib.Path):
+        return str(value)
+    return value
 
 
 def answer_reference(cls: Any, *, described: dict[Any, None] | None = None) -> str:

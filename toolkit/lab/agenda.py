@@ -16,7 +16,7 @@ from toolkit.errors import ConfigError, ToolkitError
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.holdings import Holdings
-    from toolkit.lab.record_answer_types import RecordRow, RefusedRow
+    from toolkit.lab.registry_answer import RecordRow, RefusedRow
 
 SOON_DAYS = 30
 """A check that is due in so many days stands on the agenda."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import signature_of
+from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -16,9 +18,90 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
-    from toolkit.lab.tire_answer_types import DraftKeys, EstimateEntry
     from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
+
+
+class ErrorEntry(TypedDict):
+    """An error, as every command prints it."""
+
+    rule: str | None
+    what: str
+    where: str | None
+    line: NotRequired[str | None]
+    got: str | None
+    expected: str | None
+    next_step: str | None
+
+
+class DocumentCheck(TypedDict):
+    """A check of a document against its PDF."""
+
+    name: str
+    ok: bool
+    message: str
+
+
+class PrintedEntry(TypedDict):
+    """A value as it was printed."""
+
+    tag: str
+    text: str
+    part: Annotated[str, "part of the Word file"]
+
+
+class DrawnFigure(TypedDict):
+    """A figure of a document."""
+
+    tag: str
+    alt: Annotated[str, "what it shows, in words"]
+
+
+class DeliveredDocument(TypedDict):
+    """A Word document and its PDF, verified against each other."""
+
+    docx: Path
+    pdf: Path
+    pages: int
+    verified: Annotated[bool, "whether the PDF shows every value and figure"]
+    signature: Annotated[str, "who signed, or unsigned"]
+    ledger: Annotated[Mapping[str, Any] | None, "the proof of its entry; null where it was not issued"]
+    checks: list[DocumentCheck]
+    template_sha256: str
+    content_sha256: Annotated[str, "the same for the same inputs, whatever the day"]
+    figures: list[DrawnFigure]
+    warnings: list[str]
+
+
+class Timed(TypedDict):
+    """How long the command took."""
+
+    timing: Timing
+
+
+class Timing(TypedDict):
+    """Times, which differ from run to run; nothing else in an answer does."""
+
+    seconds: Annotated[float, "of the whole command"]
+    models: NotRequired[Annotated[Mapping[str, float], "of the fit of each tire model"]]
+
+
+class DraftKeys(TypedDict):
+    """Whether an answer may not be issued."""
+
+    draft: Annotated[bool, "whether a record is used that is not approved and in force"]
+    draft_reasons: Annotated[list[str], "why"]
+
+
+class EstimateEntry(TypedDict):
+    """A value with its uncertainty."""
+
+    value: float
+    standard_uncertainty: float
+    dof: Annotated[float | None, "degrees of freedom; null where the uncertainty is known beforehand"]
+    expanded_uncertainty: Annotated[float, "for a coverage of 95 %"]
+    k: Annotated[float, "coverage factor"]
+    unit: str
 
 
 def needs_attention(findings: Sequence[Finding]) -> bool:
@@ -145,21 +228,10 @@ def estimate_keys(estimate: Estimate) -> EstimateEntry:
     }
 
 
-def delivered_keys(delivered: Delivered) -> dict[str, Any]:
+def delivered_keys(delivered: Delivered) -> DeliveredDocument:
     """Return what an answer says of any delivered document: files, pages, checks, hashes, warnings."""
-    return {
-        "docx": delivered.docx,
-        "pdf": delivered.pdf,
-        "pages": delivered.pages,
-        "verified": True,
-        "signature": delivered.signature,
-        "ledger": delivered.ledger,
-        "checks": [check.as_dict() for check in delivered.checks],
-        "template_sha256": delivered.template_sha256,
-        "content_sha256": delivered.content_sha256,
-        "figures": [{"tag": tag, "alt": alt} for tag, alt in delivered.filled.figures],
-        "warnings": list(delivered.warnings),
-    }
+    figures = [{"tag": tag, "alt": alt} for tag, alt in delivered.filled.figures]
+    return entry_of(DeliveredDocument, delivered, verified=True, figures=figures)
 
 
 def file_name(text: str, *, otherwise: str) -> str:

@@ -10,16 +10,19 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import numpy as np
 
+from toolkit.calibration.records.use import UsedRecord
 from toolkit.errors import ConfigError, OutputError, UnreadableError
+from toolkit.findings import FindingEntry
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.recording.columns import rig
 from toolkit.recording.extras import needed
-from toolkit.recording.formats.vectors import Vector, Vectors, series_of
-from toolkit.recording.formats.write import Written, mdf_bytes, tdms_bytes
+from toolkit.recording.formats.mdf import mdf_bytes
+from toolkit.recording.formats.tdms import tdms_bytes
+from toolkit.recording.formats.vectors import Vector, Vectors, Written, series_of
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, STAMP
 from toolkit.recording.model import Series
 from toolkit.recording.read import read_recording
@@ -29,8 +32,28 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.lab.control_answer_types import AppliedRange, ApplyAnswer
     from toolkit.lab.record import Loads, Record
+
+
+class AppliedRange(TypedDict):
+    """The range of a load that was computed."""
+
+    unit: str
+    least: float
+    largest: float
+    U_largest: Annotated[float | None, "largest expanded uncertainty; null where it is not determined"]
+
+
+class ApplyAnswer(TypedDict):
+    """Loads of a file of indications, computed by a record."""
+
+    out: Annotated[Path, "file that was written"]
+    rows: int
+    calibration: UsedRecord
+    mark: Annotated[str | None, "what the file is marked with"]
+    loads: Annotated[Mapping[str, AppliedRange], "by load"]
+    findings: list[FindingEntry]
+
 
 Table = Mapping[str, "NDArray[Any]"]
 

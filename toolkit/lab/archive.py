@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolkit.findings import Finding
-    from toolkit.lab.audit_answer import AuditAnswer
+    from toolkit.lab.audit_answer import AuditOutcome
     from toolkit.report.content import Plot
 
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Audit(Face):
     """Which calibration computed each file of an archive, and what it changes; ``written`` lie in ``out``."""
 
-    result: AuditAnswer
+    result: AuditOutcome
     written: tuple[Path, ...]
 
     @property

@@ -11,7 +11,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.lab.audit_answer import AuditAnswer, files_of
+from toolkit.lab.audit_answer import AuditOutcome, files_of
 from toolkit.lab.audit_headline import headline
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class AuditOrder:
     home: Path | None = None
 
 
-def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditAnswer, tuple[Path, ...]]:
+def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcome, tuple[Path, ...]]:
     """Return the answer of an audit, and the files that were written.
 
     Raises
@@ -62,7 +62,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditAnswer
     from toolkit.audit.archive import audit_archive, inventory
     from toolkit.audit.corrected import check_target, write_copies
     from toolkit.audit.linked import link, read_reports
-    from toolkit.audit.parquet import check_parquet, write_parquet
+    from toolkit.audit.serial import check_parquet, write_parquet
     from toolkit.audit.since_good import drift_since, drifted_files, drifted_tests
     from toolkit.lab.amended import amend
     from toolkit.lab.home import open_registry
@@ -105,7 +105,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditAnswer
                 linked, order.archive, order.repair, calibrations=order.calibrations, home=order.home,
                 known_at=order.known_at, draft=order.draft, step=step,
             )  # fmt: skip
-    answer = AuditAnswer(
+    answer = AuditOutcome(
         made=results,
         linked=linked,
         drift=drift,
@@ -127,7 +127,7 @@ def _silent(_total: int | None, _title: str) -> Iterator[Callable[[str], None]]:
 
 
 def write_folder(
-    out: Path, answer: AuditAnswer, registry: Registry, template: Template | None
+    out: Path, answer: AuditOutcome, registry: Registry, template: Template | None
 ) -> tuple[Path, ...]:
     """Write the page for people, the lines for machines and, by a template, the summary; return them.
 
@@ -188,7 +188,7 @@ def write_folder(
         return out / PAGE, out / LINES, summary.docx, summary.pdf
 
 
-def _uses(answer: AuditAnswer, registry: Registry) -> tuple[CalibrationUse, ...]:
+def _uses(answer: AuditOutcome, registry: Registry) -> tuple[CalibrationUse, ...]:
     """Return the records in force by which the changes of the files were computed."""
     from toolkit.calibration.records.use import CalibrationUse
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.audit.model import CLEAN
-from toolkit.lab.answers import one_line, table
+from toolkit.findings import FindingEntry
+from toolkit.lab.answers import ErrorEntry, one_line, table
 from toolkit.lab.audit_headline import headline
+from toolkit.lab.inspection_answer import RefusedRecord, Repair, Segment, SkippedRecord
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
@@ -19,11 +22,251 @@ if TYPE_CHECKING:
     from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
     from toolkit.lab.amended import Amended
 
+
+class CauseCount(TypedDict):
+    """A cause of wrong values, and in how many files."""
+
+    cause: str
+    files: int
+
+
+Headline = TypedDict(
+    "Headline",
+    {
+        "sentence": str,
+        "files": int,
+        "wrong": Annotated[int, "files with values that the record in force changes"],
+        "FY_max_abs_N": Annotated[float, "largest change"],
+        "MZ_max_abs_Nm": Annotated[float, "largest change"],
+        "causes": list[CauseCount],
+        "from": Annotated[str | None, "first month with a wrong file"],
+        "to": Annotated[str | None, "last one"],
+        "unjudged": Annotated[int, "files whose change cannot be computed"],
+        "unreadable": int,
+        "impossible": Annotated[int, "files besides the wrong ones with an Fy or Mz that no tire has"],
+    },
+)
+Headline.__doc__ = "What an archive holds, in a sentence and in numbers."
+
+
+class ArchivedCondition(TypedDict):
+    """The mean of a load block of a file, and what the record in force changes."""
+
+    first_row: int
+    last_row: int
+    SA_deg: float | None
+    FZ_N: float | None
+    FY_N: float | None
+    MZ_Nm: float | None
+    FY_change_N: float | None
+    MZ_change_Nm: float | None
+    step_SA_deg: Annotated[float | None, "slip angle of the protocol's step"]
+    step_FZ_N: Annotated[float | None, "load of the protocol's step"]
+
+
+class ArchivedNote(TypedDict):
+    """What a person should know of a file."""
+
+    rule: str
+    message: str
+
+
+class ArchivedFile(TypedDict):
+    """A file of an archive: which calibration computed it, and what the right one changes."""
+
+    path: Annotated[str, "relative to the archive"]
+    sha256: str | None
+    size: int | None
+    instrument: str | None
+    date: str | None
+    test: Annotated[str | None, "folder of its test.toml"]
+    rotation: str | None
+    to_SAE: Annotated[Mapping[str, int] | None, "sign of each channel on the way to SAE axes"]
+    own_protocol: bool
+    rows: int | None
+    grade: Annotated[str, "exact, rounding, stale, sign_variant, column_swap, ambiguous, unknown, ..."]
+    record: str | None
+    variant: Annotated[str | None, "how the record was changed: E5 negative in FY, MZ"]
+    issued: Annotated[bool | None, "whether the coefficients were those of the certificate"]
+    candidates: Annotated[list[str], "of an ambiguous file"]
+    segments: list[Segment]
+    in_force: Annotated[str | None, "the record in force on the date of the test"]
+    repair: Repair | None
+    conditions: list[ArchivedCondition]
+    estimate: Annotated[Mapping[str, Any] | None, "of an unknown calibration: what the digits prove of it"]
+    skipped: list[SkippedRecord]
+    reason: Annotated[str | None, "why it cannot be read or judged"]
+    test_toml: Annotated[str | None, "what is wrong with its test.toml"]
+    units: Annotated[Mapping[str, str] | None, "of its channels"]
+    values_sha256: str | None
+    modified: Annotated[str | None, "day on which a file without a date was last written"]
+    notes: list[ArchivedNote]
+    reports: NotRequired[Annotated[list[str], "that rest on its test"]]
+
+
+class Grades(TypedDict):
+    """How many files of an archive have each grade."""
+
+    files: int
+    grades: Mapping[str, int]
+    undated: int
+
+
+class ChangedCharacteristic(TypedDict):
+    """What the right calibration makes of a characteristic."""
+
+    load_N: float
+    name: str
+    rotation: str | None
+    unit: str
+    old: float | None
+    new: float | None
+    change: float | None
+
+
+class ArchivedTest(TypedDict):
+    """A test of an archive."""
+
+    test: str
+    instrument: str | None
+    date: str | None
+    files: int
+    not_clean: Annotated[int, "files that are neither exact nor within rounding"]
+    FY_max_abs_N: float | None
+    MZ_max_abs_Nm: float | None
+    effects: list[ChangedCharacteristic]
+    reports: NotRequired[Annotated[list[str], "that rest on it"]]
+
+
+class RestingReport(TypedDict):
+    """A report that rests on files of the archive."""
+
+    report: str
+    id: Annotated[str | None, "of its manifest"]
+    linked_by: list[str]
+    calibrations: Annotated[list[str], "that it names"]
+    tests: list[str]
+    files: int
+    not_clean: int
+    in_force: Annotated[list[str], "records in force on the days of its tests"]
+    to_amend: bool
+
+
+class FailedLoad(TypedDict):
+    """A load that failed its check."""
+
+    load: str
+    unit: str
+    max_error: float
+    tolerance: float
+
+
+class DriftedConditions(TypedDict):
+    """The share of the change in a load block."""
+
+    first_row: int
+    last_row: int
+    FY_N: float
+    MZ_Nm: float
+
+
+class DriftedFileEntry(TypedDict):
+    """A recording since the last good check: its share of the days, and its share of the change."""
+
+    path: str
+    date: str
+    share: float
+    FY_max_abs_N: float | None
+    MZ_max_abs_Nm: float | None
+    conditions: list[DriftedConditions]
+    reason: Annotated[str | None, "why nothing could be computed"]
+
+
+class DriftedTestEntry(TypedDict):
+    """A test since the last good check."""
+
+    test: str
+    date: str
+    share: float
+    files: int
+    left_out: Annotated[int, "files of which nothing could be computed"]
+    FY_max_abs_N: float | None
+    MZ_max_abs_Nm: float | None
+
+
+class SinceGood(TypedDict):
+    """What was measured since the last good check."""
+
+    instrument: str
+    good: Annotated[str, "record of the last good check"]
+    good_date: str
+    failed: Annotated[str, "session that failed"]
+    failed_date: str
+    record_in_use: str
+    later_good: list[str]
+    loads: list[FailedLoad]
+    tests: list[DriftedTestEntry]
+    files: list[DriftedFileEntry]
+
+
+class CorrectedCopy(TypedDict):
+    """A corrected copy of a file."""
+
+    path: str
+    replaces_sha256: str
+    sha256: str | None
+    record: str | None
+    record_sha256: str | None
+    reason: Annotated[str | None, "why there is none"]
+    unverified: bool
+    draft: bool
+    draft_reasons: list[str]
+
+
+class AmendedReport(TypedDict):
+    """A report that replaces another one, or why there is none."""
+
+    replaces: str
+    test: str
+    docx: Path | None
+    pdf: Path | None
+    error: ErrorEntry | None
+
+
+class AuditTiming(TypedDict):
+    """How long the audit took."""
+
+    seconds: float
+    files_per_second: float | None
+    reused: Annotated[int, "files whose answer an earlier audit had"]
+
+
+class AuditAnswer(TypedDict):
+    """Which calibration computed the files of an archive."""
+
+    archive: Path
+    known_at: str
+    headline: Headline
+    files: list[ArchivedFile]
+    summary: Grades
+    tests: list[ArchivedTest]
+    refused_records: list[RefusedRecord]
+    heads: Annotated[Mapping[str, str], "of each instrument's ledger"]
+    findings: list[FindingEntry]
+    reports: NotRequired[Annotated[list[RestingReport], "with --reports"]]
+    report_unknown: NotRequired[Annotated[list[str], "tests that no report rests on"]]
+    since_good: NotRequired[Annotated[SinceGood, "with --since-good"]]
+    repaired: NotRequired[Annotated[list[CorrectedCopy], "with --repair"]]
+    amended: NotRequired[Annotated[list[AmendedReport], "with --repair and --reports"]]
+    written: Annotated[list[str], "files"]
+    timing: AuditTiming
+
+
 _SHOWN, _SETTINGS = 40, 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class AuditAnswer:
+class AuditOutcome:
     """An audit and what was asked for besides; None where it was not."""
 
     made: ArchiveAudit
@@ -35,7 +278,7 @@ class AuditAnswer:
     amended: tuple[Amended, ...] = ()
 
 
-def payload_of(answer: AuditAnswer) -> dict[str, Any]:
+def payload_of(answer: AuditOutcome) -> dict[str, Any]:
     """Return the JSON document; what there may be many of are iterators."""
     audit = answer.made
     payload: dict[str, Any] = {
@@ -64,7 +307,7 @@ def payload_of(answer: AuditAnswer) -> dict[str, Any]:
     return payload
 
 
-def files_of(answer: AuditAnswer) -> Iterator[dict[str, Any]]:
+def files_of(answer: AuditOutcome) -> Iterator[dict[str, Any]]:
     """Yield every file's result; with the reports of its test where reports were asked about."""
     for file in answer.made.files.plain():
         if answer.linked is not None:
@@ -72,14 +315,14 @@ def files_of(answer: AuditAnswer) -> Iterator[dict[str, Any]]:
         yield file
 
 
-def _tests(answer: AuditAnswer) -> Iterator[dict[str, Any]]:
+def _tests(answer: AuditOutcome) -> Iterator[dict[str, Any]]:
     for test in answer.made.tests:
         if answer.linked is not None:
             test["reports"] = answer.linked.of_test(test["test"])
         yield test
 
 
-def text_of(answer: AuditAnswer, *, width: int = 80) -> str:
+def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
     """Return the answer for people, the headline first; tables fit ``width`` characters."""
     from toolkit.reduction.physics import RULES
 
@@ -124,7 +367,7 @@ def _table(rows: list[list[str]], width: int) -> list[str]:
     return [*lines, *textwrap.wrap(f"all of them: {', '.join(common)}", width)] if common else lines
 
 
-def _asked(answer: AuditAnswer, width: int) -> Iterator[str]:
+def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
     if answer.linked is not None:
         yield ""
         for report in answer.linked.reports:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.findings import Finding
+from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines, table
 
 if TYPE_CHECKING:
@@ -18,7 +20,77 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
     from toolkit.calibration.uncertainty.model import Budget, Temperature
     from toolkit.calibration.uncertainty.monte_carlo import MonteCarlo
-    from toolkit.lab.control_answer_types import BudgetAnswer, LoadBudget
+
+
+class BudgetComponent(TypedDict):
+    """A component of a load's uncertainty."""
+
+    name: str
+    description: str
+    type: Annotated[str, "A or B"]
+    distribution: str
+    u: Annotated[float, "standard uncertainty, in the load's unit"]
+    dof: Annotated[float | None, "null where it is known beforehand"]
+    share: Annotated[float, "of the combined variance"]
+    source: str
+    stated: Annotated[bool, "false where nobody stated it"]
+
+
+class RangePoint(TypedDict):
+    """The uncertainty at one load of the range."""
+
+    value: float
+    u: float
+    k: float
+    U: float
+
+
+class MonteCarloCheck(TypedDict):
+    """The budget, held against a Monte Carlo computation by JCGM 101."""
+
+    trials: int
+    seed: int
+    value: float
+    u: float
+    low: float
+    high: float
+    budget_low: float
+    budget_high: float
+    low_difference: float
+    high_difference: float
+    digits: Annotated[int, "of u that count"]
+    delta: Annotated[float, "numerical tolerance"]
+    stable: bool
+    validated: bool
+
+
+class LoadBudget(TypedDict):
+    """The uncertainty of one load at one value."""
+
+    unit: str
+    value: float
+    indications: list[float]
+    components: list[BudgetComponent]
+    u: float
+    dof: float | None
+    k: float
+    U: float
+    U_rounded: str
+    probability: float
+    not_stated: list[str]
+    range: list[RangePoint]
+    monte_carlo: MonteCarloCheck | None
+
+
+class BudgetAnswer(TypedDict):
+    """The uncertainty of a record's loads."""
+
+    record: str
+    sha256: str
+    loads: Annotated[Mapping[str, LoadBudget], "by load"]
+    figure: Path | None
+    findings: list[FindingEntry]
+
 
 RANGE_POINTS = 11
 

@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
-from toolkit.lab.answers import delivered_keys, file_name, finding_lines
+from toolkit.declared.answers import entry_of
+from toolkit.findings import FindingEntry
+from toolkit.lab.answers import (
+    DeliveredDocument,
+    DraftKeys,
+    PrintedEntry,
+    Timed,
+    Timing,
+    delivered_keys,
+    file_name,
+    finding_lines,
+)
 from toolkit.trust.signing import HERE
 
 if TYPE_CHECKING:
@@ -14,9 +27,49 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.sealing import Sealing
-    from toolkit.report.certificate.model import Certificate
+    from toolkit.report.certificate.model import Certificate, LoadResult
     from toolkit.report.deliver import Delivered
     from toolkit.report.word.package import Template
+
+
+class CertifiedRecord(TypedDict):
+    """The record that a certificate is of."""
+
+    id: str
+    sha256: str
+    status: str
+
+
+class CertifiedLoad(TypedDict):
+    """A load of a certificate at its full scale, in its unit."""
+
+    unit: str
+    full_scale: float
+    U: float
+    k: float
+    probability: float
+    dof: float | None
+    tolerance: float | None
+    verdict: Annotated[str | None, "by the decision rule"]
+
+
+class CertificateAnswer(DeliveredDocument, DraftKeys, Timed):
+    """A calibration certificate, issued."""
+
+    certificate: Annotated[str, "its number"]
+    record: CertifiedRecord
+    head: Annotated[str, "of the ledger"]
+    issued: Annotated[str, "day of issue"]
+    withdrawn: Annotated[str | None, "why the record was withdrawn"]
+    replaces: str | None
+    sealed_by: NotRequired[str]
+    dcc: Annotated[Path | None, "the digital certificate (DCC 3.3.0)"]
+    decision_rule: str | None
+    loads: Annotated[Mapping[str, CertifiedLoad], "by load"]
+    unverifiable: Annotated[list[str], "terms that no check load verifies"]
+    not_stated: Annotated[list[str], "what is a visible gap"]
+    manifest: Annotated[list[PrintedEntry], "every value as it was printed"]
+    findings: list[FindingEntry]
 
 
 def deliver_certificate(
@@ -87,46 +140,33 @@ def deliver_certificate(
 
 
 def certificate_payload(
-    certificate: Certificate, delivered: Delivered, sealing: Sealing | None = None
-) -> dict[str, Any]:
+    certificate: Certificate, delivered: Delivered, sealing: Sealing | None, timing: Timing
+) -> CertificateAnswer:
     """Return a delivered certificate as the JSON answer."""
-    return {
-        "certificate": certificate.id,
-        "record": {
-            "id": certificate.record,
-            "sha256": certificate.record_sha256,
-            "status": certificate.status,
-        },
-        "head": certificate.ledger_head,
-        "issued": certificate.issued.isoformat(),
-        "draft": certificate.draft,
-        "draft_reasons": list(certificate.draft_reasons),
-        "withdrawn": certificate.withdrawn,
-        "replaces": certificate.replaces,
+    record: CertifiedRecord = {
+        "id": certificate.record, "sha256": certificate.record_sha256, "status": certificate.status,
+    }  # fmt: skip
+    return entry_of(
+        CertificateAnswer, certificate,
+        certificate=certificate.id, record=record, head=certificate.ledger_head,
         **delivered_keys(delivered),
         **({"sealed_by": sealing.key.name} if sealing else {}),
-        "dcc": delivered.companions[0] if delivered.companions else None,
-        "decision_rule": certificate.rule,
-        "loads": {load.load: _load(load) for load in certificate.loads},
-        "unverifiable": [f"{load}: {term}" for load, term in certificate.unverifiable],
-        "not_stated": list(certificate.gaps),
-        "manifest": [entry.as_dict() for entry in delivered.filled.manifest],
-        "findings": [finding.as_dict() for finding in certificate.findings],
-    }
+        dcc=delivered.companions[0] if delivered.companions else None,
+        decision_rule=certificate.rule,
+        loads={load.load: _load(load) for load in certificate.loads},
+        unverifiable=[f"{load}: {term}" for load, term in certificate.unverifiable],
+        not_stated=certificate.gaps,
+        manifest=[entry_of(PrintedEntry, entry) for entry in delivered.filled.manifest],
+        timing=timing,
+    )  # fmt: skip
 
 
-def _load(load: Any) -> dict[str, Any]:
+def _load(load: LoadResult) -> CertifiedLoad:
     full = load.full_scale
-    return {
-        "unit": load.unit,
-        "full_scale": full.at,
-        "U": full.U,
-        "k": full.k,
-        "probability": full.probability,
-        "dof": full.dof,
-        "tolerance": load.tolerance,
-        "verdict": load.verdict,
-    }
+    return entry_of(
+        CertifiedLoad, full,
+        unit=load.unit, full_scale=full.at, tolerance=load.tolerance, verdict=load.verdict,
+    )  # fmt: skip
 
 
 def certificate_text(certificate: Certificate, delivered: Delivered, sealing: Sealing | None = None) -> str:

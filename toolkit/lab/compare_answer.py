@@ -4,15 +4,106 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
-from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, signature_words, table
+from toolkit.calibration.records.use import UsedRecord
+from toolkit.comparison.laboratories import LaboratoryComparison
+from toolkit.declared.answers import entry_of, merged
+from toolkit.findings import FindingEntry
+from toolkit.lab.answers import (
+    DraftKeys,
+    EstimateEntry,
+    Timing,
+    draft_keys,
+    estimate_keys,
+    finding_lines,
+    mark_words,
+    signature_words,
+    table,
+)
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
     from toolkit.findings import Finding
-    from toolkit.lab.tire_answer_types import Compared, ComparedEntry, DifferenceEntry
     from toolkit.report.style import Style
+
+
+class ComparedEntry(TypedDict):
+    """A test or a table that is compared."""
+
+    label: str
+    kind: str
+    source: str
+    simulated: bool
+    calibration: UsedRecord | None
+    unverified: bool
+    conditions: Annotated[Mapping[str, Any], "day, operator, surface, ..."]
+
+
+class DifferenceEntry(TypedDict):
+    """One quantity of one entry against the reference."""
+
+    table: str
+    quantity: str
+    rotation: str | None
+    SA_rad: float | None
+    load_N: float
+    label: str
+    reference: EstimateEntry
+    other: EstimateEntry
+    difference: EstimateEntry
+    difference_percent: float | None
+    standard_uncertainty_if_nothing_were_shared: float
+    p: float | None
+    p_holm: Annotated[float | None, "corrected for the number of comparisons"]
+    significant: bool
+
+
+class PatternEffect(TypedDict):
+    """A pull divided into what turns with the tread pattern and what turns with the body."""
+
+    quantity: str
+    load_N: float
+    regular: EstimateEntry
+    reversed: EstimateEntry
+    pattern: EstimateEntry
+    body: EstimateEntry
+
+
+class Compared(DraftKeys):
+    """Tests held against each other, or against a maker's table; SI, angles in rad."""
+
+    mode: str
+    axes: str
+    level: Annotated[float, "of significance"]
+    reference: str
+    entries: list[ComparedEntry]
+    differences: list[DifferenceEntry]
+    significant: Annotated[int, "how many differences are"]
+    repeats: Annotated[Mapping[str, Any] | None, "precision by ISO 5725-3, where tests repeat each other"]
+    pattern_effect: list[PatternEffect]
+    left_out: Annotated[list[str], "what could not be compared, and why"]
+
+
+class CompareAnswer(Compared):
+    """Tests held against each other, and what was written."""
+
+    figures: Annotated[Mapping[str, Any], "pictures that were written, by name"]
+    document: Annotated[Mapping[str, Any] | None, "Word document and PDF, where they were asked for"]
+    findings: list[FindingEntry]
+    timing: Timing
+
+
+class _LaboratoryKeys(TypedDict):
+    mode: Annotated[str, "always laboratories"]
+    source: str
+    figures: Annotated[Mapping[str, Path], "pictures that were written, by name"]
+    document: Annotated[Mapping[str, Any] | None, "Word document and PDF, where they were asked for"]
+    timing: Timing
+
+
+CompareForms = CompareAnswer | merged(LaboratoryComparison, _LaboratoryKeys)
+"""Of tests, and with ``--laboratories``."""
 
 
 def comparison_payload(comparison: Comparison) -> Compared:
@@ -43,15 +134,8 @@ def comparison_payload(comparison: Comparison) -> Compared:
 
 
 def _entry(entry: Entry) -> ComparedEntry:
-    return {
-        "label": entry.label,
-        "kind": entry.kind,
-        "source": entry.source,
-        "simulated": entry.simulated,
-        "calibration": None if entry.calibration is None else entry.calibration.as_dict(),
-        "unverified": entry.calibration is not None and entry.calibration.unverified,
-        "conditions": dict(entry.conditions),
-    }
+    unverified = entry.calibration is not None and entry.calibration.unverified
+    return entry_of(ComparedEntry, entry, unverified=unverified)
 
 
 def _difference(difference: Difference) -> DifferenceEntry:
@@ -134,14 +218,14 @@ def comparison_text(
     comparison: Comparison, style: Style, findings: Sequence[Finding], drawn: Mapping[str, Path]
 ) -> str:
     """Return a comparison for people."""
-    from toolkit.comparison.model import PARTS
+    from toolkit.comparison.model import SECTIONS
     from toolkit.report.comparison.cells import conclusion, shown_rows
 
     simulated = "  SIMULATED" if any(entry.simulated for entry in comparison.entries) else ""
     marks = simulated + mark_words(*comparison.uses)
     parts = [f"comparison of {comparison.mode}, reference {comparison.reference.label}{marks}"]
     parts += [signature_words(*comparison.uses), _conditions(comparison), conclusion(comparison)]
-    for part in PARTS:
+    for part in SECTIONS:
         rows, which = shown_rows(comparison, part)
         if any(difference.part == part for difference in comparison.differences):
             parts.append(f"{part}: {which}; * marks what is significant")

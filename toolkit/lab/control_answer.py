@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
+from toolkit.calibration.standards.e74 import E74Result
+from toolkit.calibration.standards.iso376 import Iso376Result
+from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError
-from toolkit.findings import Finding
+from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines, table
 
 if TYPE_CHECKING:
@@ -17,7 +21,132 @@ if TYPE_CHECKING:
     from toolkit.calibration.standards.e74 import E74Result
     from toolkit.calibration.standards.evaluation import Evaluation
     from toolkit.calibration.standards.iso376 import Iso376Result
-    from toolkit.lab.control_answer_types import ChartAnswer, ChartSeries, DueAnswer, DueInstrument
+
+
+StandardEvaluation = TypedDict(
+    "StandardEvaluation",
+    {
+        "standard": Annotated[str, "e74 or iso376"],
+        "load": str,
+        "load_unit": str,
+        "indication": str | None,
+        "indication_unit": str | None,
+        "sense": Annotated[str | None, "of the force"],
+        "direction": Annotated[str | None, "E74: whether the force increases or decreases, up or down"],
+        "reasons": Annotated[list[str], "against a class, or a better one"],
+        "left_out": Annotated[int, "rows that do not belong to it"],
+        "class": str | None,
+        "result": Annotated[E74Result | Iso376Result | None, "null where the rows cannot be evaluated"],
+    },
+)
+StandardEvaluation.__doc__ = "One indication under one load, by one standard."
+
+
+class StandardAnswer(TypedDict):
+    """A record, evaluated by a standard."""
+
+    id: str
+    standard: Annotated[str, "e74 or iso376"]
+    evaluations: list[StandardEvaluation]
+
+
+class CheckLoad(TypedDict):
+    """A load of a check point."""
+
+    load: str
+    value: float
+    unit: str
+
+
+class ControlLimits(TypedDict):
+    """Limits of a control chart, in the load's unit."""
+
+    centre: float
+    sigma: float
+    lower: float
+    upper: float
+    mean_range: float
+    upper_range: float
+    points: Annotated[int, "that make the limits"]
+    provisional: Annotated[bool, "whether they rest on few points"]
+
+
+class ChartPoint(TypedDict):
+    """The error of a session's check load by the record in force before it."""
+
+    session: str
+    date: str
+    record: str
+    error: Annotated[float, "in the load's unit"]
+    rows: int
+
+
+class BrokenRule(TypedDict):
+    """A rule of the chart that a session breaks."""
+
+    rule: int
+    text: str
+    session: str
+
+
+class ChartSeries(TypedDict):
+    """The errors of one load at one check point, over the sessions."""
+
+    load: str
+    unit: str
+    check_load: list[CheckLoad]
+    tolerance: float | None
+    limits: Annotated[ControlLimits | None, "null of too few points"]
+    points: list[ChartPoint]
+    moving_ranges: list[float]
+    breaks: list[BrokenRule]
+
+
+class LeftOutSession(TypedDict):
+    """A session that no chart can have."""
+
+    id: str
+    reason: str
+
+
+class ChartAnswer(TypedDict):
+    """The control charts of an instrument."""
+
+    instrument: str
+    series: list[ChartSeries]
+    left_out: list[LeftOutSession]
+    findings: list[FindingEntry]
+    picture: Path | None
+
+
+class RecommendedInterval(TypedDict):
+    """What the history recommends."""
+
+    days: Annotated[int | None, "null of too few results"]
+    drift_per_year: Annotated[float | None, "as a share of the tolerance"]
+    results: int
+    reason: str
+
+
+class DueInstrument(TypedDict):
+    """When an instrument is due."""
+
+    instrument: str
+    record: str
+    session_date: str
+    recall: Annotated[str | None, "interval, as its approval states it"]
+    due: str | None
+    days_left: int | None
+    overdue: bool | None
+    recommended: RecommendedInterval
+
+
+class DueAnswer(TypedDict):
+    """When each instrument is due."""
+
+    on: Annotated[str, "day that is judged"]
+    instruments: list[DueInstrument]
+    findings: list[FindingEntry]
 
 
 def chart_answer(
@@ -107,16 +236,8 @@ def due_answer(
             )
             continue
         findings += due_findings(due)
-        advice = due.recommendation
-        rows.append({
-            "instrument": name, "record": due.record, "session_date": due.session_date.isoformat(),
-            "recall": due.recall, "due": due.due.isoformat() if due.due else None, "days_left": due.days_left,
-            "overdue": due.overdue,
-            "recommended": {
-                "days": advice.days, "drift_per_year": advice.drift_per_year, "results": advice.results,
-                "reason": advice.reason,
-            },
-        })  # fmt: skip
+        advice = entry_of(RecommendedInterval, due.recommendation)
+        rows.append(entry_of(DueInstrument, due, instrument=name, recommended=advice))
     lines = [
         table(
             ["instrument", "in force", "session", "recall", "due", "days left", "recommended"],
@@ -148,28 +269,16 @@ def _row(series: Series) -> list[str]:
 
 
 def _series(series: Series) -> ChartSeries:
-    limits = series.limits
-    return {
-        "load": series.load,
-        "unit": series.unit,
-        "check_load": [{"load": n, "value": v, "unit": u} for n, v, u in series.check_load.loads],
-        "tolerance": series.tolerance,
-        "limits": None if limits is None else {
-            "centre": limits.centre, "sigma": limits.sigma, "lower": limits.lower, "upper": limits.upper,
-            "mean_range": limits.mean_range, "upper_range": limits.upper_range, "points": limits.points,
-            "provisional": limits.provisional,
-        },
-        "points": [
-            {"session": p.session_record, "date": p.date.isoformat(), "record": p.record, "error": p.error,
-             "rows": p.rows}
-            for p in series.points
-        ],
-        "moving_ranges": list(series.ranges),
-        "breaks": [
+    return entry_of(
+        ChartSeries, series,
+        check_load=[{"load": n, "value": v, "unit": u} for n, v, u in series.check_load.loads],
+        points=[entry_of(ChartPoint, point, session=point.session_record) for point in series.points],
+        moving_ranges=series.ranges,
+        breaks=[
             {"rule": b.rule.number, "text": b.rule.text, "session": series.points[b.index].session_record}
             for b in series.breaks
         ],
-    }  # fmt: skip
+    )  # fmt: skip
 
 
 def evaluation_text(evaluation: Evaluation) -> str:

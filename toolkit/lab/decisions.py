@@ -6,13 +6,81 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
+
+from toolkit.findings import FindingEntry
+from toolkit.lab.registry_answer import RecordRow
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.approval import Decision
     from toolkit.calibration.registry.candidate import Candidate
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.status import RecordStatus
+
+
+class VerifiedRecord(TypedDict):
+    """What came of refitting a record from its stored data."""
+
+    id: str
+    ok: Annotated[bool, "whether it reproduces and every file is as it was entered"]
+    verified: Annotated[bool, "false of a legacy import, which has no data"]
+    reason: Annotated[str | None, "why it is not ok"]
+
+
+class VerifyRegistryAnswer(TypedDict):
+    """Every record of a registry, refitted."""
+
+    records: list[VerifiedRecord]
+
+
+class ImportedRecord(RecordRow):
+    """A legacy record and where it lies."""
+
+    existing: Annotated[bool, "whether it was entered before, and nothing was written"]
+    path: str
+
+
+class ImportAnswer(TypedDict):
+    """A legacy record, entered."""
+
+    ok: bool
+    verified: Annotated[bool, "always false: its data are not known"]
+    record: ImportedRecord
+
+
+class ApproveAnswer(TypedDict):
+    """A decision on a candidate, and the gates that it failed."""
+
+    id: str
+    approved: bool
+    in_force_from: Annotated[str | None, "first day in force"]
+    findings: Annotated[list[FindingEntry], "failed gates"]
+    unverifiable: Annotated[list[str], "terms that no check load verifies"]
+    note: Annotated[str | None, "what the ledger notes of the dates"]
+    evidence: Annotated[list[str], "what the gates were judged by"]
+    recall: str | None
+    signature: Annotated[str, "who signed, or unsigned"]
+    head: Annotated[str, "of the ledger"]
+
+
+class WithdrawAnswer(TypedDict):
+    """A withdrawn record."""
+
+    id: str
+    status: str
+    void_from: Annotated[str | None, "first void day; null where every day is void"]
+    void_always: bool
+    head: Annotated[str, "of the ledger"]
+
+
+class DiscardAnswer(TypedDict):
+    """A discarded candidate."""
+
+    id: str
+    status: str
+    reason: str | None
+    head: Annotated[str, "of the ledger"]
+
 
 Kind = Literal["enter", "approve", "withdraw", "discard"]
 

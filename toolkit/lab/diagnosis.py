@@ -7,9 +7,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, NotRequired, cast
 
-from toolkit.lab.answers import delivered_keys, draft_keys, finding_lines, table
+from toolkit.diagnosis.answer.serial import DiagnosisEntries
+from toolkit.lab.answers import (
+    DeliveredDocument,
+    DraftKeys,
+    Timed,
+    Timing,
+    delivered_keys,
+    draft_keys,
+    finding_lines,
+    table,
+)
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
@@ -18,6 +28,19 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.diagnose import Result
     from toolkit.report.word.package import Template
     from toolkit.worker.posix import Limits
+
+
+class DiagnosisFile(DiagnosisEntries, DraftKeys, Timed):
+    """What ``diagnosis.json`` holds beside its schema."""
+
+    model: Annotated[str | None, "file of the simulation with these effects in it"]
+
+
+class DiagnoseAnswer(DiagnosisFile):
+    """Why a simulation and a recording differ."""
+
+    document: NotRequired[DeliveredDocument]
+    out: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,10 +133,10 @@ def write_diagnosis(
     diagnosed: Diagnosed,
     out: Path,
     *,
-    timing: Callable[[], dict[str, Any]],
+    timing: Callable[[], Timing],
     opened: Template | None = None,
     by: str | None = None,
-) -> dict[str, Any]:
+) -> DiagnoseAnswer:
     """Write predictions, model file, page, answer and, by a template, the document; return the answer.
 
     ``timing`` is asked at its end; ``by`` releases the document's opinion on the cause.
@@ -129,18 +152,22 @@ def write_diagnosis(
     from toolkit.report.diagnosis.page import page
 
     model = diagnosed.model(out)
-    marks = draft_keys(*([diagnosed.use] if diagnosed.use else []))
-    payload = as_json(diagnosed.result.diagnosis) | marks | {"model": None if model is None else MODEL}
     drawn = page(diagnosed.result, diagnosed.use)
-    payload["timing"] = timing()
-    text = json.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
-    files = {f"predictions/{name}": content for name, content in diagnosed.result.predictions}
-    files |= {"diagnosis.html": drawn, "diagnosis.json": text}
+    content: DiagnosisFile = {
+        **as_json(diagnosed.result.diagnosis),
+        **draft_keys(*([diagnosed.use] if diagnosed.use else [])),
+        "model": None if model is None else MODEL,
+        "timing": timing(),
+    }
+    answer = json.dumps({"schema": 1, **content}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
+    files = {f"predictions/{name}": rows for name, rows in diagnosed.result.predictions}
+    files |= {"diagnosis.html": drawn, "diagnosis.json": answer}
     with publication(out) as stage:
-        for name, content in files.items():
+        for name, written in files.items():
             (stage / name).parent.mkdir(exist_ok=True)
-            (stage / name).write_text(content, encoding="utf-8")
+            (stage / name).write_text(written, encoding="utf-8")
         _write_model(out / MODEL, model, stage)
+        payload = cast("DiagnoseAnswer", {**content, "out": str(out)})
         if opened is not None:
             payload["document"] = _write_document(diagnosed, opened, out, stage, by=by)
     return payload
@@ -148,7 +175,7 @@ def write_diagnosis(
 
 def _write_document(
     diagnosed: Diagnosed, opened: Template, out: Path, stage: Path, *, by: str | None
-) -> dict[str, Any]:
+) -> DeliveredDocument:
     """Deliver ``diagnosis.docx`` and ``diagnosis.pdf``; return what the JSON answer says of them."""
     from datetime import date
 

@@ -3,30 +3,131 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from toolkit.calibration.records.use import UsedRecord
 from toolkit.estimate import plus_minus
-from toolkit.lab.answers import draft_keys, findings_text, mark_words, signature_words, table
+from toolkit.findings import FindingEntry
+from toolkit.lab.answers import Timing, draft_keys, findings_text, mark_words, signature_words, table
 from toolkit.tires.table_fit import slope_sign
 
 if TYPE_CHECKING:
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.lab.fit_models import Fitted
-    from toolkit.lab.tire_answer_types import (
-        CurveEntry,
-        FitKeys,
-        FittedModels,
-        LoadFit,
-        Slope,
-        SurfaceEntry,
-        SweepsEntry,
-    )
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_model import GlobalFit
     from toolkit.tires.model import CurveFit
     from toolkit.tires.sweeps import Sweeps
+
+
+class Slope(TypedDict):
+    """A stiffness at zero slip angle."""
+
+    value: float
+    standard_error: float
+    dof: float | None
+
+
+class LoadFit(TypedDict):
+    """What a model over all loads says of one of them."""
+
+    load_N: float
+    n: Annotated[int, "rows"]
+    error_percent: float
+    prediction_error_percent: Annotated[float | None, "predicted by a fit without this load"]
+    stiffness: Slope | None
+
+
+class FitKeys(TypedDict):
+    """What every fit of a model to a channel says."""
+
+    model: str
+    channel: Annotated[str, "FY, MZ or FX"]
+    load_N: Annotated[float | None, "mean load; null of a model over all loads"]
+    rotation: Annotated[str | None, "direction of the test's runs"]
+    axes: Annotated[str, "axis system of the parameters"]
+    n: Annotated[int, "rows"]
+    dof: Annotated[float, "degrees of freedom of the residuals"]
+    parameters: Annotated[Mapping[str, float], "by name, in the units below"]
+    standard_errors: Annotated[Mapping[str, float | None], "null of a parameter that is not determined"]
+    intervals95: Annotated[
+        Mapping[str, tuple[float | None, float | None] | None], "an end is null where the data leave it open"
+    ]
+    not_determined: Annotated[list[str], "parameters that the data leave open"]
+    at_bound: Annotated[list[str], "parameters that ended at their bound"]
+    error_percent: Annotated[float, "100 sqrt(sum (model - measured)^2 / sum measured^2)"]
+    scatter_floor_percent: Annotated[float | None, "the same of the measurements about their own mean"]
+    cornering_stiffness_N_per_rad: Slope | None
+    aligning_stiffness_Nm_per_rad: Slope | None
+    loss: Annotated[str, "least squares or robust"]
+    converged: Annotated[bool, "whether several starts ended at the same lowest cost"]
+    message: str
+
+
+class CurveEntry(FitKeys):
+    """A model of one channel under one load."""
+
+    units: Annotated[Mapping[str, str], "of the parameters"]
+    standard_error_dof: Annotated[Mapping[str, float | None], "degrees of freedom of the standard errors"]
+
+
+class SurfaceEntry(FitKeys):
+    """A model of one channel over all loads."""
+
+    units: Annotated[Mapping[str, str], "of the parameters"]
+    parameter_axes: Annotated[str, "axis system in which the parameters are defined"]
+    nominal_load_N: float | None
+    fixed: Annotated[Mapping[str, str], "parameters that were not fitted, and why"]
+    prediction_error_percent: Annotated[float | None, "each load predicted without it"]
+    loads: list[LoadFit]
+    weights: Annotated[str, "of the loads"]
+    starts: int
+    starts_agreeing: Annotated[int, "that ended at the lowest cost"]
+
+
+class SweepCondition(TypedDict):
+    """One sweep of a continuous test."""
+
+    inclination_deg: float | None
+    pressure_kPa: float | None
+    load_N: float
+    direction: Annotated[str, "up or down"]
+    samples: int
+
+
+class SweepsEntry(TypedDict):
+    """What a continuous test was split into."""
+
+    swept: Annotated[str, "what was swept: slip angle or slip ratio"]
+    axes: Annotated[str, "axis system of the file"]
+    samples: int
+    samples_left_out: Annotated[int, "on the way between levels"]
+    rows: Annotated[int, "means that are fitted"]
+    conditions: list[SweepCondition]
+
+
+class FittedModels(TypedDict):
+    """Tire models fitted to a test or a table."""
+
+    fits: list[CurveEntry | SurfaceEntry]
+    comparison: Annotated[Mapping[str, Any], "rows of all models, and the floor of each channel"]
+    sweeps: NotRequired[Annotated[SweepsEntry, "of a continuous test"]]
+    calibration: NotRequired[Annotated[UsedRecord, "of a test"]]
+    draft: NotRequired[Annotated[bool, "of a test: whether its record is not approved and in force"]]
+    draft_reasons: NotRequired[list[str]]
+
+
+class FitAnswer(FittedModels):
+    """Tire models fitted to a test or a table, and what was written."""
+
+    tir: Annotated[str | None, "tire file that was written"]
+    fmu: Annotated[str | None, "FMU that was written"]
+    figures: Annotated[list[str], "files that were written"]
+    findings: list[FindingEntry]
+    timing: Timing
+
 
 _PER_DEGREE = 3.141592653589793 / 180
 _WORDS = {"pure": "Pure", "combined": "Combined"}

@@ -2,14 +2,88 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import TYPE_CHECKING, TypedDict, cast
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
+from toolkit.declared.answers import entry_of
 from toolkit.lab.answers import table
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.lab.record_answer_types import Found, FoundLoad, Gate, Judged, Response, Responses
+
+
+class Gate(TypedDict):
+    """A gate of an approval."""
+
+    rule: str
+    state: Annotated[str, "fail, asks, note, pass, not judged"]
+    where: str
+    message: str
+
+
+class JudgedMachine(TypedDict):
+    """A machine definition."""
+
+    name: str
+    version: int
+
+
+class Judged(TypedDict):
+    """What an approval meets today."""
+
+    id: str
+    compared_with: Annotated[str | None, "the last approved record"]
+    blocked: bool
+    gates: list[Gate]
+    evidence: Annotated[list[str], "of its signs"]
+    machine: Annotated[JudgedMachine | None, "definition that states its signs"]
+
+
+class Response(TypedDict):
+    """The response of a load to an indication."""
+
+    load: str
+    indication: str
+    unit: str
+    value: Annotated[float, "in SI"]
+    u: Annotated[float | None, "standard uncertainty"]
+    before: Annotated[float | None, "that of the last approved record"]
+    unit_before: str | None
+    change_percent: float | None
+
+
+class Responses(TypedDict):
+    """Responses in SI beside those of the last approved record."""
+
+    record: str
+    before: str | None
+    responses: list[Response]
+
+
+class FoundLoad(TypedDict):
+    """The errors of a session's rows by the record that was in force before it."""
+
+    load: str
+    unit: str
+    reference: Annotated[Sequence[float], "of each row"]
+    error: Annotated[Sequence[float], "fitted minus reference of each row"]
+    tolerance: float
+    full_scale: float
+    max_error: Annotated[float, "the largest one, with its sign"]
+    max_percent_fs: float
+    worst_row: Annotated[int, "from 1"]
+    within: bool
+
+
+class Found(TypedDict):
+    """As found."""
+
+    phase: Annotated[str | None, "as_found or as_left, where the session states it"]
+    session: Annotated[str | None, "record of the session that was judged"]
+    record: Annotated[str | None, "in force before it"]
+    within: bool | None
+    reason: Annotated[str | None, "why nothing could be compared"]
+    loads: list[FoundLoad]
 
 
 class FullRecord(TypedDict):
@@ -119,7 +193,7 @@ def as_found_answer(registry: Registry, record_id: str) -> Found:
         "record": result.record,
         "within": result.within,
         "reason": result.reason,
-        "loads": [cast("FoundLoad", {**asdict(load), "within": load.within}) for load in result.loads],
+        "loads": [entry_of(FoundLoad, load) for load in result.loads],
     }
 
 

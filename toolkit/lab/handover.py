@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.findings import Finding
     from toolkit.lab.resolve import Resolved
-    from toolkit.recording.details import ReportDetails
+    from toolkit.recording.folder import ReportDetails
     from toolkit.report.diagnosis.answer import Told
 
 WHOLE, TYDEX, TIR = "test.xlsx", "test.tdx", "tire.tir"
@@ -32,8 +32,7 @@ def details_of(test: Path, file: Path | None) -> ReportDetails:
         the file cannot be read, has an unknown key or a value of the wrong type
     """
     from toolkit.files import read_toml
-    from toolkit.recording.details import ReportDetails, read_details
-    from toolkit.recording.folder import TEST_FILE
+    from toolkit.recording.folder import TEST_FILE, ReportDetails, read_details
 
     if file is not None:
         table = read_toml(file)

@@ -119,8 +119,7 @@ def rows_of_tests(
     from toolkit.errors import ToolkitError
     from toolkit.files import sha256_bytes
     from toolkit.inputs import SETTINGS_FILE, read_input
-    from toolkit.recording.details import StatedTest
-    from toolkit.recording.folder import TEST_FILE
+    from toolkit.recording.folder import TEST_FILE, StatedTest
 
     for test_id in ids:
         place = holdings.places["test"][test_id]

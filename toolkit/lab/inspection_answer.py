@@ -3,22 +3,165 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from toolkit.declared.answers import entry_of, merged
+from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines, table
 
 if TYPE_CHECKING:
+    from toolkit.audit.estimate import Interval
     from toolkit.audit.inspection import Inspection, LoadBlock
-    from toolkit.audit.intervals import Interval
     from toolkit.audit.model import Segment as AuditSegment
-    from toolkit.lab.record_answer_types import Block, BlockValues, Identified, Inspected, Segment
+
+
+class SeriesEntry(TypedDict):
+    """A column of a recording."""
+
+    symbol: Annotated[str, "channel"]
+    header: Annotated[str, "as the file has it"]
+    unit: str
+    role: Annotated[str, "indication, load, angle, ..."]
+
+
+class Block(TypedDict):
+    """Rows of one load and slip angle."""
+
+    first_row: int
+    last_row: int
+    rows: int
+    tare: Annotated[bool, "whether it is taken without load"]
+    load_N: float
+    load_lbf: float | None
+    slip_angle_deg: Annotated[float, "measured"]
+
+
+class BlockValues(TypedDict):
+    """Fy and Mz of a block, as the file has them and as the record in force computes them."""
+
+    first_row: int
+    last_row: int
+    FY_file_N: float | None
+    FY_N: float | None
+    FY_file_lbf: float | None
+    FY_lbf: float | None
+    MZ_file_Nm: float | None
+    MZ_Nm: float | None
+    MZ_file_lbf_ft: float | None
+    MZ_lbf_ft: float | None
+
+
+class Segment(TypedDict):
+    """Rows that one record computed."""
+
+    first_row: int
+    last_row: int
+    record: str | None
+    variant: Annotated[str | None, "how the record was changed: E5 negative in FY, MZ"]
+    grade: str
+    candidates: NotRequired[Annotated[Sequence[str], "of an ambiguous segment"]]
+
+
+class Repair(TypedDict):
+    """The largest difference between the file and the record in force."""
+
+    FY_max_abs_N: float | None
+    MZ_max_abs_Nm: float | None
+
+
+class SkippedRecord(TypedDict):
+    """A record that could not be a candidate."""
+
+    id: str
+    reason: str
+
+
+class RefusedRecord(TypedDict):
+    """A record that does not hold what its hash says."""
+
+    id: str
+    rule: str
+    reason: str
+
+
+class Identified(TypedDict):
+    """Which calibration computed the Fy and Mz of a file."""
+
+    grade: Annotated[str, "exact, rounding, undated, stale, sign_variant, column_swap, ambiguous or unknown"]
+    record: str | None
+    variant: str | None
+    issued_digits: Annotated[bool | None, "whether the coefficients were those of the certificate"]
+    candidates: Annotated[Sequence[str], "of an ambiguous file"]
+    withdrawn: Annotated[str | None, "why the record was withdrawn"]
+    against_corrected_by: Annotated[str | None, "signs that differ from the record in force, in words"]
+    void_always: bool | None
+    segments: list[Segment]
+    in_force: Annotated[str | None, "the record in force on the date of the test"]
+    repair: Repair | None
+    skipped: list[SkippedRecord]
+
+
+class CoefficientInterval(TypedDict):
+    """What the printed digits allow a coefficient."""
+
+    load: str
+    name: str
+    low: float | None
+    high: float | None
+    sign: Annotated[int, "1 or -1 where the interval decides it, 0 where it does not"]
+
+
+class UnreadFile(TypedDict):
+    """A file of several that cannot be read."""
+
+    file: Path
+    error: Annotated[Mapping[str, str | None], "what, where, got, expected, next"]
+
+
+class Inspected(TypedDict):
+    """What a recording holds, and what computed it."""
+
+    file: Path
+    sha256: str
+    format: str
+    machine: Annotated[str, "name of the definition"]
+    machine_source: Annotated[str, "option, test.toml, file or default"]
+    simulated: bool
+    date: str | None
+    rows: int
+    channels: list[SeriesEntry]
+    blocks: list[Block]
+    slip_angle_deg: float
+    calibration: Annotated[Identified | None, "null where the file has no Fy and Mz"]
+    corrected_by: Annotated[str | None, "record of the corrected values"]
+    unverified: bool
+    corrected_tared: Annotated[bool, "false: no zero is taken off here"]
+    corrected: list[BlockValues]
+    corrected_first_row: BlockValues
+    intervals: list[CoefficientInterval]
+    refused_records: list[RefusedRecord]
+    findings: list[FindingEntry]
+
+
+class InspectAnswer(TypedDict):
+    """What recordings hold."""
+
+    files: Annotated[list[Inspected | UnreadFile], "in the order of the command"]
+    findings: list[FindingEntry]
+
+
+InspectForms = merged(InspectAnswer, Inspected, name="SingleInspectAnswer") | InspectAnswer
+"""Of a single file its entries stand at the top too."""
+
 
 _SIGNS = {1: "+", -1: "-", 0: "open"}
 
 
 def intervals_of(inspection: Inspection) -> tuple[Interval, ...]:
     """Return what the printed digits allow each coefficient of each load."""
-    from toolkit.audit.intervals import coefficient_intervals
+    from toolkit.audit.estimate import coefficient_intervals
 
     return tuple(
         interval
@@ -39,9 +182,7 @@ def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) 
         "simulated": recording.simulated,
         "date": context.date.isoformat() if context.date else None,
         "rows": recording.rows,
-        "channels": [
-            {"symbol": s.symbol, "header": s.header, "unit": s.unit, "role": s.role} for s in recording.series
-        ],
+        "channels": [entry_of(SeriesEntry, series) for series in recording.series],
         "blocks": [_block(block) for block in inspection.blocks],
         "slip_angle_deg": math.degrees(inspection.slip_angle_rad),
         "calibration": _calibration(inspection),
@@ -50,11 +191,9 @@ def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) 
         "corrected_tared": False,
         "corrected": [_values(block) for block in inspection.blocks],
         "corrected_first_row": _values(inspection.first_row),
-        "intervals": [
-            {"load": i.load, "name": i.name, "low": i.low, "high": i.high, "sign": i.sign} for i in intervals
-        ],
+        "intervals": [entry_of(CoefficientInterval, interval) for interval in intervals],
         "refused_records": [
-            {"id": refusal.id, "rule": refusal.rule, "reason": refusal.reason}
+            entry_of(RefusedRecord, refusal)
             for refusal in (inspection.choice.refused if inspection.choice else ())
         ],
         "findings": [finding.as_dict() for finding in inspection.findings],
@@ -74,18 +213,11 @@ def _block(block: LoadBlock) -> Block:
 
 
 def _values(block: LoadBlock) -> BlockValues:
-    return {
-        "first_row": block.first_row,
-        "last_row": block.last_row,
-        "FY_file_N": block.FY_file_N,
-        "FY_N": block.FY_N,
-        "FY_file_lbf": _lbf(block.FY_file_N),
-        "FY_lbf": _lbf(block.FY_N),
-        "MZ_file_Nm": block.MZ_file_Nm,
-        "MZ_Nm": block.MZ_Nm,
-        "MZ_file_lbf_ft": _lbf_ft(block.MZ_file_Nm),
-        "MZ_lbf_ft": _lbf_ft(block.MZ_Nm),
-    }
+    return entry_of(
+        BlockValues, block,
+        FY_file_lbf=_lbf(block.FY_file_N), FY_lbf=_lbf(block.FY_N),
+        MZ_file_lbf_ft=_lbf_ft(block.MZ_file_Nm), MZ_lbf_ft=_lbf_ft(block.MZ_Nm),
+    )  # fmt: skip
 
 
 def _calibration(inspection: Inspection) -> Identified | None:
@@ -95,37 +227,20 @@ def _calibration(inspection: Inspection) -> Identified | None:
     if identified is None:
         return None
     withdrawn = withdrawal(inspection)
-    return {
-        "grade": identified.grade,
-        "record": identified.record,
-        "variant": identified.variant,
-        "issued_digits": identified.issued,
-        "candidates": identified.candidates,
-        "withdrawn": None if withdrawn is None else withdrawn.reason,
-        "against_corrected_by": wrong_signs(inspection),
-        "void_always": None if withdrawn is None else withdrawn.void_always,
-        "segments": [_segment(segment) for segment in identified.segments],
-        "in_force": identified.in_force,
-        "repair": None
-        if identified.repair is None
-        else {
-            "FY_max_abs_N": identified.repair.FY_max_abs_N,
-            "MZ_max_abs_Nm": identified.repair.MZ_max_abs_Nm,
-        },
-        "skipped": [{"id": s.id, "reason": s.reason} for s in identified.skipped],
-    }
+    return entry_of(
+        Identified, identified,
+        issued_digits=identified.issued,
+        withdrawn=None if withdrawn is None else withdrawn.reason,
+        against_corrected_by=wrong_signs(inspection),
+        void_always=None if withdrawn is None else withdrawn.void_always,
+        segments=[_segment(segment) for segment in identified.segments],
+    )  # fmt: skip
 
 
 def _segment(segment: AuditSegment) -> Segment:
-    entry: Segment = {
-        "first_row": segment.first_row,
-        "last_row": segment.last_row,
-        "record": segment.record,
-        "variant": segment.variant,
-        "grade": segment.grade,
-    }
-    if segment.candidates:
-        entry["candidates"] = segment.candidates
+    entry = entry_of(Segment, segment)
+    if not segment.candidates:
+        del entry["candidates"]
     return entry
 
 

@@ -10,7 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.declared.answers import merged
 from toolkit.errors import ConfigError
+from toolkit.findings import FindingEntry
+from toolkit.lab.plan_sheets import _Sheet
 from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
 
 if TYPE_CHECKING:
@@ -21,6 +24,16 @@ if TYPE_CHECKING:
     from toolkit.report.content import Plot
     from toolkit.report.word.package import Template
     from toolkit.worker.posix import Limits
+
+
+class _RunFiles(_Sheet):
+    out: Path | None
+    files: list[Path]
+    findings: list[FindingEntry]
+
+
+PlanNextAnswer = merged(NextRunPlan, _RunFiles)
+
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
 

@@ -6,10 +6,10 @@ import json
 import re
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 from toolkit.calibration.registry.people_log import PeopleLog, enrol
 from toolkit.errors import RegistryError, ToolkitError, TrustError
@@ -27,7 +27,57 @@ from toolkit.trust.witness import SUFFIX, countersign
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.lab.decision_answer_types import EnrolledPerson, PeopleAnswer
+
+
+EnrolledPerson = TypedDict(
+    "EnrolledPerson",
+    {
+        "id": Annotated[str, "of the person"],
+        "name": str,
+        "roles": list[str],
+        "key": Annotated[str, "fingerprint"],
+        "from": Annotated[str, "first moment at which it signs"],
+        "until": Annotated[str | None, "moment from which it signs nothing"],
+    },
+)
+EnrolledPerson.__doc__ = "A key of a person, and from when until when it signs."
+
+
+class PolicyDemand(TypedDict):
+    """Whose signatures a decision takes."""
+
+    roles: list[str]
+    signatures: Annotated[int, "of different people"]
+
+
+class PeopleAnswer(TypedDict):
+    """Who is enrolled, and whose signatures decisions take."""
+
+    people: Annotated[list[EnrolledPerson], "a row for each key"]
+    versions: Annotated[int, "of the list of people"]
+    since: NotRequired[Annotated[str, "moment from which this version holds"]]
+    policy: NotRequired[Annotated[Mapping[str, PolicyDemand], "by action"]]
+
+
+class CheckLedgerAnswer(TypedDict):
+    """Whether today's ledger continues that of an earlier document."""
+
+    instrument: str
+    ledger: Annotated[str, "continues, forked, rolled_back or unknown"]
+    why: str
+    time_stamp: NotRequired[Annotated[str, "moment of the document's time stamp"]]
+    time_stamp_by: NotRequired[Annotated[str | None, "who stamped it"]]
+    time_stamp_state: NotRequired[str]
+
+
+class WitnessAnswer(TypedDict):
+    """A ledger that a second place has countersigned."""
+
+    instrument: str
+    size: Annotated[int, "entries"]
+    before: Annotated[int, "entries that it had signed before"]
+    checkpoint: str
+
 
 RECOVERY = "recovery"
 _HEAD = re.compile(r"\b[0-9a-f]{64}\b")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from toolkit.declared.answers import merged
 from toolkit.errors import ConfigError
-from toolkit.findings import Finding
+from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import findings_text, table
+from toolkit.lab.plan_sheets import _Sheet
+from toolkit.planning.interval import IntervalPlan
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -16,6 +19,20 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.planning.interval import IntervalPlan
     from toolkit.report.word.package import Template
+
+
+class _IntervalKeys(_Sheet):
+    instrument: str
+    record: str
+    in_use: Annotated[str | None, "interval, as its approval states it"]
+    next: Annotated[str, "day of the next session"]
+    method_2_days: Annotated[int | None, "what drift alone recommends"]
+    assumptions: Annotated[list[str], "what it rests on"]
+    findings: list[FindingEntry]
+
+
+PlanIntervalAnswer = merged(IntervalPlan, _IntervalKeys)
+
 
 LEAST = 0.5
 """Reliability below which an interval is none."""

@@ -8,10 +8,13 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from toolkit.declared.answers import merged
 from toolkit.errors import ConfigError
 from toolkit.lab.answers import findings_text, one_line, table
+from toolkit.lab.plan_sheets import _Sheet
+from toolkit.planning.session_plan import SessionPlan
 
 if TYPE_CHECKING:
     from datetime import date
@@ -24,6 +27,15 @@ if TYPE_CHECKING:
     from toolkit.planning.criteria import Criterion
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template
+
+
+class _SessionFiles(_Sheet):
+    fixtures_refused: Annotated[Any, "fixtures that cannot be used, and why"]
+    files: list[str]
+
+
+PlanSessionAnswer = merged(SessionPlan, _SessionFiles)
+
 
 FILES = (
     "SESSION.toml",

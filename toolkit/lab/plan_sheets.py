@@ -5,9 +5,10 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NotRequired
 
 from toolkit.estimate import round_uncertainty
+from toolkit.lab.answers import DeliveredDocument, Timed
 from toolkit.planning.printed_units import title_of
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
     from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template
+
+
+class _Sheet(Timed):
+    document: NotRequired[DeliveredDocument]
+
 
 DOCUMENT = "plan"
 """The name of the sheet's two files."""

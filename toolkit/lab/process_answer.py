@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NotRequired, TypedDict
 
+from toolkit.calibration.records.use import UsedRecord
 from toolkit.channels import CHANNELS
 from toolkit.characteristics.characteristic import BOTH
+from toolkit.declared.answers import entry_of
 from toolkit.estimate import plus_minus
+from toolkit.findings import FindingEntry
 from toolkit.lab.answers import (
+    DraftKeys,
+    Timing,
     draft_keys,
     estimate_keys,
     finding_lines,
@@ -23,10 +30,110 @@ if TYPE_CHECKING:
     from toolkit.characteristics.model import Point
     from toolkit.estimate import Estimate
     from toolkit.lab.resolve import Resolved
-    from toolkit.lab.tire_answer_types import Condition, HubValue, ReducedTest
     from toolkit.reduction.model import Condition as ReducedCondition
     from toolkit.reduction.model import HubLoad
     from toolkit.report.style import Style
+
+
+class Tare(TypedDict):
+    """What was taken off the indications."""
+
+    source: Annotated[str, "where it comes from"]
+    values: Annotated[Mapping[str, float], "by indication"]
+    unit: str
+
+
+class StatedComponent(TypedDict):
+    """An uncertainty that the machine's definition states (type B)."""
+
+    symbol: Annotated[str, "channel"]
+    u: Annotated[float, "standard uncertainty"]
+    unit: str
+    relative: Annotated[float, "standard uncertainty as a part of the value"]
+    effect: Annotated[float, "relative change of a force for a relative change of the condition"]
+    common: Annotated[
+        Literal["machine", "test"], "one error in all tests of the machine, or one in each test"
+    ]
+    source: str
+
+
+class HubValue(TypedDict):
+    """A calibrated load of the hub beside FY and MZ, SAE J670; MX and MY where [hub] puts them."""
+
+    value: Annotated[float, "mean of the block, by the record"]
+    u: Annotated[float, "standard uncertainty: scatter, record, zeros, arm"]
+    U: Annotated[float, "expanded uncertainty"]
+    k: Annotated[int, "coverage factor"]
+    unit: Annotated[str, "N or N*m"]
+
+
+class Condition(TypedDict):
+    """The mean of one block of a recording: one slip angle under one load."""
+
+    file: Annotated[str, "recording"]
+    rotation: Annotated[str, "forward or reverse"]
+    rows: Annotated[list[int], "first and last row, from 1 at the first row of data"]
+    step_SA_rad: Annotated[float | None, "slip angle of the protocol's step"]
+    step_FZ_N: Annotated[float | None, "load of the protocol's step"]
+    SA_rad: Annotated[float, "measured slip angle"]
+    FZ_N: Annotated[float, "measured load"]
+    FY_N: Annotated[float, "lateral force by the record"]
+    MZ_Nm: Annotated[float, "aligning moment by the record"]
+    u_FY_N: Annotated[float | None, "standard uncertainty by every source; null where the block is not used"]
+    u_FY_repeatability_N: Annotated[float | None, "the part of repeatability"]
+    u_MZ_Nm: Annotated[float | None, "as u_FY_N"]
+    u_MZ_repeatability_Nm: Annotated[float | None, "as u_FY_repeatability_N"]
+    FY_file_N: Annotated[float | None, "what the file itself says"]
+    MZ_file_Nm: Annotated[float | None, "what the file itself says"]
+    FZ_common_N: Annotated[float, "load to which the values of one load are carried"]
+    FY_common_N: Annotated[float, "FY at the common load"]
+    MZ_common_Nm: Annotated[float, "MZ at the common load"]
+    u_FY_common_N: Annotated[float, "standard uncertainty of carrying it there, and of the zero"]
+    u_MZ_common_Nm: Annotated[float, "as u_FY_common_N"]
+    used: Annotated[bool, "false where a later block of the same condition stands for it"]
+    calibration_sha256: Annotated[str, "of the record that computed it"]
+    hub: NotRequired[Annotated[Mapping[str, HubValue], "loads of the hub by symbol, where it has any"]]
+
+
+class Budget(TypedDict):
+    """The sources of a characteristic's uncertainty."""
+
+    load_N: float
+    rotation: Annotated[str | None, "direction; null of what both directions give"]
+    name: Annotated[str, "of the characteristic"]
+    unit: str
+    standard_uncertainty: Annotated[Mapping[str, float], "by source"]
+
+
+class ReducedTest(DraftKeys):
+    """A reduced test: conditions, characteristics with their budgets, findings."""
+
+    test: Annotated[str, "name"]
+    machine: str
+    simulated: Annotated[bool, "whether the virtual machine recorded it"]
+    axes: Annotated[str, "axis system of all values"]
+    averaging: Annotated[str, "what was averaged, in words"]
+    protocol: Annotated[str | None, "the protocol that the test is held against"]
+    reversal: Annotated[str, "what is turned for the reversed runs: drum or tire"]
+    calibration: UsedRecord
+    tare: Tare
+    stated: list[StatedComponent]
+    conditions: list[Condition]
+    characteristics: Annotated[
+        Mapping[str, list[dict[str, Any]]],
+        "lists by the catalogue's tables (characteristics.md): load_N, rotation and SA_rad where the list "
+        "has them, then each characteristic as value with uncertainty, or null; and budgets, as below",
+    ]
+    impossible: Annotated[list[FindingEntry], "values that no tire has"]
+    findings: list[FindingEntry]
+
+
+class ProcessAnswer(ReducedTest):
+    """A reduced test, and where it was written."""
+
+    out: Annotated[Path | None, "file that was written"]
+    content_sha256: Annotated[str | None, "of the file's content"]
+    timing: Timing
 
 
 def process_payload(resolved: Resolved) -> ReducedTest:
@@ -48,21 +155,13 @@ def process_payload(resolved: Resolved) -> ReducedTest:
         "reversal": reduced.info.reversal,
         "calibration": reduced.calibration.as_dict(),
         **draft_keys(reduced.calibration),
-        "tare": {
-            "source": reduced.tare.source,
-            "values": dict(reduced.tare.values),
-            "unit": reduced.tare.unit,
-        },
+        "tare": entry_of(Tare, reduced.tare),
         "stated": [
-            {
-                "symbol": component.symbol,
-                "u": component.u,
-                "unit": CHANNELS[component.symbol].si if component.symbol in CHANNELS else "1",
-                "relative": component.relative,
-                "effect": component.effect,
-                "common": component.common,
-                "source": component.source,
-            }
+            entry_of(
+                StatedComponent,
+                component,
+                unit=CHANNELS[component.symbol].si if component.symbol in CHANNELS else "1",
+            )
             for component in reduced.stated
         ],
         "conditions": [_condition(c, points.get((c.file, c.first_row))) for c in reduced.conditions],

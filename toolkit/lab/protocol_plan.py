@@ -6,13 +6,17 @@ import dataclasses
 import math
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from toolkit.declared.answers import merged
 from toolkit.errors import ConfigError
 from toolkit.files import real_path
+from toolkit.findings import FindingEntry
+from toolkit.lab.plan_sheets import _Sheet
+from toolkit.planning.protocol_plan import ProtocolPlan
 
 if TYPE_CHECKING:
     from toolkit.lab.resolve import Resolved
@@ -22,6 +26,16 @@ if TYPE_CHECKING:
     from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
     from toolkit.report.word.package import Template
     from toolkit.simulation.plan import Plan
+
+
+class _ProtocolFiles(_Sheet):
+    out: Path | None
+    files: Annotated[Mapping[str, Path], "by what they are for"]
+    findings: list[FindingEntry]
+
+
+PlanTestAnswer = merged(ProtocolPlan, _ProtocolFiles)
+
 
 PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
 DEMANDS = ("slope_cornering", "conicity", "plysteer", "peak")

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
+from toolkit.declared.answers import entry_of
 from toolkit.lab.answers import table
+from toolkit.qualification.model import Check, NotCovered
 
 if TYPE_CHECKING:
-    from toolkit.qualification.model import Check, QualificationRecord
+    from toolkit.qualification.model import QualificationRecord
 
 
-def qualification_payload(record: QualificationRecord) -> dict[str, Any]:
+class QualifyAnswer(TypedDict):
+    """What this installation computes, held against certified values."""
+
+    passed: bool
+    software: str
+    python: str
+    packages: Annotated[Mapping[str, str], "versions that change numbers"]
+    platform: str
+    date: str
+    numbers_sha256: str
+    checks: list[Check]
+    not_covered: list[NotCovered]
+
+
+def qualification_payload(record: QualificationRecord) -> QualifyAnswer:
     """Return a qualification as the JSON answer."""
-    return {
-        "passed": record.passed,
-        "software": record.software,
-        "python": record.python,
-        "packages": dict(record.packages),
-        "platform": record.platform,
-        "date": record.date.isoformat(),
-        "numbers_sha256": record.numbers_sha256,
-        "checks": [dataclasses.asdict(check) for check in record.checks],
-        "not_covered": [dataclasses.asdict(gap) for gap in record.not_covered],
-    }
+    return entry_of(QualifyAnswer, record)
 
 
 def qualification_text(record: QualificationRecord) -> str:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import datetime as dt
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import UNSIGNED
+from toolkit.declared.answers import entry_of
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import table
+from toolkit.lab.gates_answer import Found, Judged, Responses
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,19 +21,149 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.ledger import Ledger
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.status import RecordStatus
-    from toolkit.lab.record_answer_types import (
-        CellEntry,
-        Event,
-        Head,
-        HistoryAnswer,
-        ListAnswer,
-        RecordContent,
-        RecordLoad,
-        RecordRow,
-        RefusedRow,
-        ShowAnswer,
-        StoredFile,
-    )
+
+
+class DifferenceAnswer(TypedDict):
+    """Two records, term by term."""
+
+    records: Annotated[list[str], "first and second"]
+    terms: Annotated[
+        list[Mapping[str, Any]],
+        "load, term, unit; under each record's id its coefficient, or null; change, change_percent; effect, "
+        "the largest load that the change moves [unit]; effect_percent_fs; differs; note",
+    ]
+
+
+class RecordRow(TypedDict):
+    """A record and what its ledger tells of it."""
+
+    id: str
+    instrument: str
+    sha256: str
+    status: Annotated[str, "candidate, approved, superseded, withdrawn, discarded or refused"]
+    verified: Annotated[bool, "false of a legacy import"]
+    date: Annotated[str, "of the session"]
+    in_force_from: str | None
+    void_from: str | None
+    void_always: bool
+    entered_by: str | None
+    checked_by: str | None
+    approved_by: str | None
+    reason: str | None
+    unverifiable: Annotated[list[str], "terms that no check load verifies"]
+    recall: str | None
+    signature: str
+
+
+class RefusedRow(TypedDict):
+    """A record that is refused: nothing that it says holds."""
+
+    id: str
+    status: str
+    rule: str | None
+    reason: str
+
+
+class Head(TypedDict):
+    """The end of an instrument's ledger."""
+
+    count: Annotated[int, "entries"]
+    sha256: str
+    damage: Annotated[str | None, "what is wrong with the ledger"]
+
+
+class ListAnswer(TypedDict):
+    """The records of a registry."""
+
+    records: Sequence[RecordRow | RefusedRow]
+    heads: Annotated[Mapping[str, Head], "by instrument"]
+    hidden: Annotated[int, "discarded records that are not listed"]
+
+
+class CellEntry(TypedDict):
+    """An indication of a record."""
+
+    name: str
+    unit: str
+    serial: str | None
+    minimum: float | None
+    maximum: float | None
+
+
+class RecordLoad(TypedDict):
+    """The equation of one load."""
+
+    unit: str
+    coefficients: Annotated[Mapping[str, float], "in full, by term"]
+    issued: Annotated[Mapping[str, float], "in the digits of the certificate"]
+    standard_errors: Annotated[Mapping[str, float | None] | None, "null of a legacy import"]
+    covariance_model: str | None
+    scatter: Annotated[Mapping[str, Any] | None, "parts of the scatter, where runs differ"]
+    residual_sd: float | None
+    dof: float | None
+    n: int | None
+    method: str | None
+    minimum: float | None
+    maximum: float | None
+    check_tolerance: float | None
+    check_max: Annotated[float | None, "largest error of a check load"]
+
+
+class StoredFile(TypedDict):
+    """A file that lies beside a record."""
+
+    role: str
+    file: str
+    sha256: str
+
+
+class RecordContent(TypedDict):
+    """What a record holds."""
+
+    zero: str
+    indication_units: Mapping[str, str]
+    indications: list[CellEntry]
+    loads: Annotated[Mapping[str, RecordLoad], "by load"]
+    data: list[StoredFile]
+
+
+class ShowAnswer(RecordContent):
+    """One record; with --full what an approval meets."""
+
+    record: RecordRow
+    head: Annotated[str, "of the ledger"]
+    judged: NotRequired[Judged]
+    responses: NotRequired[Responses]
+    as_found: NotRequired[Annotated[Found | None, "null where no session stands behind the record"]]
+
+
+class Event(TypedDict):
+    """An entry of the ledger."""
+
+    seq: int
+    id: str
+    event: str
+    time: str
+    by: str | None
+    approved_by: str | None
+    known_on: str | None
+    since: str | None
+    reason: str | None
+    note: str | None
+    recall: str | None
+    unverifiable: list[str]
+    evidence: list[str]
+    sha256: str
+    clock: NotRequired[Annotated[str, "state of the computer's clock"]]
+    signed_by: NotRequired[list[str]]
+
+
+class HistoryAnswer(TypedDict):
+    """What happened to an instrument's records."""
+
+    events: list[Event]
+    head: str
+    damage: str | None
 
 
 def listed(
@@ -208,10 +341,7 @@ def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) 
 
 def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent, list[str]]:
     """Return a record as JSON values, and as lines of text. ``registry`` is the registry's folder."""
-    cells: list[CellEntry] = [
-        {"name": c.name, "unit": c.unit, "serial": c.serial, "minimum": c.minimum, "maximum": c.maximum}
-        for c in record.cells
-    ]
+    cells = [entry_of(CellEntry, cell) for cell in record.cells]
     rows = [
         [c.name, c.unit, c.serial or "not stated", _range(c.minimum, c.maximum, c.unit)] for c in record.cells
     ]
@@ -220,22 +350,15 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent
     loads: dict[str, RecordLoad] = {}
     for load in record.loads:
         errors = load.standard_errors or (None,) * len(load.terms)
-        loads[load.load] = {
-            "unit": load.unit,
-            "coefficients": dict(zip(load.terms, load.coefficients, strict=True)),
-            "issued": dict(zip(load.terms, load.issued, strict=True)),
-            "standard_errors": dict(zip(load.terms, errors, strict=True)) if load.covariance else None,
-            "covariance_model": load.covariance_model,
-            "scatter": None if load.scatter is None else dataclasses.asdict(load.scatter),
-            "residual_sd": load.residual_sd,
-            "dof": load.dof,
-            "n": load.n,
-            "method": load.method,
-            "minimum": load.minimum,
-            "maximum": load.maximum,
-            "check_tolerance": load.tolerance,
-            "check_max": misses.get(load.load),
-        }
+        loads[load.load] = entry_of(
+            RecordLoad, load,
+            coefficients=dict(zip(load.terms, load.coefficients, strict=True)),
+            issued=dict(zip(load.terms, load.issued, strict=True)),
+            standard_errors=dict(zip(load.terms, errors, strict=True)) if load.covariance else None,
+            scatter=None if load.scatter is None else dataclasses.asdict(load.scatter),
+            check_tolerance=load.tolerance,
+            check_max=misses.get(load.load),
+        )  # fmt: skip
         terms = [
             [term, repr(c), repr(i), "-" if u is None else round_uncertainty(u)]
             for term, c, i, u in zip(load.terms, load.coefficients, load.issued, errors, strict=True)
@@ -246,7 +369,7 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent
             table(["term", "coefficient", "issued", "std error"], terms),
         ]
         lines += _figures(load, misses.get(load.load))
-    data: list[StoredFile] = [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data]
+    data = [entry_of(StoredFile, file) for file in record.data]
     lines += ["", *(f"{d.role:<9}{d.file}  {d.sha256[:12]}" for d in record.data)]
     payload: RecordContent = {
         "zero": record.zero,

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, TypedDict, cast
 
+from toolkit.calibration.records.use import UsedRecord
+from toolkit.declared.answers import entry_of
+from toolkit.findings import FindingEntry
 from toolkit.lab.answers import (
+    DeliveredDocument,
+    DraftKeys,
+    ErrorEntry,
+    PrintedEntry,
+    Timed,
+    Timing,
     delivered_keys,
     draft_keys,
     file_name,
@@ -28,6 +37,62 @@ if TYPE_CHECKING:
     from toolkit.report.word.office import Office
     from toolkit.report.word.package import Template
     from toolkit.tires.comparison import Comparison
+
+
+class RefusedReport(TypedDict):
+    """A report that was not delivered."""
+
+    verified: bool
+    error: ErrorEntry | None
+
+
+class PrintedUnits(TypedDict):
+    """Units as a document prints them."""
+
+    force: str
+    moment: str
+
+
+class DeliveredReport(DeliveredDocument, DraftKeys):
+    """The report of a test."""
+
+    calibrations: list[UsedRecord]
+    units: PrintedUnits
+    manifest: Annotated[list[PrintedEntry], "every value as it was printed"]
+    manifest_file: Path | None
+    handed_over: Annotated[list[Path], "files beside the report"]
+    simulated: bool
+    impossible: Annotated[list[FindingEntry], "values that no tire has"]
+    findings: list[FindingEntry]
+
+
+class NamedReport(DeliveredReport):
+    """The report of one of several tests."""
+
+    test: Path
+
+
+class NamedRefusal(RefusedReport):
+    """The refusal of one of several tests."""
+
+    test: Path
+
+
+class ReportAnswer(DeliveredReport, Timed):
+    """The report of one test."""
+
+
+class RefusalAnswer(RefusedReport, Timed):
+    """The one report that was asked for was not delivered."""
+
+
+class ReportsAnswer(Timed):
+    """The reports of several tests."""
+
+    reports: Annotated[list[NamedReport | NamedRefusal], "in the order of the command"]
+
+
+ReportForms = ReportAnswer | RefusalAnswer | ReportsAnswer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,18 +275,19 @@ def attention(report: MadeReport) -> bool:
     return bool(report.outcome.warnings) or marked or needs_attention(report.resolved.findings)
 
 
-def report_payload(report: MadeReport) -> dict[str, Any]:
+def report_payload(report: MadeReport) -> DeliveredReport | RefusedReport:
     """Return a delivered report as the JSON answer."""
     resolved, delivered = report.resolved, report.outcome
     if resolved is None or isinstance(delivered, Exception):
-        return {"verified": False, "error": delivered.as_dict() if isinstance(delivered, Exception) else None}
+        error = cast("ErrorEntry", delivered.as_dict()) if isinstance(delivered, Exception) else None
+        return {"verified": False, "error": error}
     use = resolved.result.reduced.calibration
     return {
         **delivered_keys(delivered),
         "calibrations": [use.as_dict()],
         **draft_keys(use),
-        "units": dict(zip(("force", "moment"), delivered.units, strict=True)),
-        "manifest": [entry.as_dict() for entry in delivered.filled.manifest],
+        "units": {"force": delivered.units[0], "moment": delivered.units[1]},
+        "manifest": [entry_of(PrintedEntry, entry) for entry in delivered.filled.manifest],
         "manifest_file": delivered.manifest,
         "handed_over": list(delivered.extras),
         "simulated": resolved.result.reduced.info.simulated,
@@ -230,11 +296,18 @@ def report_payload(report: MadeReport) -> dict[str, Any]:
     }
 
 
-def reports_payload(reports: Sequence[MadeReport]) -> dict[str, Any]:
+def named_payload(report: MadeReport) -> NamedReport | NamedRefusal:
+    """Return the report of one of several tests as the JSON answer."""
+    return cast("NamedReport | NamedRefusal", {"test": report.test, **report_payload(report)})
+
+
+def reports_payload(
+    reports: Sequence[MadeReport], timing: Timing
+) -> ReportAnswer | RefusalAnswer | ReportsAnswer:
     """Return the JSON answer of a command: the one report, or a list that names the tests."""
     if len(reports) == 1:
-        return report_payload(reports[0])
-    return {"reports": [{"test": report.test, **report_payload(report)} for report in reports]}
+        return cast("ReportAnswer | RefusalAnswer", {**report_payload(reports[0]), "timing": timing})
+    return {"reports": list(map(named_payload, reports)), "timing": timing}
 
 
 def report_text(report: MadeReport) -> str:

@@ -5,11 +5,81 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+
+from toolkit.declared.answers import merged
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import Characteristic
     from toolkit.effects.effect import Effect, EffectParameter
+
+
+class RuleEntry(TypedDict):
+    """A rule of findings and errors."""
+
+    rule: str
+    means: str
+    do: str
+
+
+class ParameterFacts(TypedDict):
+    """A parameter of an effect."""
+
+    name: str
+    unit: str
+    means: str
+    typical: Annotated[list[float], "usual least and largest value"]
+    relative: Annotated[bool, "whether these are shares of the channel's spread"]
+
+
+class EffectFacts(TypedDict):
+    """An effect that a diagnosis names."""
+
+    effect: str
+    means: str
+    stage: str
+    equation: str
+    signature: Annotated[str, "what it does to a recording"]
+    separates: Annotated[str, "what tells it from others"]
+    needs: str
+    source: str
+    parameters: list[ParameterFacts]
+
+
+class CharacteristicFacts(TypedDict):
+    """A characteristic of a test."""
+
+    name: str
+    title: str
+    symbol: str
+    unit: str
+    means: str
+    formula: str
+    term: Annotated[str, "of the standard"]
+    source: str
+    uncertainty: Annotated[str, "sources of its uncertainty"]
+
+
+class ExplainedCharacteristic(TypedDict):
+    """A characteristic of a test, beside the effect of its name where there is one."""
+
+    characteristic: CharacteristicFacts
+
+
+class Explanations(TypedDict):
+    """All rules, effects and characteristics."""
+
+    rules: list[RuleEntry]
+    effects: list[EffectFacts]
+    characteristics: list[CharacteristicFacts]
+
+
+EffectAndCharacteristic = merged(ExplainedCharacteristic, EffectFacts, name="EffectAndCharacteristic")
+
+
+ExplainForms = Explanations | RuleEntry | EffectFacts | ExplainedCharacteristic | EffectAndCharacteristic
+"""Of no name, of a rule, and of what is an effect, a characteristic or both."""
+
 
 RULES_FILE = Path(__file__).with_name("rules.toml")
 

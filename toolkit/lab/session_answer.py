@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.errors import SessionError, ToolkitError
 from toolkit.estimate import round_uncertainty
+from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines, table
 
 if TYPE_CHECKING:
@@ -16,7 +18,77 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.candidate import Candidate
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.lab.record_answer_types import FittedSession, SessionLoad
+
+
+class RefittedRecord(TypedDict):
+    """A record by its content."""
+
+    id: str
+    sha256: str
+
+
+class RecordReportAnswer(TypedDict):
+    """A record's stored data, fitted again."""
+
+    record: RefittedRecord
+    loads: Annotated[Mapping[str, Mapping[str, Any]], "the report of each load, as calibrate --full has it"]
+    findings: list[FindingEntry]
+    balance: NotRequired[Annotated[Mapping[str, Any] | None, "the form of AIAA R-091, of a balance"]]
+    figures: NotRequired[Annotated[list[str], "files that were written"]]
+
+
+class EnteredRecord(TypedDict):
+    """The record of a session."""
+
+    id: str
+    sha256: str
+    status: str
+    existing: Annotated[bool, "whether it was recorded before, and nothing was written"]
+    path: str
+
+
+class SessionLoad(TypedDict):
+    """The fit of one load, in the units of the session."""
+
+    unit: str
+    indication_units: Mapping[str, str]
+    coefficients: Mapping[str, float]
+    issued: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    covariance_model: str | None
+    scatter: Mapping[str, Any] | None
+    residual_sd: float
+    dof: float
+    condition_number: Annotated[float, "of the indications, centred and scaled"]
+    condition_number_terms: float
+    vif: Annotated[Mapping[str, float], "variance inflation by indication"]
+    llf: Annotated[float, "lower limit factor, 2.4 residual_sd"]
+    check_max_percent_fs: float | None
+    press: Annotated[float | None, "root mean square of the rows predicted without themselves"]
+    reversibility: float | None
+    outlier_rows: list[int]
+    report: NotRequired[Annotated[Mapping[str, Any], "with --full"]]
+
+
+class FittedSession(TypedDict):
+    """A session, fitted, and its record."""
+
+    record: EnteredRecord
+    signature: Annotated[str, "who signed the record's decisions, or unsigned"]
+    findings: list[FindingEntry]
+    readings: Annotated[Mapping[str, Any], "zero, creep and shunt readings, evaluated"]
+    residual_correlation: Mapping[str, Mapping[str, float]]
+    loads: Mapping[str, SessionLoad]
+
+
+class CalibrateAnswer(FittedSession):
+    """A session, fitted and entered as a candidate."""
+
+    dry_run: Annotated[bool, "whether nothing was entered"]
+    standards: Annotated[list[Mapping[str, Any]], "evaluations by ASTM E74 and ISO 376"]
+    balance: NotRequired[Annotated[Mapping[str, Any] | None, "the form of AIAA R-091, of a balance"]]
+    figures: NotRequired[Annotated[list[str], "files that were written"]]
+
 
 NOT_ENTERED = "not entered"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Annotated, TypedDict
 
 from toolkit.errors import ConfigError, OutputError, TrustError
 from toolkit.publication import publication
@@ -13,8 +13,16 @@ from toolkit.trust.people import Person, inability
 from toolkit.trust.requested import Requested
 from toolkit.trust.requests import Request, shown, words
 
-if TYPE_CHECKING:
-    from toolkit.lab.decision_answer_types import RequestedAnswer
+
+class RequestedAnswer(TypedDict):
+    """With ``--request``: what is to be signed was written, and nothing was entered."""
+
+    requested: bool
+    request: Annotated[str, "file that was written"]
+    action: Annotated[str, "enter, approve, withdraw, discard, import, issue or enrol"]
+    id: Annotated[str, "record or person"]
+    takes: Annotated[str, "whose signatures it takes, in words"]
+
 
 _LONGEST = 4096  # bytes of a passphrase
 

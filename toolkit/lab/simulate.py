@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines
 
 if TYPE_CHECKING:
@@ -15,6 +16,94 @@ if TYPE_CHECKING:
     from toolkit.simulation.acquisition import OwnProgram
     from toolkit.simulation.plan import Plan
     from toolkit.worker.posix import Limits
+
+
+class EffectParameterValue(TypedDict):
+    """A parameter of an effect that was simulated."""
+
+    name: str
+    value: float
+    unit: str
+
+
+SimulatedEffect = TypedDict(
+    "SimulatedEffect",
+    {
+        "name": str,
+        "stage": str,
+        "channel": str | None,
+        "parameters": list[EffectParameterValue],
+        "record": NotRequired[Annotated[str, "of another calibration"]],
+        "with": NotRequired[Annotated[str, "the other channel of an exchange"]],
+        "from": NotRequired[Annotated[str, "where a leak comes from"]],
+        "only": NotRequired[Annotated[Mapping[str, list[str]], "condition under which it acts"]],
+    },
+)
+SimulatedEffect.__doc__ = "An effect that was simulated."
+
+
+class SimulatedFiles(TypedDict):
+    """What the virtual machine wrote."""
+
+    out: Path
+    simulated: Annotated[bool, "always true"]
+    kind: Annotated[str, "test, session, table or model"]
+    files: list[str]
+    findings: list[FindingEntry]
+
+
+class PlannedSimulation(SimulatedFiles):
+    """What a plan was simulated with."""
+
+    machine: str
+    date: str
+    seed: int
+    effects: list[SimulatedEffect]
+
+
+class AcquisitionProgram(TypedDict):
+    """What the machine's own program computed by."""
+
+    record: str | None
+    negated: Annotated[list[str], "indications that it takes with the wrong sign"]
+
+
+class SimulatedTest(PlannedSimulation):
+    """A simulated test."""
+
+    record: Annotated[str, "means or continuous"]
+    recordings: list[str]
+    truth: Annotated[str, "file of what was simulated"]
+    acquisition_program: AcquisitionProgram
+    csv: NotRequired[list[str]]
+    case: NotRequired[Annotated[str, "case that `diagnose` reads"]]
+
+
+class SimulatedSession(PlannedSimulation):
+    """A simulated reference-load session."""
+
+    session: str
+    truth: Annotated[str, "file of what was simulated"]
+    points: int
+    check_points: int
+
+
+class SimulatedTable(PlannedSimulation):
+    """A maker's flat-surface table, simulated."""
+
+    table: str
+    axes: str
+
+
+class SimulatedModel(SimulatedFiles):
+    """Outputs of a diagnosis's model on inputs."""
+
+    model_sha256: str
+    case_sha256: str
+    effects: Annotated[list[str], "effects in the model"]
+
+
+SimulateForms = SimulatedTest | SimulatedSession | SimulatedTable | SimulatedModel
 
 
 def simulate_plan(

@@ -18,7 +18,7 @@ from typing import Any
 
 from toolkit.channels import CHANNELS, channel_of
 from toolkit.declared import Source, refuse
-from toolkit.declared.outline import outline
+from toolkit.declared.describe import outline
 from toolkit.declared.reading import attempt
 from toolkit.declared.writing import value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
@@ -28,7 +28,7 @@ from toolkit.inputs import RECORDING_FILE, read_input
 FORMS = {
     "session": "toolkit.calibration.session.session_file:SessionFile",
     "machine": "toolkit.machine.definition:Machine",
-    "test": "toolkit.recording.details:StatedTest",
+    "test": "toolkit.recording.folder:StatedTest",
     "case": "toolkit.diagnosis.case.case_file:CaseFile",
     "plan": "toolkit.simulation.plan_file:PlanFile",
 }

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolkit.findings import Finding
+    from toolkit.lab.process_answer import ReducedTest
     from toolkit.lab.reports import MadeReport
     from toolkit.lab.resolve import Resolved
-    from toolkit.lab.tire_answer_types import ReducedTest
     from toolkit.lab.tires import TireFit
     from toolkit.recording import model
     from toolkit.recording.folder import TestFolder

@@ -12,9 +12,10 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypedDict
 
 from toolkit.declared import Entry
+from toolkit.declared.answers import merged
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
@@ -79,6 +80,16 @@ class Verdict:
         holds = {True: "still holds", False: "no longer holds", None: ""}[self.still_holds]
         parts = [f"{self.signature.upper():<9} {self.kind}", issued, holds, self.why]
         return f"{self.file}: " + "; ".join(part for part in parts if part)
+
+
+class VerifyAnswer(TypedDict):
+    """Documents, verified."""
+
+    files: Annotated[list[Verdict], "in the order of the command"]
+
+
+VerifyForms = merged(VerifyAnswer, Verdict, name="SingleVerifyAnswer") | VerifyAnswer
+"""Of a single document its entries stand at the top too."""
 
 
 def verify_file(path: Path, trust: Trust, *, ledger: Ledger = no_ledger) -> Verdict:

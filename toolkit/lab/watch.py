@@ -8,13 +8,23 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
-from toolkit.lab.watching import Round, Watcher
+from toolkit.lab.reports import NamedRefusal, NamedReport
+from toolkit.lab.watching import Aside, Round, Waiting, Watcher
 
 if TYPE_CHECKING:
     from toolkit.lab.reports import MadeReport, Options
     from toolkit.lab.resolve import Resolved
+
+
+class WatchAnswer(TypedDict):
+    """What a watch made, and what waits at its end."""
+
+    made: list[NamedReport | NamedRefusal]
+    waiting: list[Waiting]
+    set_aside: list[Aside]
+    attention: Annotated[int, "reports that a person should look at"]
 
 
 def watcher_of(
@@ -42,24 +52,24 @@ def watcher_of(
     )
 
 
-class WatchAnswer:
+class WatchLog:
     """What was said of the looks so far: a watch runs for months, so no look and no report is kept whole."""
 
     def __init__(self, *, keep: bool) -> None:
         """Keep the answer of every report made, for ``--json``; else their number alone."""
         self.keep = keep
-        self.made: list[dict[str, Any]] = []
+        self.made: list[NamedReport | NamedRefusal] = []
         self.attention = 0
         self.last: Round | None = None
 
     def add(self, look: Round, say: Callable[[str], None]) -> None:
         """Say what is new in a look."""
-        from toolkit.lab.reports import attention, report_payload
+        from toolkit.lab.reports import attention, named_payload
 
         for report in look.made:
             self.attention += attention(report)
             if self.keep:
-                self.made.append({"test": report.test, **report_payload(report)})
+                self.made.append(named_payload(report))
             if not isinstance(report.outcome, Exception):
                 say(f"{report.test}: {report.outcome.pdf}, {report.outcome.pages} pages")
         before = self.last or Round(made=(), waiting=(), set_aside=())
@@ -71,15 +81,13 @@ class WatchAnswer:
                 say(f"{waits.test}: waiting, {waits.reason}")
         self.last = replace(look, made=())
 
-    def payload(self) -> dict[str, Any]:
+    def payload(self) -> WatchAnswer:
         """Return the answer: what was made, and what waits or stands aside at the end."""
         waiting, aside = (self.last.waiting, self.last.set_aside) if self.last else ((), ())
         return {
             "made": self.made,
-            "waiting": [{"test": waits.test, "reason": waits.reason} for waits in waiting],
-            "set_aside": [
-                {"test": fault.test, "rule": fault.rule, "reason": fault.reason} for fault in aside
-            ],
+            "waiting": list(waiting),
+            "set_aside": list(aside),
             "attention": self.attention,
         }
 

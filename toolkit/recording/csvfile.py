@@ -16,7 +16,6 @@ import numpy as np
 from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.columns import header_of
-from toolkit.recording.safe_open import Gated
 from toolkit.recording.table import Table
 
 if TYPE_CHECKING:
@@ -147,7 +146,7 @@ def _headers(head: str, separator: str, is_header: Callable[[str], bool]) -> int
     return sum(map(is_header, headers)) if len(headers) > 1 else 0
 
 
-def read_csv(gated: Gated, machine: Machine) -> Table:
+def read_csv(data: bytes, where: Path, machine: Machine) -> Table:
     """Return the cells of a CSV file: numbers as floats, everything else as text.
 
     The separator is the one that splits the header row into the machine's headers; see
@@ -159,12 +158,12 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
         rule ``not-a-workbook encoding unreadable ambiguous-text``: text without such a header row, in
         another encoding, or that can be read in more than one way
     """
-    plain = _plain_table(gated, machine)
+    plain = _plain_table(data, where, machine)
     if plain is not None:
         return plain
-    text = decode(gated.data, where=gated.path)
+    text = decode(data, where=where)
     head = first_line(text)
-    separator = separator_of(head, header_of(machine), where=gated.path)
+    separator = separator_of(head, header_of(machine), where=where)
     if separator is None:
         what = "the file is a text file, not a recording"
         next_step = "give the file that the acquisition program wrote"
@@ -177,22 +176,21 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
                 "name the machine that wrote it, or define it: toolkit machine new RIG.toml --from FILE"
             )
         raise UnreadableError(
-            what, where=gated.path, got=f"text that begins with {head[:60]!r}",
+            what, where=where, got=f"text that begins with {head[:60]!r}",
             expected="an .xlsx workbook, or CSV with a header row such as "
             + ",".join(column.header for column in machine.columns),
             next_step=next_step, rule="not-a-workbook",
         )  # fmt: skip
-    below = _iterate_rows(text, separator, where=gated.path)
+    below = _iterate_rows(text, separator, where=where)
     next((row for row in below if any(cell.strip() for cell in row)), None)
-    decimal = decimal_sign(chain.from_iterable(below), separator, where=gated.path)
+    decimal = decimal_sign(chain.from_iterable(below), separator, where=where)
     rows: list[list[float | str]] = [
-        [number_or_text(cell, decimal) for cell in row]
-        for row in _iterate_rows(text, separator, where=gated.path)
+        [number_or_text(cell, decimal) for cell in row] for row in _iterate_rows(text, separator, where=where)
     ]
     width = max(map(len, rows), default=0)
     for row in rows:
         row += [""] * (width - len(row))
-    return Table(where=str(gated.path), rows=rows)
+    return Table(where=str(where), rows=rows)
 
 
 def _titles(text: str, is_header: Callable[[str], bool]) -> int:
@@ -212,8 +210,7 @@ def _is_tabular(text: str) -> bool:
 # doubles part by part, without an object for each cell; whatever departs from it is read cell by cell.
 
 
-def _plain_table(gated: Gated, machine: Machine) -> Table | None:
-    data, where = gated.data, gated.path
+def _plain_table(data: bytes, where: Path, machine: Machine) -> Table | None:
     try:
         if data[:2] in _WIDE:
             data = decode(data, where=where).encode()

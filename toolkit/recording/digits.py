@@ -18,7 +18,6 @@ not tell: as printed digits they are rounded as far.
 
 from __future__ import annotations
 
-import math
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
@@ -27,7 +26,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from toolkit.recording.model import Series
 
@@ -46,33 +45,6 @@ _BY_CHANCE = -9.0  # log10 of the share of columns of any other numbers that loo
 _HALF = np.array([0.5 * float(f"1e{-places}") for places in range(_FULL)] + [0.0])  # by decimals
 
 
-def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
-    """Return half a unit of the last printed place of every value, 0 where it is a full double.
-
-    Of a column of single floats it is half their step, with what printing moved them.
-
-    Parameters
-    ----------
-    values : (rows,) a column, or (rows, columns); finite
-
-    Returns
-    -------
-    the same shape, in the unit of ``values``. A zero has the finest place of its column.
-
-    Examples
-    --------
-    >>> half_last_place([98.59261, 98.5926, 101.25]).tolist()
-    [5e-06, 5e-06, 0.005]
-    >>> half_last_place([1 / 3, 0.5]).tolist()
-    [0.0, 0.0]
-    >>> half_last_place([1.2345678806304932, 0.1234567984938621]).tolist()
-    [5.960464477539063e-08, 3.725290353973065e-09]
-    """
-    array = np.asarray(values, dtype=np.float64)
-    table = array.reshape(len(array), math.prod(array.shape[1:]))
-    return np.ascontiguousarray(_halves(np.ascontiguousarray(table.T)).T).reshape(array.shape)
-
-
 def rounding(series: Series) -> NDArray[np.float64]:
     """Return how far each value may lie from the one that was measured (rows,), in the channel's unit.
 
@@ -83,16 +55,26 @@ def rounding(series: Series) -> NDArray[np.float64]:
 
 def roundings(series: Sequence[Series]) -> NDArray[np.float64]:
     """Return `rounding` of several channels of one file (channels, rows)."""
-    printed = _halves(np.stack([channel.values for channel in series]))
+    printed = half_last_places(np.stack([channel.values for channel in series]))
     for channel, half in zip(series, printed, strict=True):
         if channel.half is not None:
             np.maximum(half, channel.half, out=half)
     return printed
 
 
-def _halves(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    # All columns (columns, rows) at once, some thousand rows at a time: what is looked for is one number a
-    # column, decade and sign, and of every value only these two are kept.
+def half_last_places(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return half a unit of the last printed place of every value, 0 where it is a full double.
+
+    ``columns`` (columns, rows), finite. Of a column of single floats it is half their step, with what
+    printing moved them. A zero has the finest place of its column.
+
+    >>> half_last_places(np.array([[98.59261, 98.5926, 101.25], [1 / 3, 0.5, 0.25]])).tolist()
+    [[5e-06, 5e-06, 0.005], [0.0, 0.0, 0.0]]
+    >>> half_last_places(np.array([[1.2345678806304932, 0.1234567984938621]])).tolist()
+    [[5.960464477539063e-08, 3.725290353973065e-09]]
+    """
+    # All columns at once, some thousand rows at a time: what is looked for is one number a column, decade and
+    # sign, and of every value only these two are kept.
     n, rows = columns.shape
     if not columns.size:
         return np.zeros(columns.shape)

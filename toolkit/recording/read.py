@@ -56,16 +56,17 @@ def read_recording(
             path=path,
             sha256=gated.sha256,
             machine=machine,
-            series=_measurable(path, read_table(read_csv(gated, machine), machine)),
+            series=_measurable(path, read_table(read_csv(gated.data, path, machine), machine)),
             simulated=machine.simulated,
             format="csv",
         )
     if gated.kind in READERS:
+        vectors = READERS[gated.kind](gated.members.get(gated.kind, gated.data), path, machine)
         return Recording(
             path=path,
             sha256=gated.sha256,
             machine=machine,
-            series=_measurable(path, series_of(READERS[gated.kind](gated, machine), machine)),
+            series=_measurable(path, series_of(vectors, machine)),
             simulated=machine.simulated,
             format=gated.kind,
         )

@@ -19,10 +19,10 @@ from toolkit.files import sha256_bytes
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.recording.archive import read_members
 from toolkit.recording.cells import MalformedSheetError, find_cells
+from toolkit.recording.formats.mat import unpack_mat
+from toolkit.recording.formats.mdf import walk_mdf
+from toolkit.recording.formats.tdms import walk_tdms
 from toolkit.recording.grid import Grid, find_grid
-from toolkit.recording.integrity.mat import unpack_mat
-from toolkit.recording.integrity.mdf import walk_mdf
-from toolkit.recording.integrity.tdms import walk_tdms
 from toolkit.recording.sniff import Kind, office_kind, ole_kind, sniff
 
 _FOREIGN = "find out where the file comes from; the machine does not write such files"

@@ -17,7 +17,7 @@ from toolkit.calibration.fit.findings import session_findings
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.calibration.fit.session_fit import fit_gls, fit_session
-from toolkit.calibration.records.precise import solve_gls_precisely, solve_odr_precisely
+from toolkit.calibration.records.golden import solve_gls_precisely, solve_odr_precisely
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry

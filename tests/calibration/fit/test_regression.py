@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from toolkit.calibration.fit.regression import fit_terms
-from toolkit.calibration.records.exact import golden_inputs, predict_exactly, solve_exactly
+from toolkit.calibration.records.golden import golden_inputs, predict_exactly, solve_exactly
 from toolkit.calibration.terms import model_terms, parse_term, term_matrix
 from toolkit.errors import SessionError
 

@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from tests.calibration.calibration_factory import hub_data
-from toolkit.calibration.fit.levels import lack_of_fit, load_levels, reversals
+from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, reversals
 from toolkit.calibration.fit.regression import fit_terms
 from toolkit.calibration.fit.report import FitReport, coefficient_rows, prediction_half_width, report_session
 from toolkit.calibration.fit.session_fit import fit_session

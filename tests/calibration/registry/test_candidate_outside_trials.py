@@ -16,7 +16,7 @@ from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.stored import stored_loads
 from toolkit.calibration.uncertainty.budget import calibration_budget
-from toolkit.calibration.uncertainty.propagation import record_covariance
+from toolkit.calibration.uncertainty.common_errors import record_covariance
 
 Make = Callable[..., Path]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -104,3 +105,19 @@ def test_openssl_verifies_the_message_over_the_signed_bytes(tmp_path: Path) -> N
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "verified").read_bytes() == (tmp_path / "content").read_bytes()
+
+
+def test_a_check_loads_no_web_client(tmp_path: Path) -> None:
+    (tmp_path / "sealed.pdf").write_bytes(sealed_pdf())
+    (tmp_path / "root.pem").write_bytes(authority().pem)
+    script = (
+        "import sys; from pathlib import Path; from toolkit.trust.seal.pdf import check_pdf; "
+        "from toolkit.trust.seal.x509 import Trust, with_files; "
+        "check = check_pdf(Path('sealed.pdf').read_bytes(), with_files(Trust(), [Path('root.pem')])); "
+        "print(check.signature, "
+        "{'aiohttp', 'requests', 'pyhanko.sign'} & {*sys.modules})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "valid set()\n"

@@ -43,7 +43,22 @@ def _message_end() -> int:
 
 
 def _checked(data: bytes, trusted: Trust | None = None) -> SealCheck:
-    return check_pdf(data, trusted or trust(), now=dt.datetime.now(dt.UTC))
+    check = check_pdf(data, trusted or trust(), now=dt.datetime.now(dt.UTC))
+    if check.signature in ("valid", "untrusted"):
+        assert _holds_for_pyhanko(data)
+    return check
+
+
+def _holds_for_pyhanko(data: bytes) -> bool:
+    """Tell whether pyHanko's own check of a whole PDF finds its signature whole: a second opinion."""
+    from pyhanko.pdf_utils.reader import PdfFileReader
+    from pyhanko.sign.validation import validate_pdf_signature
+    from pyhanko.sign.validation.status import SignatureCoverageLevel
+    from pyhanko_certvalidator import ValidationContext
+
+    (embedded,) = PdfFileReader(io.BytesIO(data), strict=True).embedded_signatures
+    status = validate_pdf_signature(embedded, ValidationContext(trust_roots=[embedded.signer_cert]))
+    return status.intact and status.valid and status.coverage == SignatureCoverageLevel.ENTIRE_FILE
 
 
 PLAIN = len(plain_pdf())
@@ -153,6 +168,21 @@ def test_any_later_revision_breaks_the_seal(change: Callable[[object], None]) ->
     assert forged.startswith(sealed_pdf())
     assert len(forged) > len(sealed_pdf())
     assert _checked(forged).signature == "invalid"
+
+
+def test_fields_that_contain_one_another_twice_end() -> None:
+    fields = [b"<</T(%d)/Kids[%d 0 R %d 0 R]>>" % (n, n + 1, n + 1) for n in range(9, 49)]
+    data = plain_pdf()[: plain_pdf().index(b"xref\n")].replace(
+        b"/Catalog", b"/Catalog/AcroForm<</Fields[9 0 R]>>"
+    )
+    for number, body in enumerate([*fields, b"<</T(x)>>"], start=9):
+        data += b"%d 0 obj%s\nendobj\n" % (number, body)
+    places = [data.index(b"\n%d 0 obj" % number) + 1 for number in range(1, 50)]
+    start = len(data)
+    data += b"xref\n0 50\n0000000000 65535 f \n" + b"".join(b"%010d 00000 n \n" % place for place in places)
+    data += b"trailer<</Size 50/Root 1 0 R>>\nstartxref\n%d\n%%%%EOF\n" % start
+    check = _checked(data)
+    assert (check.signature, "fields in the form" in check.why) == ("invalid", True), check.why
 
 
 def test_a_second_signature_breaks_the_seal() -> None:

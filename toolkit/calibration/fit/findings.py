@@ -11,8 +11,7 @@ import numpy as np
 
 from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
 from toolkit.calibration.fit.balance_report import balance_findings
-from toolkit.calibration.fit.diagnostics import replicate_groups
-from toolkit.calibration.fit.levels import lack_of_fit, load_levels
+from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, replicate_groups
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
 from toolkit.calibration.fit.session_fit import session_statements, within_runs

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.calibration.session.reading_entries import (
+from toolkit.calibration.session.readings import (
     SHUNT_TOLERANCE_PERCENT,
     CreepEntry,
     Scope,

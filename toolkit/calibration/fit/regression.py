@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.calibration.fit.basis import Basis, build_basis
-from toolkit.calibration.fit.inner import inner
+from toolkit.calibration.fit.basis import Basis, build_basis, inner
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.levels import LackOfFit, Reversal, lack_of_fit, load_levels, reversals
+from toolkit.calibration.fit.diagnostics import LackOfFit, Reversal, lack_of_fit, load_levels, reversals
 from toolkit.calibration.fit.robust import robust_weights
 from toolkit.calibration.terms import term_matrix
 

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.basis import build_basis
-from toolkit.calibration.fit.inner import inner
+from toolkit.calibration.fit.basis import build_basis, inner
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

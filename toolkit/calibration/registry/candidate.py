@@ -20,9 +20,13 @@ from toolkit.calibration.fit.session_fit import (
     load_errors,
     load_uncertainty,
 )
-from toolkit.calibration.records.exact import golden_inputs, predict_exactly, solve_exactly
-from toolkit.calibration.records.issue import issued_value
-from toolkit.calibration.records.precise import solve_gls_precisely, solve_odr_precisely
+from toolkit.calibration.records.golden import (
+    golden_inputs,
+    predict_exactly,
+    solve_exactly,
+    solve_gls_precisely,
+    solve_odr_precisely,
+)
 from toolkit.calibration.records.record import (
     CalibrationRecord,
     DataFile,
@@ -43,7 +47,7 @@ from toolkit.calibration.registry.registry import ID, Registry, load_checked
 from toolkit.calibration.registry.status import discarded_before, is_discarded
 from toolkit.calibration.registry.store import Change
 from toolkit.calibration.session.read import Session, read_session
-from toolkit.calibration.terms import term_matrix
+from toolkit.calibration.terms import issued_value, term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding

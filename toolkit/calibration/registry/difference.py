@@ -98,7 +98,7 @@ def _changed_units(
     units = [{cell.name: cell.unit for cell in record.cells} for record in (first, second)]
     pairs += [
         (name, units[0][name], units[1][name])
-        for name in sorted(_indications(term))
+        for name in sorted(set(parse_term(term).indications))
         if name in units[0] and name in units[1]
     ]
     return [pair for pair in pairs if not same_unit(pair[1], pair[2])]
@@ -154,11 +154,6 @@ def _coefficients(load: LoadFit | None) -> dict[str, float]:
     return {} if load is None else dict(zip(load.terms, load.coefficients, strict=True))
 
 
-def _indications(term: str) -> set[str]:
-    parsed = parse_term(term)
-    return {name for name, _ in parsed.powers} | set(parsed.absolutes)
-
-
 def _extent(term: str, record: CalibrationRecord, second: CalibrationRecord) -> float | None:
     """Return the largest absolute value of a term over the ranges of both records, in units of ``one``."""
     ranges: dict[str, float] = {}
@@ -169,6 +164,6 @@ def _extent(term: str, record: CalibrationRecord, second: CalibrationRecord) -> 
             factor = 1.0 if comparable else unit(cell.unit).factor / unit(units[cell.name]).factor
             largest = max(abs(cell.minimum), abs(cell.maximum)) * factor
             ranges[cell.name] = max(ranges.get(cell.name, 0.0), largest)
-    if not _indications(term) <= ranges.keys():
+    if not ranges.keys() >= set(parse_term(term).indications):
         return None
     return float(evaluate(parse_term(term), ranges, 1.0))

@@ -21,7 +21,7 @@ from toolkit.calibration.registry.plausible import plausible, tare_claim
 from toolkit.calibration.registry.response import largest_load, main_indications, response, tolerance
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check, stored_loads
-from toolkit.calibration.session.polarity import PolarityReading, polarity_readings
+from toolkit.calibration.session.readings import PolarityReading, polarity_readings
 from toolkit.calibration.session.statements import scope_of, statements_of
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, parse_toml

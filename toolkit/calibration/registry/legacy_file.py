@@ -89,7 +89,7 @@ class LegacyFile:
                         key=key, got=term, expected=str(error.expected), what="the term cannot be read"
                     )
                     continue
-                if not {name for name, _ in parsed.powers} | set(parsed.absolutes) <= set(cells):
+                if not set(parsed.indications) <= set(cells):
                     expected = ", ".join((*sorted(cells), INTERCEPT))
                     yield Fault(key=key, got=term, expected=expected, what="the term takes no indication")
             if INTERCEPT in terms[:-1]:

@@ -21,12 +21,11 @@ import numpy as np
 
 from toolkit.calibration.fit.run_scatter import is_lowest, stated_scatter
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
-from toolkit.calibration.records.issue import issued_value, term_reach
 from toolkit.calibration.records.scatter import rows_of
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
-from toolkit.calibration.terms import INTERCEPT, term_matrix, term_slopes
+from toolkit.calibration.terms import INTERCEPT, issued_value, term_matrix, term_reach, term_slopes
 from toolkit.errors import RecordError
 from toolkit.units import unit
 

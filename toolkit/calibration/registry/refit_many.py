@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.calibration.records.issue import issued_value
 from toolkit.calibration.registry.refit import (
     CRITERION,
     GOLDEN,
@@ -23,7 +22,7 @@ from toolkit.calibration.registry.refit import (
     reference_u,
     scatter_covariance,
 )
-from toolkit.calibration.terms import INTERCEPT, evaluate, parse_term
+from toolkit.calibration.terms import INTERCEPT, evaluate, issued_value, parse_term
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

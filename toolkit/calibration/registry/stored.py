@@ -11,10 +11,15 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.calibration.session.bridge import Bridge, bridges_of, converted
+from toolkit.calibration.session.indications import (
+    Bridge,
+    bridges_of,
+    converted,
+    without_read_zeros,
+    without_run_zeros,
+)
 from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.read import Session, read_session
-from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
 from toolkit.calibration.session.settings import dcc_name, parse_session
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError

@@ -9,10 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.record import Zero
-from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
 from toolkit.calibration.session.cells import FILES
+from toolkit.calibration.session.indications import (
+    Bridge,
+    bridges_of,
+    converted,
+    fit_units,
+    without_read_zeros,
+    without_run_zeros,
+)
 from toolkit.calibration.session.known_errors import group_column, row_columns
-from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
 from toolkit.calibration.session.session_file import session_faults
 from toolkit.calibration.session.settings import (
     Settings,

@@ -10,18 +10,17 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration.session.bridge import Bridge, bridges_of, per
-from toolkit.calibration.session.polarity import polarity_readings
-from toolkit.calibration.session.reading_entries import (
+from toolkit.calibration.session.indications import Bridge, bridges_of, per
+from toolkit.calibration.session.readings import (
     Scope,
     creep_entries,
+    polarity_readings,
     shunt_entry,
     zero_entries,
 )
-from toolkit.calibration.session.settings import wrong, zero_readings
+from toolkit.calibration.session.settings import quantity, wrong, zero_readings
 from toolkit.errors import SessionError, UnitError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.quantity import quantity
 from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:

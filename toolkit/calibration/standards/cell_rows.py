@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.bridge import bridges_of
-from toolkit.calibration.session.reading_entries import Scope, creep_entries, zero_entries
+from toolkit.calibration.session.indications import bridges_of
+from toolkit.calibration.session.readings import Scope, creep_entries, zero_entries
 from toolkit.errors import SessionError
 from toolkit.units import unit
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.terms import term_matrix
-from toolkit.calibration.uncertainty.model import Component, Distribution, Evaluation, Temperature
-from toolkit.calibration.uncertainty.readings import (
+from toolkit.calibration.uncertainty.common_errors import (
     creep,
     indication_errors,
     left_at_zero,
     sensitivities,
     zero_drift,
 )
+from toolkit.calibration.uncertainty.model import Component, Distribution, Evaluation, Temperature
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 
 if TYPE_CHECKING:

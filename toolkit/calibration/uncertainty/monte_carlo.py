@@ -22,7 +22,7 @@ import numpy as np
 
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
-from toolkit.calibration.uncertainty.readings import indication_errors
+from toolkit.calibration.uncertainty.common_errors import indication_errors
 from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.errors import SessionError
 from toolkit.estimate import last_place
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.session.table import Table
+    from toolkit.calibration.uncertainty.common_errors import IndicationError
     from toolkit.calibration.uncertainty.model import Budget, Component
-    from toolkit.calibration.uncertainty.readings import IndicationError
 
     Draw = Callable[[np.random.Generator, int], NDArray[np.float64]]
     Refit = Callable[[np.random.Generator, int, NDArray[np.float64]], NDArray[np.float64]]

@@ -2,145 +2,246 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
+
+from toolkit.declared.answers import entry_of
+from toolkit.declared.writing import json_value
+from toolkit.findings import FindingEntry
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, FoundLaw, Mismatch
+    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, FoundLaw, Mismatch, Place
 
 
-def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+class DiagnosedRecording(TypedDict):
+    """A recording of a case."""
+
+    name: str
+    sha256: str
+    own: Annotated[bool, "whether the virtual machine recorded it"]
+
+
+MismatchPlace = TypedDict(
+    "MismatchPlace",
+    {
+        "variable": str,
+        "from": float | None,
+        "to": float | None,
+        "unit": str,
+        "runs": list[str],
+    },
+)
+MismatchPlace.__doc__ = "Where a channel departs from the simulation."
+
+
+class ChannelMismatch(TypedDict):
+    """How far a channel departs from the simulation."""
+
+    channel: str
+    p_value: float | None
+    share_of_variance: float | None
+    where: list[MismatchPlace]
+
+
+class EffectEstimate(TypedDict):
+    """A parameter of an effect that a diagnosis names."""
+
+    name: str
+    value: float | None
+    unit: str
+    ci95: Annotated[list[float | None] | None, "interval for a coverage of 95 %"]
+    runs: Annotated[list[Any] | None, "values of single runs, where they differ"]
+
+
+class RejectedEffect(TypedDict):
+    """An effect that explains less."""
+
+    name: str
+    log_likelihood_less: float | None
+
+
+class EffectEvidence(TypedDict):
+    """What speaks for an effect."""
+
+    held_out_log_score_gain: Annotated[float | None, "on runs that no fit has seen"]
+    p_value: Annotated[float | None, "against the chance of the whole search"]
+
+
+class DiagnosedEffect(TypedDict):
+    """An effect that a diagnosis names."""
+
+    name: str
+    stage: str
+    channel: str | None
+    statement: str
+    equation: str
+    reference: str
+    parameters: list[EffectEstimate]
+    equivalent_to: Annotated[list[str], "effects that this recording cannot tell from it"]
+    rejected: list[RejectedEffect]
+    evidence: EffectEvidence
+
+
+class LawPlace(TypedDict):
+    """Where a law acts."""
+
+    kind: Annotated[str, "output or state"]
+    channel: str
+
+
+class LawCurve(TypedDict):
+    """A law of one signal over what was recorded."""
+
+    x: list[float]
+    y: list[float]
+    band95: Annotated[list[list[float]], "lower and upper ends of a 95 % band"]
+    unit: str
+
+
+class ResembledEffect(TypedDict):
+    """A known effect that a law is like."""
+
+    name: str
+    distance: Annotated[float, "share of the law's response that is left beside the effect's"]
+
+
+class LawEvidence(TypedDict):
+    """What speaks for a law."""
+
+    held_out_log_score_gain: Annotated[float | None, "null of what explains and does not predict"]
+    p_value: float
+    share_of_gap: Annotated[float, "of the mean square that it takes"]
+
+
+class DiagnosedLaw(TypedDict):
+    """A law of what no known effect explains."""
+
+    place: LawPlace
+    form: Annotated[str, "static, mode, loop, event or tone"]
+    acts: Annotated[str, "adds or multiplies"]
+    variables: list[str]
+    memory_s: float | None
+    formula: Annotated[str | None, "null of a curve"]
+    parameters: list[EffectEstimate]
+    curve: LawCurve | None
+    range: Annotated[dict[str, list[float]], "recorded range of each variable"]
+    resembles: list[ResembledEffect]
+    confounded_with: Annotated[list[str], "parameters that moved far because of it"]
+    evidence: LawEvidence
+
+
+class NominalParameter(TypedDict):
+    """A parameter of the simulation, before and after it was fitted."""
+
+    name: str
+    before: float | None
+    after: float | None
+    unit: str
+    prior_sd: float | None
+    shift_in_sd: float | None
+
+
+class ChannelNoise(TypedDict):
+    """The noise of a channel, divided."""
+
+    sensor_sd: float | None
+    process_sd: float | None
+    how: str
+
+
+class HeldOutChannel(TypedDict):
+    """How well a channel is predicted in runs that no fit has seen."""
+
+    channel: str
+    unit: str
+    nominal_rmse: float | None
+    refitted_rmse: float | None
+    augmented_rmse: Annotated[float | None, "with the effects that are named"]
+    noise_floor: float | None
+    with_laws_rmse: Annotated[float | None, "with the laws of what has no name too"]
+    noise: ChannelNoise | None
+
+
+class HeldOutFit(TypedDict):
+    """How well the channels are predicted."""
+
+    held_out_by: str | None
+    held_out: list[HeldOutChannel]
+
+
+class Dependence(TypedDict):
+    """What an unexplained remainder depends on."""
+
+    channel: str
+    variables: list[str]
+
+
+class AbsentEffect(TypedDict):
+    """An effect that was not found, and how large it would have had to be."""
+
+    name: str
+    minimum_detectable: float | None
+    unit: str
+    observable: bool
+    why: str
+
+
+class DiagnosisEntries(TypedDict):
+    """Why a simulation and a recording differ."""
+
+    title: str
+    case_sha256: str
+    recordings: list[DiagnosedRecording] | None
+    verdict: Annotated[str, "named, equivalent, unknown, nothing or untestable"]
+    remaining: Annotated[str, "what is left unexplained"]
+    complete: Annotated[bool, "whether the search ended by itself"]
+    skipped: list[str]
+    mismatch: list[ChannelMismatch]
+    effects: list[DiagnosedEffect]
+    laws: Annotated[list[DiagnosedLaw], "of what has no name"]
+    nominal_parameters: list[NominalParameter]
+    fit: HeldOutFit
+    depends_on: list[Dependence]
+    not_found: list[AbsentEffect]
+    next_measurements: Annotated[list[str], "what to measure next"]
+    findings: list[FindingEntry]
+
+
+def as_json(diagnosis: Diagnosis) -> DiagnosisEntries:
     """Return the answer as the contract has it, without ``schema`` and ``timing``."""
-    answer: dict[str, Any] = _finite({
-        "title": diagnosis.title,
-        "case_sha256": diagnosis.case_sha256,
-        "recordings": None if diagnosis.recordings is None else [
-            {"name": recording.name, "sha256": recording.sha256, "own": recording.own}
-            for recording in diagnosis.recordings
-        ],
-        "verdict": diagnosis.verdict,
-        "remaining": diagnosis.remaining,
-        "complete": diagnosis.complete,
-        "skipped": list(diagnosis.skipped),
-        "mismatch": [_mismatch(mismatch) for mismatch in diagnosis.mismatch],
-        "effects": [_effect(effect) for effect in diagnosis.effects],
-        "laws": [_law(law) for law in diagnosis.laws],
-        "nominal_parameters": [
-            {
-                "name": parameter.name, "before": parameter.before, "after": parameter.after,
-                "unit": parameter.unit, "prior_sd": parameter.prior_sd, "shift_in_sd": parameter.shift_in_sd,
-            }
-            for parameter in diagnosis.nominal_parameters
-        ],
-        "fit": {
-            "held_out_by": diagnosis.held_out_by,
-            "held_out": [
-                {
-                    "channel": output.channel, "unit": output.unit, "nominal_rmse": output.nominal_rmse,
-                    "refitted_rmse": output.refitted_rmse, "augmented_rmse": output.augmented_rmse,
-                    "noise_floor": output.noise_floor,
-                    "with_laws_rmse": output.with_laws_rmse,
-                    "noise": None if output.noise is None else {
-                        "sensor_sd": output.noise.sensor_sd, "process_sd": output.noise.process_sd,
-                        "how": output.noise.how,
-                    },
-                }
-                for output in diagnosis.held_out
-            ],
-        },
-        "depends_on": [
-            {"channel": channel, "variables": list(names)} for channel, names in diagnosis.depends_on
-        ],
-        "not_found": [
-            {
-                "name": effect.name, "minimum_detectable": effect.minimum_detectable, "unit": effect.unit,
-                "observable": effect.observable, "why": effect.why,
-            }
-            for effect in diagnosis.not_found
-        ],
-        "next_measurements": list(diagnosis.next_measurements),
-        "findings": [finding.as_dict() for finding in diagnosis.findings],
-    })  # fmt: skip
-    return answer
+    entries = entry_of(
+        DiagnosisEntries, diagnosis,
+        mismatch=[_mismatch(mismatch) for mismatch in diagnosis.mismatch],
+        effects=[_effect(effect) for effect in diagnosis.effects],
+        laws=[_law(law) for law in diagnosis.laws],
+        fit=entry_of(HeldOutFit, diagnosis),
+        depends_on=[{"channel": channel, "variables": names} for channel, names in diagnosis.depends_on],
+    )  # fmt: skip
+    return cast("DiagnosisEntries", json_value(entries))
 
 
-def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
-    return {
-        "channel": mismatch.channel,
-        "p_value": mismatch.p_value,
-        "share_of_variance": mismatch.share_of_variance,
-        "where": [
-            {
-                "variable": place.variable,
-                "from": place.start,
-                "to": place.end,
-                "unit": place.unit,
-                "runs": list(place.runs),
-            }
-            for place in mismatch.where
-        ],
-    }
+def _mismatch(mismatch: Mismatch) -> ChannelMismatch:
+    return entry_of(ChannelMismatch, mismatch, where=[_place(place) for place in mismatch.where])
 
 
-def _effect(effect: FoundEffect) -> dict[str, Any]:
-    return {
-        "name": effect.name,
-        "stage": effect.stage,
-        "channel": effect.channel,
-        "statement": effect.statement,
-        "equation": effect.equation,
-        "reference": effect.reference,
-        "parameters": [
-            {
-                "name": parameter.name,
-                "value": parameter.value,
-                "unit": parameter.unit,
-                "ci95": None if parameter.ci95 is None else list(parameter.ci95),
-                "runs": None if parameter.runs is None else list(parameter.runs),
-            }
-            for parameter in effect.parameters
-        ],
-        "equivalent_to": list(effect.equivalent_to),
-        "rejected": [{"name": name, "log_likelihood_less": -value} for name, value in effect.rejected],
-        "evidence": {"held_out_log_score_gain": effect.held_out_log_score_gain, "p_value": effect.p_value},
-    }
+def _place(place: Place) -> MismatchPlace:
+    return entry_of(MismatchPlace, place, **{"from": place.start, "to": place.end})
 
 
-def _law(law: FoundLaw) -> dict[str, Any]:
+def _effect(effect: FoundEffect) -> DiagnosedEffect:
+    return entry_of(
+        DiagnosedEffect, effect,
+        rejected=[{"name": name, "log_likelihood_less": -value} for name, value in effect.rejected],
+        evidence=entry_of(EffectEvidence, effect),
+    )  # fmt: skip
+
+
+def _law(law: FoundLaw) -> DiagnosedLaw:
     curve = law.curve
-    return {
-        "place": {"kind": law.kind, "channel": law.channel},
-        "form": law.form,
-        "acts": law.acts,
-        "variables": list(law.variables),
-        "memory_s": law.memory_s,
-        "formula": law.formula,
-        "parameters": [
-            {
-                "name": parameter.name, "value": parameter.value, "unit": parameter.unit,
-                "ci95": None if parameter.ci95 is None else list(parameter.ci95),
-                "runs": None if parameter.runs is None else list(parameter.runs),
-            }
-            for parameter in law.parameters
-        ],
-        "curve": None if curve is None else {
-            "x": list(curve.x), "y": list(curve.y), "band95": [list(curve.low), list(curve.high)],
-            "unit": curve.unit,
-        },
-        "range": {name: [start, end] for name, start, end in law.ranges},
-        "resembles": [{"name": name, "distance": distance} for name, distance in law.resembles],
-        "confounded_with": list(law.confounded_with),
-        "evidence": {
-            "held_out_log_score_gain": law.held_out_log_score_gain, "p_value": law.p_value,
-            "share_of_gap": law.share_of_gap,
-        },
-    }  # fmt: skip
-
-
-def _finite(value: Any) -> Any:
-    """Return a JSON value with null in the place of every number that is none."""
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return entry_of(
+        DiagnosedLaw, law,
+        place=entry_of(LawPlace, law),
+        curve=None if curve is None else entry_of(LawCurve, curve, band95=[curve.low, curve.high]),
+        range={name: [start, end] for name, start, end in law.ranges},
+        resembles=[{"name": name, "distance": distance} for name, distance in law.resembles],
+        evidence=entry_of(LawEvidence, law),
+    )  # fmt: skip

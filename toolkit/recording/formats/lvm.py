@@ -12,19 +12,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.errors import ColumnError, RecordingError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.csvfile import number_or_text
-from toolkit.recording.formats.vectors import Vector, Vectors, one_table
-from toolkit.recording.integrity.refuse import damaged, truncated
+from toolkit.recording.formats.vectors import Vector, Vectors, Written, damaged, one_table, truncated
 from toolkit.recording.table import judge, refuse_cell
-
-if TYPE_CHECKING:
-    from toolkit.recording.safe_open import Gated
 
 _END = "***End_of_Header***"
 _SPECIAL, _SPECIAL_END = "***Start_Special***", "***End_Special***"
@@ -47,7 +42,7 @@ class _Segment:
         return values[column].strip() if 0 <= column < len(values) else ""
 
 
-def read_lvm(gated: Gated, machine: Machine) -> Vectors:
+def read_lvm(data: bytes, where: object, machine: Machine) -> Vectors:
     """Return the channels of an LVM file, its segments one after the other.
 
     Raises
@@ -61,23 +56,23 @@ def read_lvm(gated: Gated, machine: Machine) -> Vectors:
     RecordingError
         rule ``several-sheets``: segments with other channels than the first
     """
-    lines = _text(gated.data).splitlines()
-    head, start, separator = _header(lines, gated)
+    lines = _text(data).splitlines()
+    head, start, separator = _header(lines, where)
     decimal = head.get("Decimal_Separator", ".")[:1] or "."
-    segments = _segments(lines, start, separator, head.get("Multi_Headings", "No"), gated)
+    segments = _segments(lines, start, separator, head.get("Multi_Headings", "No"), where)
     filled = [segment for segment in segments if segment.rows]
     if not filled:
         raise UnreadableError(
-            "the LVM file has no data", where=gated.path, got=f"{len(segments)} segments without rows",
+            "the LVM file has no data", where=where, got=f"{len(segments)} segments without rows",
             expected="a line of channel names and rows of numbers",
             next_step="repeat the recording, or leave the file out of the test", rule="no-data",
         )  # fmt: skip
-    columns = _columns(filled[0], head.get("X_Columns", "One"), gated)
+    columns = _columns(filled[0], head.get("X_Columns", "One"), where)
     for table in filled[1:]:
-        if _columns(table, head.get("X_Columns", "One"), gated) != columns:
+        if _columns(table, head.get("X_Columns", "One"), where) != columns:
             raise RecordingError(
                 "the segments of the LVM file have different channels",
-                where=f"{gated.path}, line {table.rows[0][0] - 1}",
+                where=f"{where}, line {table.rows[0][0] - 1}",
                 got=", ".join(table.names)[:300],
                 expected=", ".join(filled[0].names)[:300],
                 next_step="save each segment as a file of its own",
@@ -85,12 +80,10 @@ def read_lvm(gated: Gated, machine: Machine) -> Vectors:
             )
     rows = [row for filled_table in filled for row in filled_table.rows]
     vectors = [
-        Vector(name=name, unit=unit, values=_values(rows, place, name, decimal, gated))
+        Vector(name=name, unit=unit, values=_values(rows, place, name, decimal, where))
         for place, name, unit in columns
     ]
-    return one_table(
-        [Vectors(where=str(gated.path), vectors=_one_time(vectors, gated))], machine, where=gated.path
-    )
+    return one_table([Vectors(where=str(where), vectors=_one_time(vectors, where))], machine, where=where)
 
 
 def _text(data: bytes) -> str:
@@ -101,10 +94,10 @@ def _text(data: bytes) -> str:
         return data.decode("cp1252", "replace")
 
 
-def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
+def _header(lines: list[str], where: object) -> tuple[dict[str, str], int, str]:
     end = next((number for number, line in enumerate(lines) if line.startswith(_END)), None)
     if end is None:
-        truncated(gated.path, "the LVM file ends within its header", f"{len(lines)} lines", _END)
+        truncated(where, "the LVM file ends within its header", f"{len(lines)} lines", _END)
     separator = "\t"
     for line in lines[:end]:
         if line.startswith("Separator"):
@@ -113,7 +106,7 @@ def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
             word = mark[1:].strip(mark[:1] + " ").casefold()
             if _SEPARATORS.get(word, separator) != separator or separator not in _SEPARATORS.values():
                 raise UnreadableError(
-                    "the LVM file has a separator that is not read", where=gated.path, got=repr(mark),
+                    "the LVM file has a separator that is not read", where=where, got=repr(mark),
                     expected="a tab, comma or semicolon",
                     next_step="save it again with tabs", rule="unreadable",
                 )  # fmt: skip
@@ -125,9 +118,9 @@ def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
     return head, end + 1, separator
 
 
-def _segments(lines: list[str], place: int, separator: str, multi: str, gated: Gated) -> list[_Segment]:
+def _segments(lines: list[str], place: int, separator: str, multi: str, where: object) -> list[_Segment]:
     segments: list[_Segment] = []
-    while (place := _skip(lines, place, separator, gated)) < len(lines):
+    while (place := _skip(lines, place, separator, where)) < len(lines):
         fields = _split(lines[place], separator)
         if fields[0] == "Channels" or (not segments and _ahead(lines, place)):
             segment = _Segment({})
@@ -136,12 +129,10 @@ def _segments(lines: list[str], place: int, separator: str, multi: str, gated: G
                 segment.tags[fields[0]] = fields[1:]
                 place += 1
                 if place == len(lines):
-                    truncated(
-                        gated.path, "the LVM file ends within a segment's header", f"line {place}", _END
-                    )
+                    truncated(where, "the LVM file ends within a segment's header", f"line {place}", _END)
             place += 1
             if place == len(lines):
-                truncated(gated.path, "the LVM file ends before a segment's names", f"line {place}", _X)
+                truncated(where, "the LVM file ends before a segment's names", f"line {place}", _X)
             segment.names = [name.strip() for name in _split(lines[place], separator)]
             segments.append(segment)
             place += 1
@@ -154,7 +145,7 @@ def _segments(lines: list[str], place: int, separator: str, multi: str, gated: G
             segments[-1].rows.append((place + 1, fields))
             place += 1
     for member in segments:
-        _check_rows(member, exact=multi.casefold() == "yes", gated=gated)
+        _check_rows(member, exact=multi.casefold() == "yes", where=where)
     return segments
 
 
@@ -162,14 +153,14 @@ def _ahead(lines: Sequence[str], place: int) -> bool:
     return any(line.startswith(_END) for line in lines[place : place + 40])
 
 
-def _skip(lines: list[str], place: int, separator: str, gated: Gated) -> int:
+def _skip(lines: list[str], place: int, separator: str, where: object) -> int:
     while place < len(lines):
         if lines[place].startswith(_SPECIAL):
             begin = place
             while place < len(lines) and not lines[place].startswith(_SPECIAL_END):
                 place += 1
             if place == len(lines):
-                truncated(gated.path, "a special block of the LVM file does not end", f"line {begin + 1}",
+                truncated(where, "a special block of the LVM file does not end", f"line {begin + 1}",
                           _SPECIAL_END)  # fmt: skip
         elif lines[place].strip(separator + " \t"):
             return place
@@ -177,22 +168,18 @@ def _skip(lines: list[str], place: int, separator: str, gated: Gated) -> int:
     return place
 
 
-def _check_rows(segment: _Segment, *, exact: bool, gated: Gated) -> None:
+def _check_rows(segment: _Segment, *, exact: bool, where: object) -> None:
     claims = [text.strip() for text in segment.tags.get("Samples", [])]
     longest = max((int(text) for text in claims if re.fullmatch("[0-9]{1,9}", text)), default=None)
     if longest is None:
         return
     if len(segment.rows) < longest:
-        truncated(
-            gated.path, "the LVM file has fewer rows than it says", len(segment.rows), f"{longest} samples"
-        )
+        truncated(where, "the LVM file has fewer rows than it says", len(segment.rows), f"{longest} samples")
     if exact and len(segment.rows) > longest:
-        damaged(
-            gated.path, "the LVM file has more rows than it says", len(segment.rows), f"{longest} samples"
-        )
+        damaged(where, "the LVM file has more rows than it says", len(segment.rows), f"{longest} samples")
 
 
-def _columns(segment: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
+def _columns(segment: _Segment, saved: str, where: object) -> list[tuple[int, str, str | None]]:
     """Return (place in the row, name, unit) of the channels of a segment."""
     columns: list[tuple[int, str, str | None]] = []
     channels = 0
@@ -209,7 +196,7 @@ def _columns(segment: _Segment, saved: str, gated: Gated) -> list[tuple[int, str
             columns.append((place, name, _label(segment.tag("Y_Unit_Label", place - 1))))
     count = segment.tag("Channels", 0)
     if count and count != str(channels):
-        damaged(gated.path, "the LVM file names more or fewer channels than it says", channels, count)
+        damaged(where, "the LVM file names more or fewer channels than it says", channels, count)
     return columns
 
 
@@ -218,7 +205,7 @@ def _label(text: str) -> str | None:
 
 
 def _values(
-    rows: list[tuple[int, list[str]]], place: int, name: str, decimal: str, gated: Gated
+    rows: list[tuple[int, list[str]]], place: int, name: str, decimal: str, where: object
 ) -> np.ndarray:
     values = []
     for line, fields in rows:
@@ -226,19 +213,19 @@ def _values(
         value = number_or_text(text, decimal)
         rule, reading = judge(value)
         if rule is not None:
-            refuse_cell(rule, reading, str(gated.path), line, place + 1, name)
+            refuse_cell(rule, reading, str(where), line, place + 1, name)
         values.append(value)
     return np.array(values, dtype=np.float64)
 
 
-def _one_time(vectors: list[Vector], gated: Gated) -> list[Vector]:
+def _one_time(vectors: list[Vector], where: object) -> list[Vector]:
     # With `X_Columns Multi` every channel brings its own; they must be the same to be one recording's rows.
     times = [vector for vector in vectors if vector.name == "t"]
     for time in times[1:]:
         if time.unit != times[0].unit or not np.array_equal(time.values, times[0].values):
             raise ColumnError(
                 "the channels of the LVM file were not sampled together",
-                where=gated.path,
+                where=where,
                 got="columns of x values that differ",
                 expected="one time for all channels",
                 next_step="resample the channels to one time when they are saved",
@@ -249,3 +236,38 @@ def _one_time(vectors: list[Vector], gated: Gated) -> list[Vector]:
 
 def _split(line: str, separator: str) -> list[str]:
     return line.split(separator)
+
+
+def lvm_bytes(columns: Sequence[Written], title: str) -> bytes:
+    """Return an LVM file of one segment; a time channel is its column of x values."""
+    time = next((column for column in columns if column.symbol == "t"), None)
+    channels = [column for column in columns if column is not time]
+    rows, many = len(columns[0].values), len(channels)
+
+    def line(*texts: str) -> str:
+        return "\t".join(texts)
+
+    head = [
+        line("LabVIEW Measurement", ""),
+        line("Writer_Version", "2"),
+        line("Reader_Version", "2"),
+        line("Separator", "Tab"),
+        line("Decimal_Separator", "."),
+        line("Multi_Headings", "Yes"),
+        line("X_Columns", "No" if time is None else "One"),
+        line("Description", " ".join(title.split())),
+        line("***End_of_Header***", ""),
+        "",
+        line("Channels", str(many), *[""] * many),
+        line("Samples", *[str(rows)] * many, ""),
+        line("Y_Unit_Label", *[column.unit for column in channels], ""),
+        line("X_Dimension", *["Time"] * many, ""),
+        line("X_Unit_Label", *["s" if time is None else time.unit] * many, ""),
+        line("***End_of_Header***", *[""] * (many + 1)),
+        line("X_Value", *[column.name for column in channels], "Comment"),
+    ]
+    x = [""] * rows if time is None else [repr(float(v)) for v in time.values]
+    body = [
+        line(x[row], *[repr(float(column.values[row])) for column in channels], "") for row in range(rows)
+    ]
+    return ("\r\n".join([*head, *body]) + "\r\n").encode()

@@ -1,10 +1,12 @@
-"""Named vectors, as files of channels hold them, to checked columns of numbers."""
+"""Named vectors, as files of channels hold them, to checked columns of numbers; what their files are refused
+for.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+_AGAIN = "copy the file again from the machine; it was cut off or damaged on its way"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,6 +44,21 @@ class Vectors:
 
     where: str
     vectors: Sequence[Vector]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Written:
+    """One channel to write: symbol, header, unit and values (rows,) in that unit."""
+
+    symbol: str
+    header: str
+    unit: str
+    values: NDArray[np.float64]
+
+    @property
+    def name(self) -> str:
+        """The header without its unit."""
+        return split_header(self.header)[0]
 
 
 def one_table(tables: Sequence[Vectors], machine: Machine, *, where: object) -> Vectors:
@@ -189,4 +209,47 @@ def _bad_cell(rule: str, actual: str, header: str, row: int, where: str) -> None
         expected="a finite number",
         next_step="look at that value in the file; repeat the recording or mend a copy of the file",
         rule=rule,
+    )
+
+
+def truncated(where: object, problem: str, actual: object, expected: object) -> NoReturn:
+    """Refuse a file that ends before its own headers say (rule ``truncated``)."""
+    raise UnreadableError(
+        problem, where=where, got=actual, expected=expected, next_step=_AGAIN, rule="truncated"
+    )
+
+
+def damaged(where: object, what: str, actual: object, expected: object) -> NoReturn:
+    """Refuse a file whose lengths or links contradict each other (rule ``damaged``)."""
+    raise UnreadableError(what, where=where, got=actual, expected=expected, next_step=_AGAIN, rule="damaged")
+
+
+def too_large(where: object, actual: object, most: int) -> NoReturn:
+    """Refuse a file that grows out of all proportion (rule ``inflation``)."""
+    raise UnreadableError(
+        "the file grows out of all proportion when it is unpacked",
+        where=where,
+        got=actual,
+        expected=f"at most {most // 2**20} MB in all",
+        next_step="find out where the file comes from; the machine does not write such files",
+        rule="inflation",
+    )
+
+
+def version(where: object, what: str, actual: object, expected: object, next_step: str) -> NoReturn:
+    """Refuse a version of a format that is not read (rule ``format-version``)."""
+    raise UnreadableError(
+        what, where=where, got=actual, expected=expected, next_step=next_step, rule="format-version"
+    )
+
+
+def no_numbers(where: object, problem: str, actual: object) -> NoReturn:
+    """Refuse objects, texts or complex values where columns of numbers are read (rule ``not-numbers``)."""
+    raise UnreadableError(
+        problem,
+        where=where,
+        got=actual,
+        expected="columns of real numbers",
+        next_step="export the channels as arrays of numbers",
+        rule="not-numbers",
     )

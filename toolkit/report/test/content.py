@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import WideTable
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
-    from toolkit.recording.details import ReportDetails
+    from toolkit.recording.folder import ReportDetails
     from toolkit.recording.model import TestInfo
     from toolkit.reduction.model import Condition
     from toolkit.report.diagnosis.answer import Told
@@ -101,7 +101,7 @@ def build_content(
     diagnosis : the answer of a diagnosis and who releases it; None leaves its chapter out
     titled : writes a person's name beside the id by which a text names them
     """
-    from toolkit.recording.details import ReportDetails
+    from toolkit.recording.folder import ReportDetails
 
     style = style or Style()
     report = ReportedTest(

@@ -23,10 +23,6 @@ class Check:
     message: str
     warning: bool = False
 
-    def as_dict(self) -> dict[str, object]:
-        """Return the check as a JSON-ready dict."""
-        return {"name": self.name, "ok": self.ok, "message": self.message}
-
 
 def squeeze(text: str) -> str:
     """Return text as it is compared: composed, without white space, soft hyphens and direction marks.

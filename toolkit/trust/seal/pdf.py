@@ -12,26 +12,28 @@ import datetime as dt
 import io
 import logging
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 from toolkit.errors import TrustError
 from toolkit.trust.seal.attachments import attach, attachments_of
 from toolkit.trust.seal.check import Forged, SealCheck, Sealed, judged
-from toolkit.trust.seal.cms import demand_plain
+from toolkit.trust.seal.cms import Message, check_message
 from toolkit.trust.seal.qr import Place, draw, qr_modules
-from toolkit.trust.seal.x509 import HASHES, Trust, load_certificate
+from toolkit.trust.seal.x509 import Trust
 
 if TYPE_CHECKING:
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.pdf_utils.reader import PdfFileReader
     from pyhanko.sign.timestamps import TimeStamper
 
     from toolkit.trust.seal.key import SealKey
 
 FIELD = "Seal"
+_MOST_FIELDS = 1000
 _RANGE = re.compile(rb"/ByteRange")
 _HEX = re.compile(rb"<(?:[0-9a-f]+|[0-9A-F]+)>")
 
@@ -153,14 +155,12 @@ def check_pdf(data: bytes, trust: Trust, *, now: dt.datetime | None = None) -> S
 
 def _signature(data: bytes, trust: Trust) -> Sealed | None:
     from pyhanko.pdf_utils.misc import PdfError
-    from pyhanko.sign.general import UnacceptableSignerError
-    from pyhanko.sign.validation.errors import SignatureValidationError
 
     try:
         return _read(data, trust)
     except Forged:
         raise
-    except (PdfError, SignatureValidationError, UnacceptableSignerError) as error:
+    except PdfError as error:
         raise Forged(f"the file or its signature is damaged: {' '.join(str(error).split())[:200]}") from error
     except Exception as error:
         # Hostile bytes: what cannot be checked does not hold.
@@ -168,57 +168,90 @@ def _signature(data: bytes, trust: Trust) -> Sealed | None:
 
 
 def _read(data: bytes, trust: Trust) -> Sealed | None:
+    from pyhanko.pdf_utils.generic import parse_pdf_date
     from pyhanko.pdf_utils.reader import PdfFileReader
-    from pyhanko.sign.validation import validate_pdf_signature
 
     reader = PdfFileReader(io.BytesIO(data), strict=True)
     if reader.encrypted:
         raise Forged("the PDF is encrypted")
-    signatures = reader.embedded_signatures
+    signatures = _signatures(reader)
     if not signatures:
         if _RANGE.search(data):
             raise Forged("a signature that no field refers to: the file was changed after it was sealed")
         return None
     if len(signatures) > 1:
         raise Forged(f"{len(signatures)} signatures: only the last covers the file, and it is not the seal")
-    embedded = signatures[0]
-    demand_plain(_message(data, embedded))
-    if embedded.md_algorithm not in HASHES:
-        raise Forged(f"weak algorithm: the digest is {embedded.md_algorithm.upper()}")
-    status = validate_pdf_signature(
-        embedded, _only(embedded.signer_cert), _stamp_context(trust), skip_diff=True
-    )
-    if not status.intact:
-        raise Forged("the file was changed after it was sealed: its digest differs")
-    if not status.valid:
-        raise Forged("the signature was not made by the key of its certificate")
-    at, stamped = _time(embedded, status)
+    (seal,) = signatures
+    if reader.xrefs.hybrid_xrefs_present:
+        raise Forged("readers differ about which objects the file has")
+    first, second = _gap(data, seal)
+    message = check_message(_message(data[first:second], seal), (data[:first], data[second:]))
+    at, stamped = message.at or parse_pdf_date(_part(seal, "/M"), strict=True), False
+    if message.stamp is not None:
+        at, stamped = _stamped(message, at, trust)
+    if at.tzinfo is None:
+        raise Forged("the signature states no time")
     return Sealed(
-        signer=_certificate(embedded.signer_cert),
-        others=tuple(_certificate(c) for c in embedded.other_embedded_certs),
-        at=at,
-        stamped=stamped,
+        signer=message.signer, others=message.others, at=at, stamped=stamped,
         attachments=attachments_of(reader),
-    )
+    )  # fmt: skip
 
 
-def _message(data: bytes, embedded: Any) -> bytes:
-    """Return the signature's own bytes; everything else in the file must be what it covers."""
-    first, length, second, rest = (int(n) for n in embedded.byte_range)
+def _signatures(reader: PdfFileReader) -> list[Any]:
+    """Return the signatures of the file's form."""
+    fields = _fields(_part(_part(reader.root, "/AcroForm", {}), "/Fields", ()))
+    counted = list(islice(fields, _MOST_FIELDS + 1))
+    if len(counted) > _MOST_FIELDS:  # a few that contain one another twice would take for ever
+        raise Forged(f"more than {_MOST_FIELDS} fields in the form of a document that has none to fill in")
+    return [field["/V"] for field, kind in counted if kind == "/Sig" and "/V" in field]
+
+
+def _fields(fields: Any, kind: object = None) -> Iterator[tuple[Any, object]]:
+    """Yield fields with their kinds; one below another has its kind."""
+    for place in range(len(fields)):
+        field = fields[place]
+        own = _part(field, "/FT", kind)
+        yield field, own
+        yield from _fields(_part(field, "/Kids", ()), own)
+
+
+def _part(entries: Any, key: str, otherwise: Any = None) -> Any:
+    """Return an entry, wherever in the file it stands."""
+    return entries[key] if key in entries else otherwise  # noqa: SIM401  its `get` returns a reference
+
+
+def _gap(data: bytes, seal: Any) -> tuple[int, int]:
+    """Return where the signature itself lies; everything else in the file must be what it covers."""
+    first, length, second, rest = (int(n) for n in seal.raw_get("/ByteRange"))
     if first != 0 or length <= 0 or second <= length or second + rest != len(data):
         raise Forged(
             f"the signature covers {length + rest} of {len(data)} bytes: something was added after it"
         )
     if len(_RANGE.findall(data)) != 1:
         raise Forged("the file speaks of more than one signature")
-    contents = data[length:second]
+    return length, second
+
+
+def _message(contents: bytes, seal: Any) -> bytes:
+    """Return the signature's own bytes, the only ones that it does not cover."""
     if not _HEX.fullmatch(contents):
         raise Forged("more than the signature itself lies outside of what it covers")
     raw = bytes.fromhex(contents[1:-1].decode())
     size = _der_length(raw)
-    if raw[size:].strip(b"\0") or raw != bytes(embedded.pkcs7_content):
+    if raw[size:].strip(b"\0") or raw != seal.raw_get("/Contents").original_bytes:
         raise Forged("bytes beside the signature were changed")
     return raw[:size]
+
+
+def _stamped(message: Message, at: dt.datetime, trust: Trust) -> tuple[dt.datetime, bool]:
+    """Return the time that a trusted time stamp proves, else the one that the signer states."""
+    from toolkit.trust.seal.stamps import check_stamp
+
+    try:
+        stamp = check_stamp(message.stamp or b"", message.value, trust)
+    except TrustError as error:
+        raise Forged("the time stamp is not of this signature") from error
+    return (stamp.at, True) if stamp.state == "valid" else (at, False)
 
 
 def _der_length(raw: bytes) -> int:
@@ -231,34 +264,6 @@ def _der_length(raw: bytes) -> int:
     if not 1 <= count <= 4 or size < 0x80 or raw[2] == 0:
         raise Forged("the signature is not in DER")
     return 2 + count + size
-
-
-def _time(embedded: Any, status: Any) -> tuple[dt.datetime, bool]:
-    stamp = status.timestamp_validity
-    if stamp is not None:
-        if not (stamp.intact and stamp.valid):
-            raise Forged("the time stamp is not of this signature")
-        if stamp.trusted:
-            return stamp.timestamp, True
-    at = embedded.self_reported_timestamp
-    if at is None or at.tzinfo is None:
-        raise Forged("the signature states no time")
-    return at, False
-
-
-def _only(certificate: Any) -> Any:
-    """Return a context that trusts the signer itself: what is asked here is the signature, not the path."""
-    from pyhanko_certvalidator import ValidationContext
-
-    return ValidationContext(trust_roots=[certificate], allow_fetching=False, revocation_mode="soft-fail")
-
-
-def _stamp_context(trust: Trust) -> Any:
-    from asn1crypto import x509 as asn1
-    from pyhanko_certvalidator import ValidationContext
-
-    roots = [asn1.Certificate.load(c.public_bytes(Encoding.DER)) for c in trust.certificates]
-    return ValidationContext(trust_roots=roots, allow_fetching=False, revocation_mode="soft-fail")
 
 
 def _writer(data: bytes) -> IncrementalPdfFileWriter:
@@ -296,10 +301,6 @@ def _signer(key: SealKey) -> Any:
         cert_registry=store,
         embed_roots=False,
     )
-
-
-def _certificate(part: Any) -> x509.Certificate:
-    return load_certificate(part.dump())
 
 
 def _unsealable(what: str, got: str, expected: str) -> TrustError:

@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from toolkit.calibration.fit.inner import inner
+from toolkit.calibration.fit.basis import inner
 from toolkit.calibration.fit.regression import CutDesign, exact_bits, fit_loads, fit_terms, leading
-from toolkit.calibration.records.exact import solve_exactly
+from toolkit.calibration.records.golden import solve_exactly
 
 
 def test_a_cut_line_keeps_few_bits_and_loses_nothing() -> None:

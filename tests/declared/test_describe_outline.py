@@ -8,7 +8,7 @@ import pytest
 
 from tests.house.pages import formats
 from toolkit.declared import plain, read_text, starter, table_of
-from toolkit.declared.outline import outline
+from toolkit.declared.describe import outline
 from toolkit.declared.reading import attempt
 
 FORMATS = formats()
@@ -34,7 +34,7 @@ def test_what_nobody_gave_is_missing_and_nothing_is_made_up(cls: type) -> None:
 
 
 def test_a_note_stands_beside_its_entry() -> None:
-    from toolkit.recording.details import StatedTest
+    from toolkit.recording.folder import StatedTest
 
     text = outline(StatedTest, {"machine": "belt-2"}, {"machine": "guessed from run_01.csv"})
     assert '# guessed from run_01.csv\nmachine = "belt-2"' in text

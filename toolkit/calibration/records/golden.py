@@ -1,18 +1,24 @@
-"""Golden vectors of fits with shared errors, or errors in both variables: 60 digits or more.
+"""Golden vectors of a record: its least squares once more, in exact rationals or in 60 digits and more.
 
-Decimal arithmetic on the raw terms, nothing centred, scaled or whitened, and nothing shared with the fit.
-Shared errors are solved as further unknowns with a prior of unit spread (Henderson's mixed-model equations),
-which has the same solution as generalised least squares without its covariance ever being built.
+Data are doubles, hence exact binary fractions. Ordinary and weighted least squares sum their products as
+integers over a power of two and solve the normal equations in rationals. Fits with shared errors, or errors
+in both variables, have decimal arithmetic on the raw terms: shared errors are further unknowns with a prior
+of unit spread (Henderson's mixed-model equations), which has the same solution as generalised least squares
+without its covariance ever being built. Nothing is centred, scaled or whitened, and nothing is shared with
+the fit.
 
 References: Henderson, Biometrics 31 (1975) 423; Britt and Luecke, Technometrics 15 (1973) 233.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from operator import mul
+from typing import Any
 
 from toolkit.calibration.terms import Term, evaluate, parse_term, term_slopes
 
@@ -20,6 +26,82 @@ _DIGITS = 60
 _SETTLED = Decimal("1e-24")
 _ITERATIONS = 400
 _Rows = list[list[Decimal]]
+
+
+def solve_exactly(
+    *,
+    terms: Sequence[str],
+    columns: Mapping[str, Sequence[float]],
+    load: Sequence[float],
+    weights: Sequence[float] | None = None,
+) -> tuple[Fraction, ...]:
+    """Return the least-squares coefficients of the raw terms as exact rationals.
+
+    Raises
+    ------
+    ZeroDivisionError
+        the terms are exactly dependent
+    """
+    names = sorted({name for term in terms for name in parse_term(term).indications})
+    integers = {name: _integers(columns[name]) for name in names}
+    matrix = [_term_integers(term, integers, len(load)) for term in terms]
+    y, y_denominator = _integers(load)
+    w, w_denominator = ([1] * len(y), 1) if weights is None else _integers(weights)
+    weighted = [list(map(mul, column, w)) for column, _ in matrix]
+    size = len(terms)
+    normal = [[Fraction(0)] * size for _ in range(size)]
+    right = []
+    for i in range(size):
+        for j in range(i, size):
+            product = sum(map(mul, weighted[i], matrix[j][0]))
+            normal[i][j] = normal[j][i] = Fraction(product, matrix[i][1] * matrix[j][1] * w_denominator)
+        product = sum(map(mul, weighted[i], y))
+        right.append(Fraction(product, matrix[i][1] * y_denominator * w_denominator))
+    return tuple(_solve(normal, right))
+
+
+def golden_inputs(ranges: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], ...]:
+    """Return points that excite every indication: the centre, the ends of each, each pair at its top."""
+    middle = [(low + high) / 2 for low, high in ranges]
+    points = [tuple(middle)]
+    for i, (low, high) in enumerate(ranges):
+        points += [(*middle[:i], end, *middle[i + 1 :]) for end in (low, high)]
+    for i, j in itertools.combinations(range(len(ranges)), 2):
+        point = list(middle)
+        point[i], point[j] = ranges[i][1], ranges[j][1]
+        points.append(tuple(point))
+    return tuple(points)
+
+
+def predict_exactly(
+    *, terms: Sequence[str], coefficients: Sequence[Fraction], names: Sequence[str], point: Sequence[float]
+) -> float:
+    """Return the load at a point, computed in rationals and rounded once."""
+    columns = {name: Fraction(value) for name, value in zip(names, point, strict=True)}
+    total = Fraction(0)
+    for term, coefficient in zip(terms, coefficients, strict=True):
+        total += coefficient * evaluate(parse_term(term), columns, Fraction(1))
+    return float(total)
+
+
+def _integers(values: Sequence[float]) -> tuple[list[int], int]:
+    ratios = [float(value).as_integer_ratio() for value in values]
+    common = max(denominator for _, denominator in ratios)
+    return [number * (common // denominator) for number, denominator in ratios], common
+
+
+def _term_integers(
+    term: str, integers: Mapping[str, tuple[list[int], int]], rows: int
+) -> tuple[list[int], int]:
+    parsed = parse_term(term)
+    column, denominator = [1] * rows, 1
+    for name, power in parsed.powers:
+        column = [a * b**power for a, b in zip(column, integers[name][0], strict=True)]
+        denominator *= integers[name][1] ** power
+    for name in parsed.absolutes:
+        column = [a * abs(b) for a, b in zip(column, integers[name][0], strict=True)]
+        denominator *= integers[name][1]
+    return column, denominator
 
 
 def solve_gls_precisely(
@@ -128,7 +210,7 @@ def _digits(terms: Sequence[str], columns: Mapping[str, Sequence[float]]) -> int
     ratio = max(
         (max(map(abs, x)) / ((max(x) - min(x)) or 1.0) for x in columns.values() if any(x)), default=1.0
     )
-    degree = max(sum(p for _, p in term.powers) + len(term.absolutes) for term in map(parse_term, terms))
+    degree = max(parse_term(name).degree for name in terms)
     return _DIGITS + 4 * degree * max(0, math.ceil(math.log10(max(ratio, 1.0))))
 
 
@@ -166,14 +248,14 @@ def _least_squares(x: _Rows, y: Sequence[Decimal], weights: Sequence[Decimal]) -
     return _solve(*_normal(x, y, weights))
 
 
-def _solve(normal: _Rows, right: list[Decimal]) -> list[Decimal]:
+def _solve(normal: Sequence[Sequence[Any]], right: Sequence[Any]) -> list[Any]:
     rows = [[*row, value] for row, value in zip(normal, right, strict=True)]
     size = len(rows)
     for i in range(size):
         pivot = max(range(i, size), key=lambda r: abs(rows[r][i]))
         rows[i], rows[pivot] = rows[pivot], rows[i]
         if rows[i][i] == 0:
-            raise ArithmeticError("the terms are dependent")
+            raise ZeroDivisionError("the terms are dependent")
         rows[i] = [value / rows[i][i] for value in rows[i]]
         for r in range(size):
             if r != i:

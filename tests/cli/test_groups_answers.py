@@ -16,10 +16,9 @@ import pytest
 import typer
 
 from toolkit.cli.console import Json, answers
-from toolkit.cli.groups import build_group, declared_answers, leaves
+from toolkit.cli.groups import build_group, declared_answers, declared_type, leaves
 from toolkit.cli.main import command_tree, run
 from toolkit.declared.answers import answer_schema, departures, tables_of
-from toolkit.lab.answer_types import declared_type
 from toolkit.lab.home import packaged_home
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import simulate
