@@ -61,7 +61,7 @@ EFFORT = {
         r"\]\(tutorials/(\w+)\.md\)[^\n]*\| (\d+) \| (\d+) \| (\d+) \| (\d+) \|$", INDEX, re.M
     )
 }
-"""By page, as the index tells: commands, entries and options, files that a person writes, seconds of processor time."""
+"""By page, as the index tells: commands, entries and options, files written by hand, processor time [s]."""
 _SECONDS = 3  # times as many as told: a machine is slower, or busy
 
 
