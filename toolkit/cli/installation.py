@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json as jsonlib
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers, into_file, into_folder
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output, into_file, into_folder
 
 
 class InitAnswer(TypedDict):
@@ -29,8 +30,8 @@ class DocsAnswer(TypedDict):
 @answers(InitAnswer)
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", callback=into_folder, help="The home to make.")],
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Make a laboratory's home folder.
 
@@ -47,12 +48,12 @@ def init(
         f"  calibrations/       fill it with: toolkit calibrate SESSION.toml --home {folder}\n"
         f"  report_templates/   {', '.join(p.name for p in sorted((folder / TEMPLATES).glob('*.docx')))}"
     )
-    answer({"home": real_path(folder), "written": list(written)}, text, as_json=json, quiet=quiet)
+    output.answer({"home": real_path(folder), "written": list(written)}, text)
     return 0
 
 
 @answers("toolkit.lab.doctor:DoctorAnswer")
-def doctor(json: Json = False, quiet: Quiet = False) -> int:
+def doctor(*, output: Output) -> int:
     """Report what this computer lacks, and how to install it.
 
     Example: toolkit doctor
@@ -60,7 +61,7 @@ def doctor(json: Json = False, quiet: Quiet = False) -> int:
     from toolkit.lab.doctor import doctor_answer
 
     payload, text = doctor_answer()
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 1 if payload["mend"] else 0
 
 
@@ -69,8 +70,8 @@ def docs(
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the place of its first page and open nothing.")
     ] = False,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Open the documentation, which needs no network: tutorials, how-tos, reference, explanations.
 
@@ -82,7 +83,7 @@ def docs(
 
     page = documentation()
     opened = not no_browser and webbrowser.open(page.as_uri())
-    answer({"page": page, "opened": opened}, str(page), as_json=json, quiet=quiet)
+    output.answer({"page": page, "opened": opened}, str(page))
     return 0
 
 
@@ -92,8 +93,8 @@ def qualify(
         Path | None,
         typer.Option("--out", callback=into_file, help="Write the record here: .json, else as text."),
     ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Qualify this installation: certified sets, published examples, golden vectors, and every refusal once.
 
@@ -108,12 +109,12 @@ def qualify(
     record = run(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
     payload, text = qualification_payload(record), qualification_text(record)
     if out is not None:
-        document = jsonlib.dumps(
+        document = json.dumps(
             {"schema": 1, **json_value(payload)}, ensure_ascii=False, indent=2, allow_nan=False
         )
         write_result(out, (document if out.suffix.lower() == ".json" else text) + "\n")
         text += f"\nwritten: {out}"
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 0 if record.passed else 1
 
 
@@ -131,8 +132,8 @@ def explain(
         str | None,
         typer.Option("--answer", metavar="COMMAND", help="Print the JSON schema of a command's answer."),
     ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Explain a finding's rule and what to do, an effect that a diagnosis names, or a characteristic.
 
@@ -146,5 +147,5 @@ def explain(
     from toolkit.lab.rules import explained
 
     payload, text = explained(rule)
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 0
