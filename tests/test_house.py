@@ -51,7 +51,8 @@ def test_no_import_cycles() -> None:
 def test_files_are_small() -> None:
     lines = {path: len(path.read_text().splitlines()) for path in ROOT.rglob("*.py")}
     assert max(lines.values()) <= 500, max(lines, key=lines.get)  # type: ignore[arg-type]
-    assert statistics.median(n for n in lines.values() if n > 10) <= 175
+    # Fewer, fuller files: a module of a few lines that one other alone uses is a part of that one.
+    assert statistics.median(n for n in lines.values() if n > 10) <= 200
 
 
 def test_the_public_api_is_small_and_there() -> None:

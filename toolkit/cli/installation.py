@@ -52,13 +52,13 @@ def init(
     return 0
 
 
-@answers("toolkit.lab.doctor:DoctorAnswer")
+@answers("toolkit.lab.installation:DoctorAnswer")
 def doctor(*, output: Output) -> int:
     """Report what this computer lacks, and how to install it.
 
     Example: toolkit doctor
     """
-    from toolkit.lab.doctor import doctor_answer
+    from toolkit.lab.installation import doctor_answer
 
     payload, text = doctor_answer()
     output.answer(payload, text)
@@ -87,7 +87,7 @@ def docs(
     return 0
 
 
-@answers("toolkit.lab.qualification_answer:QualifyAnswer")
+@answers("toolkit.lab.installation:QualifyAnswer")
 def qualify(
     out: Annotated[
         Path | None,
@@ -102,7 +102,7 @@ def qualify(
     """
     from toolkit.declared import json_value
     from toolkit.lab.home import packaged_home
-    from toolkit.lab.qualification_answer import qualification_payload, qualification_text
+    from toolkit.lab.installation import qualification_payload, qualification_text
     from toolkit.publication import write_result
     from toolkit.qualification.run import qualify as run
 

@@ -188,7 +188,7 @@ def prove(
     registry = place.open(sign)
     document = anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument))
     if time_stamp is not None:
-        from toolkit.lab.stamping import stamped
+        from toolkit.lab.sealing import stamped
 
         document = stamped(document, time_stamp)
     typer.echo(document, nl=False)
@@ -216,8 +216,7 @@ def check(
     Example: toolkit ledger check --against certificate.pdf
     """
     from toolkit.lab.people import check_against
-    from toolkit.lab.sealing import TRUST, trusted
-    from toolkit.lab.stamping import stamp_of
+    from toolkit.lab.sealing import TRUST, stamp_of, trusted
 
     registry = place.open()
     concerned, comparison = check_against(registry, instrument, against)

@@ -195,8 +195,7 @@ def words(
     from toolkit.report.word.language import fixed_texts, phrase_of
     from toolkit.report.word.package import open_package, read_template
     from toolkit.report.word.xml import stories
-    from toolkit.words.catalogue import SOURCE, languages, phrases
-    from toolkit.words.phrasebook import phrasebook
+    from toolkit.words.phrasebook import SOURCE, languages, phrasebook, phrases
 
     translated = [name for name in languages() if name != SOURCE]
     if language is not None and language not in translated:
@@ -258,7 +257,7 @@ def new(
     from toolkit.report.style import style_file, style_in_language
     from toolkit.report.word.language import in_language
     from toolkit.report.word.package import read_template
-    from toolkit.words.catalogue import SOURCE, languages
+    from toolkit.words.phrasebook import SOURCE, languages
 
     sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
     if like not in sources:

@@ -18,9 +18,10 @@ from toolkit.lab.previews import (
     read_preview,
     report_words,
     template_findings,
+    template_pages,
+    template_print,
     templates_of,
 )
-from toolkit.lab.template_pages import template_pages, template_print
 from toolkit.lab.uploads import hand_in_template
 from toolkit.workbench.page import page
 

@@ -19,10 +19,9 @@ from toolkit.lab.decisions import Order
 from toolkit.lab.pending import decide
 from toolkit.lab.statements import statement_groups, with_statement
 from toolkit.trust.requested import Requested
-from toolkit.workbench.bench import Bench
+from toolkit.workbench.bench import Bench, waiting
 from toolkit.workbench.page import fragment, page
 from toolkit.workbench.record_page import PARTS
-from toolkit.workbench.waiting import waiting
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -16,9 +16,9 @@ from lxml import etree
 from toolkit.errors import RenderError
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.bulk import with_rows, without_rows
-from toolkit.report.word.contents import ContentsEntry, contents_fields
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
+from toolkit.report.word.toc import ContentsEntry, contents_fields
 from toolkit.report.word.xml import SDT_CONTENT, SDT_PR, W_P, W_R, W_SDT, W_T, Element, ancestor, parser, q
 
 Edit = Callable[[Element], None]
@@ -193,7 +193,7 @@ def titles_of(
     The PDF's title begins with the number that Word gives a heading by itself. A heading that the outline
     has not is left out.
     """
-    from toolkit.report.word.verify_text import squeeze
+    from toolkit.report.word.verify import squeeze
 
     found = []
     at = 0
