@@ -61,8 +61,8 @@ class Bench:
 
     def path_of(self, kind: Kind, holding_id: str) -> Path | None:
         """Return the folder of a holding by its id; the home is looked through where it is not known."""
-        known = self.holdings().path(kind, holding_id)
-        return known or self.holdings(again=True).path(kind, holding_id)
+        path = self.holdings().path(kind, holding_id)
+        return path or self.holdings(again=True).path(kind, holding_id)
 
     def reported(self) -> frozenset[str]:
         """Return the hashes that the reports of the home rest on, read once for each look through it."""

@@ -112,7 +112,7 @@ def start(request: Request) -> Response:
 
 def model(request: Request) -> Response:
     """Return the page: the effects with their sizes, and a place for what the simulation says."""
-    bench, folder, sizable = _asked(request)
+    bench, folder, sizable = _requested(request)
     kept = request.query_params.get("kept", "")
     is_kept = _KEPT.fullmatch(kept) and (bench.home / MODELS / kept).is_file()
     return page(
@@ -123,7 +123,7 @@ def model(request: Request) -> Response:
 
 def attempt(request: Request) -> Response:
     """Return what the simulation says with the effects as they are set."""
-    bench, _, sizable = _asked(request)
+    bench, _, sizable = _requested(request)
     sized = sized_from(sizable.model, request.state.form)
     with _ANSWERING:
         answer = trial_answer(sizable, sized, bench.home)
@@ -132,14 +132,14 @@ def attempt(request: Request) -> Response:
 
 def keep(request: Request) -> Response:
     """Keep the effects as they are set as a model file of the home."""
-    bench, _, sizable = _asked(request)
+    bench, _, sizable = _requested(request)
     place_of = keep_model(bench.home, sizable.model, sized_from(sizable.model, request.state.form))
-    kept = place_of.removeprefix(f"{MODELS}/")
+    name = place_of.removeprefix(f"{MODELS}/")
     address = f"{bench.keys.place}/diagnosis/{request.path_params['diagnosis']}/model"
-    return RedirectResponse(f"{address}?kept={kept}", 303)
+    return RedirectResponse(f"{address}?kept={name}", 303)
 
 
-def _asked(request: Request) -> tuple[Bench, Path, SizableModel]:
+def _requested(request: Request) -> tuple[Bench, Path, SizableModel]:
     bench: Bench = request.app.state.bench
     folder = bench.path_of("diagnosis", request.path_params["diagnosis"])
     if folder is None or not (folder / ANSWER).is_file():

@@ -51,7 +51,7 @@ def _newest_first(status: Any) -> int:
 
 def record(request: Request) -> Response:
     """Return a record's page: its state and coefficients, and a place for each part."""
-    _, record_id = _asked(request)
+    _, record_id = _requested(request)
     return record_page(request, record_id)
 
 
@@ -83,7 +83,7 @@ def record_page(
 
 def part(request: Request) -> Response:
     """Return one part of a record's page."""
-    bench, record_id = _asked(request)
+    bench, record_id = _requested(request)
     name = request.path_params["part"]
     if name not in PARTS:
         raise HTTPException(404)
@@ -151,7 +151,7 @@ def decide(request: Request) -> Response:
 
     Where people are enrolled the decision is requested: it is signed by their keys, which never come here.
     """
-    bench, record_id = _asked(request)
+    bench, record_id = _requested(request)
     decision = request.path_params["decision"]
     if decision not in DECISIONS:
         raise HTTPException(404)
@@ -192,7 +192,7 @@ def _day(form: Mapping[str, str], name: str) -> dt.date:
         ) from error  # fmt: skip
 
 
-def _asked(request: Request) -> tuple[Bench, str]:
+def _requested(request: Request) -> tuple[Bench, str]:
     """Return the bench and the record of an address: an id that a ledger knows; nothing else has one."""
     bench: Bench = request.app.state.bench
     record_id = request.path_params["record"]
