@@ -64,8 +64,11 @@ class Command:
         self._command, self.answer = command, answer
         functools.update_wrapper(self, command)
 
-    def __call__(self, **values: Any) -> int:
-        """Run the command with its options' values by name."""
+    def __call__(self, *arguments: Any, **options: Any) -> int:
+        """Run the command; what is not given has its default."""
+        bound = self.__signature__.bind(*arguments, **options)
+        bound.apply_defaults()
+        values = bound.arguments
         groups = {
             name: group(**{option.name: values.pop(option.name) for option in dataclasses.fields(group)})
             for name, group in self._groups.items()
@@ -80,15 +83,14 @@ class Command:
     def _groups(self) -> dict[str, Any]:
         return {name: held for name, held in self._hints.items() if dataclasses.is_dataclass(held)}
 
-    @property
+    @functools.cached_property
     def __signature__(self) -> inspect.Signature:
         """Its options as parameters, those of a class in its place."""
         parameters: list[inspect.Parameter] = []
         for parameter in inspect.signature(self._command).parameters.values():
             group = self._groups.get(parameter.name)
             if group is None:
-                annotation = self._hints[parameter.name]
-                parameters.append(parameter.replace(kind=parameter.KEYWORD_ONLY, annotation=annotation))
+                parameters.append(parameter.replace(annotation=self._hints[parameter.name]))
                 continue
             hints = typing.get_type_hints(group, include_extras=True)
             parameters += [
