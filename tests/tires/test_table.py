@@ -13,7 +13,7 @@ from toolkit.errors import (
     UnitError,
     UnreadableError,
 )
-from toolkit.tires.catalog import model
+from toolkit.tires.models import model
 from toolkit.tires.models.magic_formula import value
 from toolkit.tires.table import read_table
 from toolkit.tires.table_fit import fit_table

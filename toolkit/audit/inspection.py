@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
-from toolkit.audit.model import CLEAN, TELLS, Identification
+from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, columns_of
 from toolkit.audit.quality import impossible
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding

@@ -13,12 +13,11 @@ from typing import Any, cast
 
 from toolkit.audit.candidates import unfit
 from toolkit.audit.choices import Choices
-from toolkit.audit.columns import columns_of
 from toolkit.audit.conditions import Change, changes
 from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
-from toolkit.audit.model import Grade, Identification
+from toolkit.audit.model import Grade, Identification, columns_of
 from toolkit.audit.quality import impossible, quality
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs

@@ -154,9 +154,9 @@ def fit_resolved(
     from toolkit.characteristics.groups import group
     from toolkit.lab.tire_files import STAND_IN_RADIUS
     from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.catalog import fit_model
     from toolkit.tires.fit import Curve, why_not
     from toolkit.tires.global_data import measured
+    from toolkit.tires.models import fit_model
     from toolkit.tires.table_fit import fit_findings
 
     groups = group(resolved.result.reduced)
@@ -206,8 +206,8 @@ def fit_resolved(
 
 
 def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalModel, ...]]:
-    from toolkit.tires.catalog import find
     from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.models import find
 
     models = [find(name) for name in names]
     over_loads = tuple(model for model in models if isinstance(model, GlobalModel))
@@ -275,7 +275,7 @@ def model_choice(choices: Sequence[str]) -> tuple[str, ...]:
     FitError
         no model of a name is built: to be told before anything is read
     """
-    from toolkit.tires.catalog import find, model_names
+    from toolkit.tires.models import find, model_names
 
     names = [name for choice in choices for name in (model_names() if choice == "all" else (choice,))]
     for name in names:

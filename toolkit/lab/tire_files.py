@@ -65,9 +65,9 @@ def write_fit(
         the data have one load: its change would be invented
     """
     from toolkit.errors import FitError
-    from toolkit.tires.catalog import find
     from toolkit.tires.global_data import what_varies
     from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.models import find
     from toolkit.tires.tir_write import tire_fit, write_tir
 
     varies = what_varies(data)

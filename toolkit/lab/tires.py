@@ -190,7 +190,7 @@ class Tire(Face):
         import numpy as np
 
         from toolkit.report.content import Curve, Plot
-        from toolkit.tires.tir_units import si_number
+        from toolkit.tires.tir import si_number
 
         angles, nominal = np.linspace(-12.0, 12.0, 97), si_number(self.result, "FNOMIN")
         loads = [round(share * nominal) for share in (0.5, 1.0, 1.5)]

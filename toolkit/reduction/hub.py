@@ -26,8 +26,8 @@ from toolkit.channels import hub_signs, signs
 from toolkit.errors import RecordError
 from toolkit.findings import Finding
 from toolkit.reduction.averaging import means
+from toolkit.reduction.corrections import zero_shifts
 from toolkit.reduction.model import HubLoad
-from toolkit.reduction.tare import zero_shifts
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:

@@ -16,12 +16,11 @@ from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means, turning
 from toolkit.reduction.cells import physics_findings
 from toolkit.reduction.common_load import at_one_angle, carry, slopes
-from toolkit.reduction.corrections import correction_findings
+from toolkit.reduction.corrections import choose_tares, correction_findings, zero_shifts
 from toolkit.reduction.hub import HubBlock, hub_findings, hub_means
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
 from toolkit.reduction.remarks import drift_findings
-from toolkit.reduction.tare import choose_tares, zero_shifts
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
