@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+import datetime as dt
 from pathlib import Path
 from typing import Annotated
 
@@ -15,11 +15,9 @@ from toolkit.cli.options import (
     DecisionOptions,
     EntryOptions,
     Id,
-    KnownAt,
     Machine,
     Output,
     RegistryOptions,
-    day,
 )
 
 app = typer.Typer(help="Calibration records: what is in force, and why.", no_args_is_help=True)
@@ -28,7 +26,7 @@ IN_FORCE = (
     "First day in force (YYYY-MM-DD). Before the session's date it needs --reason; "
     "before the decision it is noted in the ledger."
 )
-_DAYS = ["%Y-%m-%d"]
+KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known on this day (YYYY-MM-DD).")]
 
 
 @app.command("list")
@@ -48,7 +46,7 @@ def list_records(
     from toolkit.lab.registry_answer import listed
 
     payload, text, sound = listed(
-        place.open(), instrument, known_at=day(known_at),
+        place.open(), instrument, known_at=_day_or_none(known_at, "--known-at"),
         everything=everything,
     )  # fmt: skip
     output.answer(payload, text)
@@ -75,7 +73,7 @@ def show(
     from toolkit.lab.registry_answer import shown
 
     registry = place.open()
-    payload, text = shown(registry, record_id, known_at=day(known_at))
+    payload, text = shown(registry, record_id, known_at=_day_or_none(known_at, "--known-at"))
     if full:
         more, lines = full_record(registry, record_id)
         payload, text = {**payload, **more}, f"{text}\n\n{lines}"
@@ -149,7 +147,7 @@ def import_record(
 @answers("toolkit.lab.decisions:ApproveAnswer")
 def approve(
     record_id: Id,
-    in_force_from: Annotated[datetime, typer.Option("--in-force-from", formats=_DAYS, help=IN_FORCE)],
+    in_force_from: Annotated[str, typer.Option("--in-force-from", help=IN_FORCE)],
     checked_by: Annotated[str, typer.Option("--checked-by", help="Who checked; not who entered.")],
     approved_by: Annotated[str | None, typer.Option("--approved-by", help="Who approved.")] = None,
     reason: Annotated[
@@ -160,10 +158,8 @@ def approve(
         ),
     ] = None,
     on: Annotated[
-        datetime | None,
-        typer.Option(
-            "--on", formats=_DAYS, help="Day of the decision; default: today. In the past it needs --reason."
-        ),
+        str | None,
+        typer.Option("--on", help="Day of the decision; default: today. In the past it needs --reason."),
     ] = None,
     polarity: Annotated[
         Path | None,
@@ -184,10 +180,10 @@ def approve(
     from toolkit.calibration.registry.approval import approve as put_in_force
     from toolkit.lab.decisions import approval_answer
 
-    registry, since = entering.open(), in_force_from.date()
+    registry, since = entering.open(), _day(in_force_from, "--in-force-from")
     decision = put_in_force(
         registry, record_id, in_force_from=since, checked_by=checked_by, approved_by=approved_by,
-        reason=reason, known_on=day(on), recall=recall, polarity=polarity, machine=machine,
+        reason=reason, known_on=_day_or_none(on, "--on"), recall=recall, polarity=polarity, machine=machine,
     )  # fmt: skip
     output.answer(*approval_answer(registry, decision, since))
     return exit_code(decision.findings)
@@ -198,14 +194,14 @@ def approve(
 def withdraw(
     record_id: Id,
     on: Annotated[
-        datetime,
-        typer.Option("--on", formats=_DAYS, help="Day on which the fault became known (YYYY-MM-DD)."),
+        str,
+        typer.Option("--on", help="Day on which the fault became known (YYYY-MM-DD)."),
     ],
     reason: Annotated[str, typer.Option("--reason", help="Why; printed wherever the record is named.")],
     by: Annotated[str, typer.Option("--by", help="Who withdraws.")],
     void_from: Annotated[
-        datetime | None,
-        typer.Option("--from", formats=_DAYS, help="First void day; default: the record's in-force date."),
+        str | None,
+        typer.Option("--from", help="First void day; default: the record's in-force date."),
     ] = None,
     *,
     entering: DecisionOptions,
@@ -220,7 +216,7 @@ def withdraw(
 
     registry = entering.open()
     status = void(
-        registry, record_id, on=on.date(), void_from=day(void_from),
+        registry, record_id, on=_day(on, "--on"), void_from=_day_or_none(void_from, "--from"),
         reason=reason, by=by,
     )  # fmt: skip
     output.answer(*withdrawal_answer(registry, record_id, status))
@@ -305,3 +301,19 @@ def _instrument_of(record_id: str) -> str:
     from toolkit.calibration.registry.registry import instrument_of
 
     return instrument_of(record_id)
+
+
+def _day_or_none(text: str | None, option: str) -> dt.date | None:
+    return None if text is None else _day(text, option)
+
+
+def _day(text: str, option: str) -> dt.date:
+    try:
+        return dt.date.fromisoformat(text)
+    except ValueError as error:
+        from toolkit.errors import ConfigError
+
+        raise ConfigError(
+            f"{option} is no date", where=option, got=text, expected="YYYY-MM-DD",
+            next_step="write it as in 2026-03-31", rule="usage",
+        ) from error  # fmt: skip
