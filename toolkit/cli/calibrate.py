@@ -73,7 +73,7 @@ def command(
             next_step="leave one of them out; nothing was written",
             rule="usage",
         )
-    registry = replace(entering, calibrations=calibrations or out).open()
+    registry = replace(entering, calibrations=calibrations or out).registry()
     if dry_run and figures is not None:
         raise ConfigError(
             "a dry run makes no files",

@@ -46,7 +46,7 @@ def list_records(
     from toolkit.lab.registry_answer import listed
 
     payload, text, sound = listed(
-        place.open(), instrument, known_at=_day_or_none(known_at, "--known-at"),
+        place.registry(), instrument, known_at=_day_or_none(known_at, "--known-at"),
         everything=everything,
     )  # fmt: skip
     output.answer(payload, text)
@@ -72,7 +72,7 @@ def show(
     from toolkit.lab.gates_answer import full_record
     from toolkit.lab.registry_answer import shown
 
-    registry = place.open()
+    registry = place.registry()
     payload, text = shown(registry, record_id, known_at=_day_or_none(known_at, "--known-at"))
     if full:
         more, lines = full_record(registry, record_id)
@@ -95,7 +95,7 @@ def verify(
     """
     from toolkit.lab.decisions import verified_answer
 
-    payload, text = verified_answer(place.open(), head)
+    payload, text = verified_answer(place.registry(), head)
     output.answer(payload, text)
     return 0 if all(record["ok"] for record in payload["records"]) else 1
 
@@ -114,7 +114,7 @@ def history(
     """
     from toolkit.lab.registry_answer import history as told
 
-    registry = place.open()
+    registry = place.registry()
     instrument = name if name in registry.instruments() else _instrument_of(name)
     ledger = registry.ledger(instrument)
     payload, text = told(ledger, instrument, name)
@@ -139,7 +139,7 @@ def import_record(
     """
     from toolkit.lab.decisions import import_answer
 
-    output.answer(*import_answer(entering.open(), file, again=again))
+    output.answer(*import_answer(entering.registry(), file, again=again))
     return 0
 
 
@@ -180,7 +180,7 @@ def approve(
     from toolkit.calibration.registry.approval import approve as put_in_force
     from toolkit.lab.decisions import approval_answer
 
-    registry, since = entering.open(), _day(in_force_from, "--in-force-from")
+    registry, since = entering.registry(), _day(in_force_from, "--in-force-from")
     decision = put_in_force(
         registry, record_id, in_force_from=since, checked_by=checked_by, approved_by=approved_by,
         reason=reason, known_on=_day_or_none(on, "--on"), recall=recall, polarity=polarity, machine=machine,
@@ -214,7 +214,7 @@ def withdraw(
     from toolkit.calibration.registry.approval import withdraw as void
     from toolkit.lab.decisions import withdrawal_answer
 
-    registry = entering.open()
+    registry = entering.registry()
     status = void(
         registry, record_id, on=_day(on, "--on"), void_from=_day_or_none(void_from, "--from"),
         reason=reason, by=by,
@@ -237,7 +237,7 @@ def diff(
     """
     from toolkit.lab.registry_answer import difference
 
-    payload, text, differs = difference(place.open(), one, other)
+    payload, text, differs = difference(place.registry(), one, other)
     output.answer(payload, text)
     return 1 if differs else 0
 
@@ -261,7 +261,7 @@ def discard(
     from toolkit.calibration.registry.approval import discard as put_aside
     from toolkit.lab.decisions import discarded_answer
 
-    registry = entering.open()
+    registry = entering.registry()
     status = put_aside(registry, record_id, reason=reason, by=by)
     output.answer(*discarded_answer(registry, record_id, status))
     return 0
@@ -281,7 +281,7 @@ def report(
     """
     from toolkit.lab.session_answer import record_report
 
-    payload, text, findings = record_report(place.open(), record_id, figures)
+    payload, text, findings = record_report(place.registry(), record_id, figures)
     output.answer(payload, text)
     return exit_code(findings)
 

@@ -73,7 +73,7 @@ def budget(
         load=load, at=at, indications=indications, trials=trials, seed=seed, digits=digits, figure=figure,
         temperature=temperature_of(temperature_range, temperature_coefficient),
     )  # fmt: skip
-    payload, text, findings = budget_answer(place.open(), record_id, order)
+    payload, text, findings = budget_answer(place.registry(), record_id, order)
     output.answer(payload, text)
     return exit_code(findings)
 
@@ -110,7 +110,7 @@ def apply(
     from toolkit.lab.budget import values_of
     from toolkit.lab.record import Record
 
-    registry = place.open()
+    registry = place.registry()
     record = Record(result=registry.load(record_id), registry=registry, on=day(on), known_at=day(known_at))
     zero = None if tare is None else values_of(tare, "--tare")
     payload, text, loads = apply_answer(record, data, out, tare=zero, draft=draft)
@@ -169,7 +169,7 @@ def certificate(
 
     started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", issuing.home))
-    registry = issuing.open()
+    registry = issuing.registry()
     sealing = issuing.sealing(registry, draft=draft)
     with output.progress("certificate") as step:
         issued, delivered = deliver_certificate(
@@ -219,7 +219,7 @@ def standard(
             next_step="name one of them", rule="usage",
         )  # fmt: skip
     evaluations = evaluate_record(
-        place.open(), record_id,
+        place.registry(), record_id,
         standard="e74" if name == "e74" else "iso376",
         load=load, indication=indication, degree=degree, preloads=preloads,
     )  # fmt: skip
@@ -255,7 +255,9 @@ def chart(
     """
     from toolkit.lab.control_answer import chart_answer
 
-    payload, text, findings = chart_answer(place.open(), instrument, load=load, baseline=baseline, out=out)
+    payload, text, findings = chart_answer(
+        place.registry(), instrument, load=load, baseline=baseline, out=out
+    )
     output.answer(payload, text)
     return exit_code(findings)
 
@@ -277,7 +279,7 @@ def due(
     from toolkit.calibration.registry.clock import today
     from toolkit.lab.control_answer import due_answer
 
-    registry = place.open()
+    registry = place.registry()
     payload, text, findings = due_answer(registry, instrument, day(on) or today())
     output.answer(payload, text)
     return exit_code(findings)

@@ -230,7 +230,7 @@ class RegistryOptions:
     calibrations: Calibrations = None
     home: Home = None
 
-    def open(self, sign: Sequence[Path] | None = None) -> Registry:
+    def registry(self, sign: Sequence[Path] | None = None) -> Registry:
         """Return it, with the signers of ``sign``."""
         from toolkit.lab.home import open_registry
 
@@ -246,7 +246,7 @@ class DecisionOptions(RegistryOptions):
     request: RequestFile = None
     answers: Answers = None
 
-    def open(self, sign: Sequence[Path] | None = None) -> Registry:
+    def registry(self, sign: Sequence[Path] | None = None) -> Registry:
         """Return the registry, whose entries are signed."""
         from toolkit.lab.home import open_registry
 
@@ -262,7 +262,7 @@ class EntryOptions(DecisionOptions):
 
     calibrations: NewCalibrations = None
 
-    def open(self, sign: Sequence[Path] | None = None) -> Registry:
+    def registry(self, sign: Sequence[Path] | None = None) -> Registry:
         """Return the registry, made where there is none."""
         from toolkit.calibration.registry.registry import Registry
         from toolkit.lab.home import registry_to_write

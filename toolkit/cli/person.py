@@ -84,7 +84,7 @@ def enrol(
     """
     from toolkit.lab.people import enrol_person, people_answer
 
-    registry = entering.open()
+    registry = entering.registry()
     recovered = open_signers([recovery])[0] if recovery is not None else None
     roles = cast("list[Role]", role)
     log = enrol_person(
@@ -103,7 +103,7 @@ def list_people(*, place: RegistryOptions, output: Output) -> int:
     """
     from toolkit.lab.people import people_answer
 
-    output.answer(*people_answer(place.open().people()))
+    output.answer(*people_answer(place.registry().people()))
     return 0
 
 
@@ -127,7 +127,7 @@ def revoke(
     """
     from toolkit.lab.people import people_answer, revoke_key
 
-    registry = entering.open()
+    registry = entering.registry()
     log = revoke_key(registry, person_id, fingerprint=key, since=since, reason=reason, by=by)
     output.answer(*people_answer(log))
     return 0
@@ -158,7 +158,7 @@ def policy(
 
     if action not in get_args(Action):
         raise typer.BadParameter(", ".join(get_args(Action)), param_hint="ACTION")
-    registry = entering.open()
+    registry = entering.registry()
     log = set_demand(
         registry, cast("Action", action), roles=cast("list[Role]", role), signatures=signatures,
         reason=reason, by=by,
@@ -185,7 +185,7 @@ def prove(
     """
     from toolkit.lab.people import anchor_document, checkpoint_of
 
-    registry = place.open(sign)
+    registry = place.registry(sign)
     document = anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument))
     if time_stamp is not None:
         from toolkit.lab.sealing import stamped
@@ -218,7 +218,7 @@ def check(
     from toolkit.lab.people import check_against
     from toolkit.lab.sealing import TRUST, stamp_of, trusted
 
-    registry = place.open()
+    registry = place.registry()
     concerned, comparison = check_against(registry, instrument, against)
     stamp = stamp_of(against, trusted(registry.folder.parent / TRUST))
     text = f"{comparison.continuity}: {comparison.why}"
@@ -251,7 +251,7 @@ def witness(
     """
     from toolkit.lab.people import witness as countersigned
 
-    registry = place.open(sign)
+    registry = place.registry(sign)
     signer = open_signers([key])[0]
     checkpoint, before = countersigned(registry, instrument, folder, name=name, signer=signer)
     payload = {

@@ -104,7 +104,7 @@ def session(
         minutes=minutes, loads=loads, criterion=criterion, two_levels=two_levels, seed=seed, on=day(on),
         known_at=day(known_at), out=out, template=document_template(template, out),
     )  # fmt: skip
-    payload, text, findings = session_plan_answer(place.open(), order)
+    payload, text, findings = session_plan_answer(place.registry(), order)
     payload["timing"] = {"seconds": time.perf_counter() - started}
     output.answer(payload, text)
     return max(sheet_code(payload), exit_code(findings))
@@ -153,7 +153,7 @@ def interval(
 
     started = time.perf_counter()
     payload, text, findings = interval_plan_answer(
-        place.open(), instrument, reliability=reliability, tests_a_year=tests, load=load,
+        place.registry(), instrument, reliability=reliability, tests_a_year=tests, load=load,
         out=out, template=document_template(template, out, default="plan.docx", home=place.home),
     )  # fmt: skip
     payload["timing"] = {"seconds": time.perf_counter() - started}

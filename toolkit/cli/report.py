@@ -126,7 +126,7 @@ def command(
     if issue or issuing.asked:
         from toolkit.lab.issuing import open_issuing
 
-        registry = issuing.open()
+        registry = issuing.registry()
         issued = open_issuing(
             registry, issuing.sealing(registry, draft=draft), asked=issue, draft=draft,
             named=issuing.issued_by or (),

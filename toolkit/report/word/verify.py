@@ -15,10 +15,9 @@ from pathlib import Path
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.filled import Filled, text_elements
 from toolkit.report.word.scan import BROKEN, LITERAL, control_tag
-from toolkit.report.word.toc_pages import pdf_outline, pdf_text, poppler, printed_pages, titles_of
+from toolkit.report.word.toc_pages import pdf_outline, pdf_text, poppler, printed_pages, squeeze, titles_of
 from toolkit.report.word.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
 
-_SPACE = re.compile("[\\s\u00ad\u200b-\u200f\u202a-\u202e\u2066-\u2069\ufeff]+")
 _LONG, _UNBROKEN = 40, 20  # characters of prose, and of one word, that a page's end may cut
 
 
@@ -30,15 +29,6 @@ class Check:
     ok: bool
     message: str
     warning: bool = False
-
-
-def squeeze(text: str) -> str:
-    """Return text as it is compared: composed, without white space, soft hyphens and direction marks.
-
-    >>> squeeze("1 234,5\\u00ad N")
-    '1234,5N'
-    """
-    return _SPACE.sub("", unicodedata.normalize("NFKC", text))
 
 
 def text_checks(text: str, filled: Filled) -> list[Check]:
