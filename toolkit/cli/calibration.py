@@ -166,7 +166,7 @@ def import_record(
 
     Example: toolkit calibration import coefficients-2004.toml
     """
-    from toolkit.calibration.registry.legacy import import_legacy
+    from toolkit.calibration.registry.candidate import import_legacy
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.home import registry_to_write
     from toolkit.lab.registry_answer import record_row

@@ -9,12 +9,11 @@ from pathlib import Path
 import pytest
 
 from tests.calibration.calibration_factory import hub_data
-from tests.calibration.registry.test_legacy import GOOD
+from tests.calibration.registry.test_candidate_legacy import GOOD
 from toolkit.audit.inspection import choose
 from toolkit.calibration.registry import candidate, settled
-from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.ledger import Ledger
-from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry, load_checked
 from toolkit.lab.registry_answer import listed
 
