@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.audit.archive_findings import noted
-from toolkit.audit.conditions import Change
 from toolkit.audit.estimate import Coefficient, Equation, Estimate, Nearest
 from toolkit.audit.model import Identification, Repair, Segment, Skipped
-from toolkit.audit.one_file import FileAudit
+from toolkit.audit.one_file import Change, FileAudit
 from toolkit.errors import OutputError
 from toolkit.publication import publication
 from toolkit.recording.extras import needed

@@ -58,9 +58,9 @@ class BalanceForm:
 
     def slopes(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return dR/dF (rows, responses, loads) at loads (rows, loads)."""
-        columns, one = dict(zip(self.loads, loads.T, strict=True)), np.ones(len(loads))
-        by_name = [term_slopes([name], [one], columns).values() for name in self.terms]
-        by_term = np.stack([np.stack(np.broadcast_arrays(*slopes), axis=-1) for slopes in by_name], axis=1)
+        columns, zero = dict(zip(self.loads, loads.T, strict=True)), np.zeros(len(loads))
+        slopes = [term_slopes([name], [1.0], columns, zero).values() for name in self.terms]
+        by_term = np.stack([np.stack(list(by_load), axis=1) for by_load in slopes], axis=1)
         responses: NDArray[np.float64] = np.einsum("jt,rtl->rjl", self.coefficients, by_term)
         return responses
 
