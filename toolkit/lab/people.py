@@ -299,7 +299,22 @@ def check_against(registry: Registry, instrument: str | None, document: Path) ->
 def witness(
     registry: Registry, instrument: str, folder: Path, *, name: str, signer: Signer
 ) -> tuple[Checkpoint, int]:
-    """Let a witness countersign an instrument's ledger; return the checkpoint and the size it knew before."""
+    """Let a witness countersign an instrument's ledger; return the checkpoint and the size it knew before.
+
+    Raises
+    ------
+    TrustError
+        ``not-allowed``: a key of the laboratory's own people; ``ledger-fork``, ``ledger-rollback``
+    """
+    versions = registry.people().history.versions
+    owner = next((person for v in versions if (person := v.people.owner(signer.public)) is not None), None)
+    if owner is not None:
+        raise TrustError(
+            "a witness is somebody else than the laboratory", where="--key", got=f"the key of {owner.id}",
+            expected="a key of the second place, with which nobody decides here",
+            next_step="make the witness a key of its own: toolkit person key FILE; nothing was signed",
+            rule="not-allowed",
+        )  # fmt: skip
     texts = lines_of(registry, instrument)
     copy = registry.folder.parent / "trust" / "witnessed" / f"{instrument}-{name}{SUFFIX}"
     check_file(copy)  # before the witness signs: it never forgets
@@ -334,9 +349,6 @@ def _head(text: str) -> str | None:
 def _enter(
     registry: Registry, people: People, signers: Sequence[Signer], reason: str, by: str | None
 ) -> PeopleLog:
-    heads = {
-        name: (len(registry.ledger(name).entries), registry.head(name)) for name in registry.instruments()
-    }
     now = registry.people().history.now
     deciding = people if now is None else now.people
     answered = [str(answer.body["by"]) for answer in registry.travel.answers]
@@ -348,7 +360,7 @@ def _enter(
             next_step="add --by ID; nothing was changed", rule="person",
         )  # fmt: skip
     return enrol(
-        registry.folder, people, signers, by=named or "nobody", reason=reason, heads=heads,
+        registry.folder, people, signers, by=named or "nobody", reason=reason,
         lock_file=registry.lock_file, travel=registry.travel,
     )  # fmt: skip
 

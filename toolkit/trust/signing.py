@@ -17,10 +17,14 @@ from toolkit.trust.ssh import PublicKey
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Travel:
-    """How a decision is signed elsewhere: the file of a ``request`` to write, or ``answers`` to it."""
+    """How a decision is signed elsewhere: the file of a ``request`` to write, or ``answers`` to it.
+
+    ``files`` are those whose hashes the request has; they lie beside it, to be read before it is signed.
+    """
 
     request: Path | None = None
     answers: tuple[Request, ...] = ()
+    files: tuple[Path, ...] = ()
 
 
 HERE = Travel()
