@@ -15,7 +15,7 @@ from toolkit.calibration.registry.refit import polarity
 from toolkit.calibration.session.settings import INSTRUMENT, wrong
 from toolkit.calibration.session.statement_checks import check_load_unit
 from toolkit.calibration.terms import INTERCEPT, NAME, parse_term
-from toolkit.declared import Day, Entry, Fault, Format, Keyed, Size, Text, UnitName, read_text
+from toolkit.declared import Day, Entry, Fault, Format, Keyed, Size, Text, UnitName, plain, read_text
 from toolkit.errors import ConfigError, ToolkitError, UnitError
 from toolkit.files import sha256_bytes
 from toolkit.units import si_scale, unit
@@ -106,7 +106,6 @@ def read_legacy(data: bytes, *, where: object) -> CalibrationRecord:
         ``not-toml``, ``unknown-key``, ``unknown-unit``; ``legacy``: a value that is missing or cannot be used
     """
     file = read_text(LegacyFile, data, where=where)
-    origin = {"title": file.source.title, "place": file.source.place, "text": file.source.text}
     return CalibrationRecord(
         id="",
         instrument=file.instrument,
@@ -118,7 +117,9 @@ def read_legacy(data: bytes, *, where: object) -> CalibrationRecord:
         loads=tuple(map(_fit, file.loads)),
         golden=Golden(),
         data=(),
-        settings=canonical({"source": {key: text for key, text in origin.items() if text is not None}}),
+        settings=canonical(
+            {"source": {key: text for key, text in asdict(file.source).items() if text is not None}}
+        ),
         inputs_sha256=sha256_bytes(data),
     )
 
@@ -147,9 +148,7 @@ def check_possible(record: CalibrationRecord, *, where: object) -> None:
     for key, entries in (("indications", names), ("loads", loads)):
         if any(not NAME.match(name) or name in (INTERCEPT, "abs") for name in entries):
             raise _wrong(where, key, ", ".join(entries), "names such as FY, MZ, D51")
-    for key, names_found in (("indications", names), ("loads", loads)):
-        twice = [name for name in dict.fromkeys(names_found) if names_found.count(name) > 1]
-        if twice:
+        if twice := [name for name in dict.fromkeys(entries) if entries.count(name) > 1]:
             raise _wrong(where, key, f"{', '.join(twice)} more than once", f"each of the {key} once")
     if shared := set(names) & set(loads):
         raise _wrong(where, "loads", ", ".join(sorted(shared)), "names that are no indications")
