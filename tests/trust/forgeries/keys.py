@@ -20,6 +20,7 @@ from tests.trust.forgeries.laboratory import (
     RIG,
     believed,
     decide,
+    key_of,
     laboratory,
     lines_of,
     new_signer,
@@ -31,7 +32,7 @@ from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
 from toolkit.trust.decisions import unsigned
-from toolkit.trust.people import NAMESPACE, Key, People, Person
+from toolkit.trust.people import NAMESPACE, RECOVERY, Key, People, Person
 from toolkit.trust.ssh import MAGIC, PublicKey, parse_public
 
 _WITH = {"stranger": "mallory", "expired": "expired", "not yet valid": "later", "another role": "emil"}
@@ -65,6 +66,10 @@ def forgeries() -> Iterator[Forgery]:
             kind="self-approval", what=f"operator {text} in the session, entered by carl, approved by dora",
             accepted=functools.partial(_self_approved, "carl", "dora", operator=text),
         )  # fmt: skip
+    yield Forgery(
+        kind="self-approval", what="entered by anna, approved by the recovery key that she keeps",
+        accepted=_by_recovery,
+    )  # fmt: skip
     yield Forgery(kind="one person twice", what="two keys of one head", accepted=_two_keys)
     for until in ("2026-02-28T00:00:00Z", "2026-03-01T12:00:00Z"):
         yield Forgery(
@@ -108,6 +113,23 @@ def _self_approved(entered: str, name: str, operator: str = "somebody else") -> 
         decide(home, entry, entered)
         try:
             decide(home, approval, name)
+        except ToolkitError:
+            return False
+    return True
+
+
+def _by_recovery() -> bool:
+    approval = {**DECISIONS[1][0], "id": "rig-r9", "by": RECOVERY}
+    with laboratory() as home:
+        registry = Registry(home / "calibrations")
+        version = registry.people().history.now
+        assert version is not None
+        kept = Person(id=RECOVERY, name="Recovery key", roles=("head",), keys=(key_of("thief"),))
+        people = version.people.with_person(kept)
+        enrol(registry.folder, people, [KEYS["anna"]], by="anna", reason="kept apart")
+        decide(home, {**DECISIONS[0][0], "id": "rig-r9", "by": "somebody"}, "anna")
+        try:
+            decide(home, approval, "thief")
         except ToolkitError:
             return False
     return True
