@@ -117,9 +117,7 @@ def read_legacy(data: bytes, *, where: object) -> CalibrationRecord:
         loads=tuple(map(_fit, file.loads)),
         golden=Golden(),
         data=(),
-        settings=canonical(
-            {"source": {key: text for key, text in asdict(file.source).items() if text is not None}}
-        ),
+        settings=canonical({"source": plain(file.source)}),
         inputs_sha256=sha256_bytes(data),
     )
 
