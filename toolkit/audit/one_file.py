@@ -31,6 +31,7 @@ from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
+from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.reduction.protocol import nearest_load, nearest_step
 
@@ -189,7 +190,9 @@ class Auditor:
         context, trouble = self._context(path, data or b"")
         try:
             recording = read_recording(path, context.machine, data=data)
-            blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
+            choice = self.choices.on(context.machine.name, context.date)
+            loaded = with_load(recording, machine=context.machine, record=choice.in_force)
+            blocks = () if context.is_tare else split_blocks(loaded, context.machine)[0]
         except ToolkitError as error:
             sha256 = large if data is None else sha256_bytes(data)
             if workbook and data is not None and own_output(data):
@@ -200,7 +203,6 @@ class Auditor:
             return unreadable(name, reason, sha256=sha256, size=size, context=trouble)
         columns = columns_of(recording)
         instrument = context.machine.name
-        choice = self.choices.on(instrument, context.date)
         screen = self.choices.screen(instrument, columns)
         in_force = choice.in_force
         fits = in_force is not None and unfit(in_force, columns) is None
@@ -219,7 +221,7 @@ class Auditor:
         reversal = table.get("reversal")
         direction = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
         sae = signs(context.machine.axes, "SAE", direction)
-        changed = changes(recording, columns, blocks, new, turn=sae["SA"])
+        changed = changes(loaded, columns, blocks, new, turn=sae["SA"])
         return FileAudit(
             path=name,
             sha256=recording.sha256,

@@ -24,7 +24,7 @@ import numpy as np
 
 from toolkit.calibration.apply import apply_record, coefficient_jacobian
 from toolkit.channels import hub_signs, signs
-from toolkit.errors import RecordError
+from toolkit.errors import ColumnError, RecordError
 from toolkit.findings import Finding
 from toolkit.recording.model import Recording, Series
 from toolkit.reduction.averaging import means
@@ -118,11 +118,29 @@ def hub_means(
 
 
 def with_load(
-    recording: Recording, *, machine: Machine, record: CalibrationRecord, tare: Mapping[str, float] | None
+    recording: Recording,
+    *,
+    machine: Machine,
+    record: CalibrationRecord | None,
+    tare: Mapping[str, float] | None = None,
 ) -> Recording:
-    """Return a recording whose load is the hub's FZ by the record, where it has no column of the load."""
+    """Return a recording whose load is the hub's FZ by the record, where it has no column of the load.
+
+    Raises
+    ------
+    ColumnError
+        ``missing-column``: there is no record to compute it by
+    """
     if recording.has("FZ") or machine.hub is None or "FZ" not in machine.hub.loads:
         return recording
+    if record is None:
+        raise ColumnError(
+            "the load is that of the hub's cells, and no record computes it", where=recording.path,
+            got="no column FZ, and no calibration record in force",
+            expected="a record of the hub, or a column of the load",
+            next_step="name the laboratory's home with --home, or approve a record",
+            rule="missing-column",
+        )  # fmt: skip
     indications = {name: recording[name].values for name in record.indications}
     units = {name: recording[name].unit for name in record.indications}
     values = apply_record(record, indications, units=units, tare=tare, only=("FZ",))["FZ"]
