@@ -33,6 +33,7 @@ REPEATED = 0.1
 COARSE_REFERENCE = 0.05
 MOST_NAMED = 10
 _RISK = 0.01
+_MOST_ROWS = 20
 
 
 def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
@@ -247,9 +248,9 @@ def _robust_findings(fit: SessionFit) -> list[Finding]:
     return findings
 
 
-def _some(rows: list[int], most: int = 20) -> str:
-    text = ", ".join(str(row) for row in rows[:most])
-    return text if len(rows) <= most else f"{text} and {len(rows) - most} more"
+def _some(rows: list[int]) -> str:
+    text = ", ".join(str(row) for row in rows[:_MOST_ROWS])
+    return text if len(rows) <= _MOST_ROWS else f"{text} and {len(rows) - _MOST_ROWS} more"
 
 
 def _inline(lines: str) -> str:
