@@ -55,7 +55,7 @@ RIGS: tuple[Recording, ...] = (
             "Grandprix - Contact - Right - 120 psi.csv":
             "9c9aecad7ae317f076d91928aedd8f86e005e8ce7954b46f501a007bda25681b",
         },
-        missing="rolling resistance, for which the rig was built (test_procedure.md: coasting in contact "
+        missing="rolling resistance, for which the rig was built (the rig's test procedure: coasting in contact "
         "less coasting in the air); simulated: the drag of the air",
     ),
     Recording(
@@ -72,7 +72,7 @@ RIGS: tuple[Recording, ...] = (
         },
         runs=rig_readers.wheel_in_air,
         missing="the drag of the air, which the publisher takes for the only loss of the lifted wheel "
-        "(test_procedure.md); simulated: the dry friction of the bearings",
+        "(the rig's test procedure); simulated: the dry friction of the bearings",
     ),
     Recording(
         name="two_cells", licence="MIT", kind="control", runs=rig_readers.two_cells,
