@@ -56,7 +56,9 @@ class Headline:
             parts.append(f"{subject} the values of the record in force")
         if self.unjudged:
             further = " more" if self.wrong else ""
-            parts.append(f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known")
+            parts.append(
+                f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known or fits"
+            )
         if self.unreadable:
             parts.append(f"{_files(self.unreadable)} cannot be read")
         return "; ".join(parts)
