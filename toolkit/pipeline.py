@@ -12,9 +12,9 @@ from toolkit.characteristics.model import Characteristics
 from toolkit.findings import Finding
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
+from toolkit.reduction.corrections import tare_of_file
 from toolkit.reduction.model import ReducedTest, Tare
 from toolkit.reduction.reduce import reduce_test
-from toolkit.reduction.tare import tare_of_file
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from tests.recording.printed import half_last_place
-from toolkit.audit.columns import Columns
+from toolkit.audit.model import Columns
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, sealed
 
 TERMS = ("D51", "D52", "E5", "intercept")

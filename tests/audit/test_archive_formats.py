@@ -15,9 +15,9 @@ from tests.audit.audit_factory import record
 from tests.recording.format_factory import csv, every, lvm, tdms
 from toolkit.audit import resume
 from toolkit.audit.archive import audit_archive
-from toolkit.audit.columns import columns_of
 from toolkit.audit.corrected import write_copies
 from toolkit.audit.identify import identify_columns
+from toolkit.audit.model import columns_of
 from toolkit.audit.one_file import unreadable
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app

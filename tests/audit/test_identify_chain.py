@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 import toolkit
-from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import identify_columns
 from toolkit.audit.inspection import inspect_file
+from toolkit.audit.model import columns_of
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError

@@ -115,7 +115,7 @@ def _mf52(load: float):  # type: ignore[no-untyped-def]
     # The book's tire is one of 4000 N; a truck's or a bicycle's is it, scaled by its load.
     scale = load / float(np.clip(load, 1500.0, 6500.0))
     FZ = load / scale
-    from toolkit.tires.mf52 import side
+    from toolkit.tires.models.mf52 import side
     from toolkit.tires.slip import state
 
     def make(SA: np.ndarray) -> np.ndarray:

@@ -170,7 +170,7 @@ def _coverage(many: list[Sample]) -> list[Result]:
 
 
 def _per_point(count: int) -> Result:
-    from toolkit.tires.mf61 import forces
+    from toolkit.tires.models.mf61 import forces
     from toolkit.tires.slip import state
 
     points = 1_000_000
@@ -194,11 +194,11 @@ def _per_point(count: int) -> Result:
 def _families(folder: Path, count: int) -> Result:
     from toolkit.channels import signs
     from toolkit.simulation.tire import aligning_moment, lateral_force
-    from toolkit.tires.catalog import find, model_names
     from toolkit.tires.fit import Curve, fit_curves
     from toolkit.tires.global_data import measured
     from toolkit.tires.global_fit import fit_global
     from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.models import find, model_names
 
     del folder
     rng, flip = np.random.default_rng(2), signs("adapted-SAE", "SAE")

@@ -31,9 +31,10 @@ from toolkit.characteristics.characterise import characterise
 from toolkit.machine import Machine, load_machine
 from toolkit.pipeline import TestResult
 from toolkit.planning.demands import PEAK, parse_demand
-from toolkit.planning.design import Design, ordered, pace_of, standard, steps_of
+from toolkit.planning.design import Design, ordered, standard, steps_of
 from toolkit.planning.expectation import EarlierTest, earlier_test, pooled
 from toolkit.planning.protocol_search import Question, least_plan
+from toolkit.planning.tread import Tread
 from toolkit.simulation.file_tire import read_file_tire
 from toolkit.simulation.plan import Plan, read_plan, with_effects, with_numbers
 from toolkit.simulation.steady import settled
@@ -95,7 +96,7 @@ def entries(seed: int) -> tuple[Entry, ...]:
     for text, part in LOADS.items():
         loads = earlier.loads_N[part]
         question = Question.beside(own, earlier=earlier, demands=demands, loads_N=loads)
-        found = least_plan(question, pace_of(MACHINE))
+        found = least_plan(question, Tread.of(MACHINE, earlier))
         size = len(found.design.slip_angles_rad)
         even = tuple(math.radians(a) for a in np.linspace(-10, 10, size))
         for name, design in (

@@ -11,7 +11,7 @@ from toolkit.cli import fit
 from toolkit.errors import ToolkitError
 from toolkit.lab.fit_models import model_choice
 from toolkit.simulation.tire import aligning_moment, lateral_force
-from toolkit.tires.catalog import model_names
+from toolkit.tires.models import model_names
 
 KEYS = (
     "model channel load_N axes n dof parameters standard_errors not_determined at_bound error_percent "

@@ -11,9 +11,7 @@ from statsmodels.stats.multitest import multipletests
 
 from tests.comparison.comparison_factory import LOADS, conicity, entry, own, row
 from toolkit.characteristics.uncertain import Part
-from toolkit.comparison.at_load import at_load
-from toolkit.comparison.differences import differences
-from toolkit.comparison.significance import holm, two_sided_p
+from toolkit.comparison.differences import at_load, differences, holm, two_sided_p
 
 
 def test_the_difference_of_two_tests_loses_what_they_share() -> None:

@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from tests.comparison.comparison_factory import conicity
+from toolkit.comparison.differences import grubbs_p
 from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread
-from toolkit.comparison.significance import grubbs_p
 
 
 def test_gum_h5_zener_voltage_standard() -> None:

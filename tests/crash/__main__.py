@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 
 from tests.crash.bench import Bench
-from tests.crash.commands import QUICK, SIGNED, SLOW, office, signed_folder, whole_folder
+from tests.crash.commands import QUICK, SIGNED, SIGNED_SLOW, SLOW, office, signed_folder, whole_folder
 from tests.faults import Runner
 
 
@@ -38,11 +38,11 @@ def main() -> int:
                 Bench(prepare, Path(place) / folder, runner)
                 for prepare, folder in ((whole_folder, "all"), (signed_folder, "signed"))
             )
-            for command in (*QUICK, *SLOW, *SIGNED):
+            for command in (*QUICK, *SLOW, *SIGNED, *SIGNED_SLOW):
                 if wanted.names and not command.name.startswith(tuple(wanted.names)):
                     continue
-                bench = signed if command in SIGNED else bench
-                count = bench.judge(command, most=wanted.most)
+                judging = signed if command in (*SIGNED, *SIGNED_SLOW) else bench
+                count = judging.judge(command, most=wanted.most)
                 row = (
                     command.name,
                     count.calls,

@@ -34,6 +34,8 @@ class Command:
     home : where below its folder the registry's home is
     then : the next entry, with which a registry's remnant goes; None: the command itself is one
     once : a result is never written over: the next run refuses where one is in place
+    proved : files that, wherever they are there, `verify` proves by the ledger of the home: no document
+        without its entry, and none with half a seal
     """
 
     name: str
@@ -45,6 +47,7 @@ class Command:
     home: str = "."
     then: str | None = None
     once: bool = False
+    proved: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -147,6 +150,10 @@ class Bench:
         self, command: Command, seen: dict[str, bytes], old: dict[str, bytes], new: dict[str, bytes]
     ) -> bool:
         if command.registry:
+            present = [name for name in command.proved if (self.work / name).exists()]
+            proving = f"verify {' '.join(f'{{work}}/{n}' for n in present)} --home {{work}}/{command.home}"
+            if present and self._run(proving).code != 0:
+                return True
             return self._asked(command, "verify") not in (0, 1) or self._asked(command, "list") != 0
         for place in command.sets:
             ages = {

@@ -56,6 +56,15 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
             [wrong("2014-03-01", 5.25) | {"notes": IMPOSSIBLE}],
             "1 file carries a wrong Fy, up to 5.2 N; cause: E5 negative; in 2014-03",
         ),
+        (
+            [file("unknown", repair={"FY_max_abs_N": None, "MZ_max_abs_Nm": None})] * 2,
+            "2 files hold no Fy and no Mz of their own",
+        ),
+        (
+            [file("exact"), file("unknown", repair={"FY_max_abs_N": None, "MZ_max_abs_Nm": None})],
+            "The file carries the values of the record in force; "
+            "1 file more holds no Fy and no Mz of its own",
+        ),
         ([file("unknown")], "1 file cannot be judged: no record in force is known or fits"),
         (
             [file("stale", None), file("unknown")],

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.planning.class_factory import T, answer, found, problem, with_run, write_case
-from toolkit.diagnosis.case.case import Run
 from toolkit.planning.members import members_of
 from toolkit.planning.next_run import Change, RunSearch, changed, movable, power_of, reach
 
@@ -47,10 +47,32 @@ def test_inputs_stay_within_what_was_recorded_or_the_limits(search: RunSearch) -
     )
 
 
+def test_an_input_is_moved_to_an_end_of_its_limits(search: RunSearch) -> None:
+    run = changed(search.problem, Change(run="r1.csv", levels=(("u", "high"),)), {"u": (-5.0, 9.0)})
+    assert run is not None
+    recorded = search.problem.runs[1].columns["u"]
+    np.testing.assert_allclose(run.columns["u"], recorded + 9.0 - recorded.max())
+    assert Change(run="r1.csv", levels=(("u", "low"),)).words()[1] == "u as low as its limits allow"
+
+
+def test_the_next_run_comes_after_the_last_where_one_clock_goes_on(tmp_path: Path) -> None:
+    case = write_case(tmp_path)
+    for number, path in enumerate(sorted(tmp_path.glob("r*.csv"))):
+        run = pd.read_csv(path)
+        run.assign(t=run["t"] + 25.0 * number).to_csv(path, index=False)
+    posed = problem(case)
+    following = changed(posed, Change(run="r0.csv"), {})
+    assert following is not None
+    pause = posed.runs[1].t[0] - posed.runs[0].t[-1]
+    assert following.t[0] == pytest.approx(posed.runs[1].t[-1] + pause)
+    np.testing.assert_allclose(following.columns["t"], following.t)
+
+
 def test_a_change_of_nothing_is_a_repeat(search: RunSearch) -> None:
     run = changed(search.problem, Change(run="r1.csv"), {})
     assert run is not None
     np.testing.assert_allclose(run.columns["u"], search.problem.runs[1].columns["u"], atol=1e-12)
+    np.testing.assert_array_equal(run.t, search.problem.runs[1].t)  # each run has a clock of its own here
 
 
 def test_faster_inputs_come_again_there_and_back(search: RunSearch) -> None:
@@ -66,13 +88,32 @@ def test_a_rate_of_change_stays_that_of_its_channel(tmp_path: Path) -> None:
     from tests.diagnosis.cases import write_case as carriage_case
 
     posed = problem(carriage_case(tmp_path, r0__csv=carriage(rows=400), r1__csv=carriage(seed=1, rows=400)))
-    assert dict(movable(posed)) == {"v": None, "a": "v"}
+    assert dict(movable(posed, {})) == {"v": None, "a": "v"}
     wide = {"v": (-9.0, 9.0), "a": (-9.0, 9.0)}
     run = changed(posed, Change(run="r0.csv", rate=2.0, sizes=(("v", 0.5),)), wide)
     assert run is not None
     inner = slice(5, 180)  # before the way back
     rate = np.gradient(run.columns["v"], run.t)
     np.testing.assert_allclose(run.columns["a"][inner], rate[inner], atol=0.05)
+
+
+def test_a_covariate_goes_on_as_it_was_recorded_unless_it_can_be_set(tmp_path: Path) -> None:
+    case = write_case(tmp_path)
+    for path in tmp_path.glob("r*.csv"):
+        run = pd.read_csv(path)
+        run.assign(T=20 + run["t"], W=np.sin(run["t"])).to_csv(path, index=False)
+    channels = 'T = { unit = "degC", role = "covariate" }\nW = { unit = "degC", role = "covariate" }\n[[rec'
+    case.write_text(case.read_text(encoding="utf-8").replace("[[rec", channels, 1), encoding="utf-8")
+    posed = problem(case)
+    assert dict(movable(posed, {})) == {"u": None}
+    faster = changed(posed, Change(run="r0.csv", rate=2.0), {})
+    assert faster is not None
+    np.testing.assert_array_equal(faster.columns["W"], posed.runs[0].columns["W"])
+    oven = {"T": (20.0, 30.0)}
+    assert dict(movable(posed, oven)) == {"u": None, "T": None}
+    held = changed(posed, Change(run="r0.csv", sizes=(("T", 0.0),)), oven)
+    assert held is not None
+    np.testing.assert_allclose(held.columns["T"], np.median(posed.runs[0].columns["T"]))
 
 
 def test_the_power_is_that_of_the_nearest_of_the_others() -> None:
@@ -96,13 +137,3 @@ def test_the_budget_ends_the_search(tmp_path: Path) -> None:
     spent = RunSearch(problem=posed, members=members, limits={}, until=lambda: False)
     assert spent.best() == Change(run="r0.csv")
     assert len(T) == posed.runs[0].rows
-
-
-def test_no_run_is_learned_twice(search: RunSearch) -> None:
-    """The worker of a case numbers the runs that it learns: one with two numbers is taken for another."""
-    learned: list[Run] = []
-    RunSearch(
-        problem=search.problem, members=search.members, limits={}, learn=learned.extend
-    ).best()  # fmt: skip
-    assert len(learned) > 4
-    assert len({id(run) for run in learned}) == len(learned)

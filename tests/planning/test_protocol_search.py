@@ -14,9 +14,15 @@ from toolkit.errors import ConfigError
 from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import Design, Pace, standard
 from toolkit.planning.protocol_search import ProtocolSearch, Question, least_plan, load_sets
+from toolkit.planning.tread import Tread
 
 PACE = Pace(condition_s=5.0, between_files_s=30.0)
+SPEED = 20.0
 PROTOCOL = standard(M15, M15.rotations)
+
+
+def tread(*, energy_J: float = math.inf, rise_K: float = math.inf) -> Tread:
+    return Tread(earlier=earlier(), pace=PACE, speed_m_s=SPEED, energy_J=energy_J, rise_K=rise_K)
 
 
 def question(*demands: str, loads: tuple[float, ...] = LOADS) -> Question:
@@ -26,7 +32,7 @@ def question(*demands: str, loads: tuple[float, ...] = LOADS) -> Question:
 
 def test_the_uncertainties_of_the_protocol_are_reached_in_fewer_rows() -> None:
     asked = question("conicity", "plysteer", "slope_cornering", "peak")
-    found = least_plan(asked, PACE)
+    found = least_plan(asked, tread())
     assert found.worst <= 1.0
     assert found.design.rows < PROTOCOL.rows
     # What is offered is judged by the whole budget, not by the screen.
@@ -36,7 +42,7 @@ def test_the_uncertainties_of_the_protocol_are_reached_in_fewer_rows() -> None:
 
 def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
     asked = question("conicity=2 N", "slope_cornering=2 %")
-    search = ProtocolSearch(asked, PACE, LOADS)
+    search = ProtocolSearch(asked, tread(), LOADS)
     for size in (8, 11, 14):
         found = search.best(size)
         screened = search._screen.criterion(np.array([search._best[size]]))[0]
@@ -44,19 +50,19 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
 
 
 def test_more_slip_angles_are_never_worse() -> None:
-    search = ProtocolSearch(question("conicity"), PACE, LOADS)
+    search = ProtocolSearch(question("conicity"), tread(), LOADS)
     worst = [search.best(size).worst for size in (7, 9, 11, 13)]
     assert worst == sorted(worst, reverse=True)
 
 
 def test_a_demand_of_one_direction_needs_no_reversed_run() -> None:
-    found = least_plan(question("slope_cornering=3 %", loads=LOADS[2:3]), PACE)
+    found = least_plan(question("slope_cornering=3 %", loads=LOADS[2:3]), tread())
     assert found.design.rotations == ("forward",)
 
 
 def test_every_plan_measures_a_curve_to_its_peak_on_both_sides() -> None:
     asked = question("conicity")
-    degrees = np.degrees(least_plan(asked, PACE).design.slip_angles_rad)
+    degrees = np.degrees(least_plan(asked, tread()).design.slip_angles_rad)
     assert degrees.min() <= -8
     assert degrees.max() >= 8
     narrow = tuple(i for i, angle in enumerate(asked.candidates_rad) if abs(angle) < math.radians(3.5))
@@ -65,7 +71,7 @@ def test_every_plan_measures_a_curve_to_its_peak_on_both_sides() -> None:
 
 
 def test_no_test_makes_smaller_what_all_rows_share() -> None:
-    floor = least_plan(question("plysteer=1 N", loads=LOADS[2:3]), PACE, minutes=60)
+    floor = least_plan(question("plysteer=1 N", loads=LOADS[2:3]), tread(), minutes=60)
     (reach,) = floor.reaches
     assert floor.worst > 1
     # 0.05 deg of the steering's zero by the cornering stiffness, k = 1.96.
@@ -75,14 +81,14 @@ def test_no_test_makes_smaller_what_all_rows_share() -> None:
 
 def test_a_time_that_holds_no_curve_is_refused_with_the_least_that_does() -> None:
     with pytest.raises(ConfigError) as error:
-        least_plan(question("conicity"), PACE, minutes=1.0)
+        least_plan(question("conicity"), tread(), minutes=1.0)
     assert error.value.rule == "plan-infeasible"
     smallest = Design(slip_angles_rad=(0.0,) * 7, loads_N=LOADS, rotations=("forward", "reverse"))
     assert f"{math.ceil(10 * PACE.minutes(smallest)) / 10} min" in str(error.value.expected)
 
 
 def test_a_demand_at_a_slip_angle_keeps_it_beside_demands_that_would_do_without() -> None:
-    found = least_plan(question("FY@5deg=200 N", "conicity", "slope_cornering=3 %"), PACE)
+    found = least_plan(question("FY@5deg=200 N", "conicity", "slope_cornering=3 %"), tread())
     assert 5.0 in np.round(np.degrees(found.design.slip_angles_rad), 9)
     assert found.worst <= 1
     assert {reach.demand.label for reach in found.reaches} == {"FY@5deg", "conicity", "slope_cornering"}
@@ -93,6 +99,32 @@ def test_a_demand_at_a_slip_angle_that_no_test_measures_is_refused() -> None:
         question("FY@5.3deg=200 N")
     assert error.value.rule == "plan-demand"
     assert ", 5, " in str(error.value.expected)
+
+
+def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
+    asked = question("slope_cornering=3 %", loads=LOADS[2:3])
+    free = least_plan(asked, tread())
+    used = float(tread().energies_J(free.design).sum())
+    spared = least_plan(asked, tread(energy_J=0.8 * used))
+    assert spared.feasible
+    assert tread().energies_J(spared.design).sum() <= 0.8 * used
+    assert asked.covers([asked.candidates_rad.index(angle) for angle in spared.design.slip_angles_rad])
+    impossible = least_plan(asked, tread(energy_J=0.01 * used))
+    assert not impossible.feasible
+    assert impossible.excess > 0
+
+
+def test_a_limit_of_warmth_costs_pauses_and_they_count_in_the_time() -> None:
+    asked = question("slope_cornering=3 %", loads=LOADS[2:3])
+    free = least_plan(asked, tread())
+    cold = tread(rise_K=1.05 * float(tread().rises_K(free.design).max()))
+    paused = least_plan(asked, cold)
+    assert paused.feasible
+    waits = cold.pauses_s(paused.design) - PACE.between_files_s
+    assert waits.max() > 0
+    assert paused.minutes == pytest.approx(PACE.minutes(paused.design) + waits.sum() / 60)
+    hurried = least_plan(asked, cold, minutes=0.9 * paused.minutes)
+    assert not hurried.feasible or hurried.minutes <= 0.9 * paused.minutes
 
 
 def test_further_loads_are_tried_the_nearest_first() -> None:

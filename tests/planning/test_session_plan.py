@@ -168,5 +168,50 @@ def test_a_load_that_nothing_makes_is_named(knowledge: Knowledge, feasible: Feas
     assert "MZ" in str(refused.value)
 
 
+def with_one_weight(text: str) -> str:
+    """Return fixtures of one weight each that pull one way."""
+    for weights, weight in (
+        ("2000, 4000, 6200", "6200"),
+        ("130, 260, 400", "400"),
+        ("800, 1600, 2370", "2370"),
+    ):
+        text = text.replace(f"[{weights}]", f"[{weight}]")
+    return text.replace("minutes = 2\n", "minutes = 2\nboth = false\n").replace(
+        "= 3\n", "= 3\nboth = false\n"
+    )
+
+
+def test_loads_of_two_levels_are_refused_unless_that_is_asked_for(
+    tmp_path: Path, knowledge: Knowledge
+) -> None:
+    two = made(tmp_path, knowledge, with_one_weight(FIXTURES))
+    with pytest.raises(ConfigError) as refused:
+        plan_session(knowledge, two, Demand(loads=36, simulated=2))
+    assert refused.value.rule == "plan-infeasible"
+    assert "--two-levels" in str(refused.value.next_step)
+    plan = plan_session(knowledge, two, Demand(loads=36, simulated=2, two_levels=True))
+    assert any("can be seen" in text for text in plan.gives_up)
+
+
+@pytest.mark.parametrize("by", ["D", "I", "G"])
+def test_a_plan_has_three_levels_of_each_load_and_repeats(
+    knowledge: Knowledge, fixtures: FeasibleLoads, by: Criterion
+) -> None:
+    """A line needs its two ends alone, and says nothing of how crooked it is."""
+    plan = plan_session(knowledge, fixtures, Demand(loads=30, criterion=by, simulated=2))
+    for column in np.array([row.loads for row in plan.rows]).T:
+        assert len(np.unique(column)) >= 3
+    keys = {(row.loads, row.direction) for row in plan.rows}
+    assert len(plan.rows) - len(keys) == plan.replicates >= 3
+    assert all(load.visible_misfit is not None for load in plan.outlook)
+
+
+def test_weights_are_named_in_the_unit_of_their_file(tmp_path: Path, knowledge: Knowledge) -> None:
+    text = FIXTURES.replace('[2000, 4000, 6200], unit = "N"', '[0.5, 1, 1.25], unit = "kN"')
+    known = made(tmp_path, knowledge, text)
+    assert "1.25 kN" in known.label
+    assert known.loads[:, 0].max() == pytest.approx(1250 / 4.4482216152605)
+
+
 def test_fixtures_file_is_read_as_it_is_written(tmp_path: Path, knowledge: Knowledge) -> None:
     assert made(tmp_path, knowledge, FIXTURES).run_minutes == 5

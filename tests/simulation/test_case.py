@@ -13,9 +13,9 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.errors import ConfigError
 from toolkit.simulation.case import write_case, write_runs
-from toolkit.simulation.case_plan import CaseParameter, CasePlan
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.plan import read_plan, with_effects
+from toolkit.simulation.plan_file import CaseParameter, CasePlan
 from toolkit.simulation.run import simulate
 
 EXAMPLES = Path(toolkit.__file__).parent / "examples" / "virtual"

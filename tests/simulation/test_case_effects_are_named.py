@@ -18,8 +18,8 @@ import toolkit
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.simulation.case import write_case
-from toolkit.simulation.case_plan import CasePlan
 from toolkit.simulation.plan import read_plan, with_effects
+from toolkit.simulation.plan_file import CasePlan
 from toolkit.simulation.run import simulate
 
 PLAN = Path(toolkit.__file__).parent / "examples" / "virtual" / "continuous_plan.toml"

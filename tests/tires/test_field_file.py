@@ -106,6 +106,17 @@ def test_units_may_stand_beside_the_names(
         np.testing.assert_array_equal(columns[name], values)
 
 
+def test_decimal_commas_are_read_where_semicolons_or_tabs_part_the_cells(
+    channels: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    points = write_dat(tmp_path / "run.dat", channels, title="")
+    commas = tmp_path / "commas.dat"
+    commas.write_text(points.read_text().replace(".", ","))
+    expected = read_field_file(points)
+    for name, values in read_field_file(commas).columns.items():
+        np.testing.assert_array_equal(values, expected.columns[name])
+
+
 def test_the_axes_follow_from_the_sign_of_the_load(channels: dict[str, np.ndarray], tmp_path: Path) -> None:
     turned = channels | {"FZ": -channels["FZ"]}
     assert read_field_file(write_mat(tmp_path / "sae.mat", channels)).axes == "SAE"

@@ -5,12 +5,12 @@ import pytest
 
 from toolkit.channels import signs
 from toolkit.errors import FitError
-from toolkit.tires.catalog import find
 from toolkit.tires.comparison import compare
 from toolkit.tires.fit import Curve, fit_curves
 from toolkit.tires.global_data import binned, measured, what_varies
 from toolkit.tires.global_fit import fit_global, global_findings, not_varied
 from toolkit.tires.global_model import make_rows
+from toolkit.tires.models import find
 
 LOADS = (1500.0, 2800.0, 4000.0, 5200.0, 6400.0)
 ANGLES = np.radians([0, 1, -1, -2, 2, 4, -4, -6, 6, 8, -8, -10, 10])

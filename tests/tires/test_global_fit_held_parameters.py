@@ -5,8 +5,7 @@ import pytest
 
 from toolkit.tires.global_data import measured
 from toolkit.tires.global_fit import fit_global
-from toolkit.tires.global_model import GlobalModel, Responses
-from toolkit.tires.parameter_table import parameters
+from toolkit.tires.global_model import GlobalModel, Responses, parameters
 
 SA = np.radians(np.arange(-12.0, 12.25, 0.25))
 LOADS = (2000.0, 4000.0)

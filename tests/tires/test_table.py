@@ -13,7 +13,7 @@ from toolkit.errors import (
     UnitError,
     UnreadableError,
 )
-from toolkit.tires.catalog import model
+from toolkit.tires.models import model
 from toolkit.tires.models.magic_formula import value
 from toolkit.tires.table import read_table
 from toolkit.tires.table_fit import fit_table
@@ -93,11 +93,27 @@ def test_bad_tables_are_refused_with_place_and_next_step(tmp_path, header, lines
     assert caught.value.next_step
 
 
-def test_decimal_commas_are_told_to_be_saved_as_points(tmp_path):
-    with pytest.raises(CellError) as caught:
-        read_table(write(tmp_path, ["-1,5;2,0;3,0"], "SA [deg];FZ [N];FY [N]"))
-    assert caught.value.got == "'-1,5'"
-    assert caught.value.next_step == "save the table again with points for decimal commas"
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_commas_are_read_where_something_else_stands_between_the_cells(tmp_path, separator):
+    header = separator.join(["SA [deg]", "FZ [N]", "FY [N]"])
+    rows = [separator.join(row) for row in (["-1,5", "2000,0", "300,25"], ["0", "2100", "3,5e1"])]
+    table = read_table(write(tmp_path, rows, header))
+    np.testing.assert_allclose(table["SA"], np.deg2rad([-1.5, 0.0]), rtol=1e-15)
+    np.testing.assert_array_equal(table["FY"], [300.25, 35.0])
+    assert table.cells[0] == ("-1.5", "2000.0", "300.25")
+
+
+def test_commas_that_may_stand_between_thousands_are_refused(tmp_path):
+    with pytest.raises(UnreadableError) as caught:
+        read_table(write(tmp_path, ["1;2,000;3,000"], "SA [deg];FZ [N];FY [N]"))
+    assert caught.value.rule == "ambiguous-text"
+    for cell in ("1.234,5", "1,5"):
+        with pytest.raises(CellError) as wrong:
+            read_table(write(tmp_path, [f"1.5;{cell};3.5"], "SA [deg];FZ [N];FY [N]"))
+        assert wrong.value.got == repr(cell)
+
+
+def test_a_number_beyond_every_float_is_told_as_it_is_written(tmp_path):
     with pytest.raises(CellError) as caught:
         read_table(write(tmp_path, ["1e999,2,3"], "SA [deg],FZ [N],FY [N]"))
     assert caught.value.next_step == "remove or mend that row"

@@ -7,9 +7,8 @@ import pytest
 
 from tests.conftest import SHARED_DATA
 from toolkit.errors import CellError, ConfigError, ToolkitError, UnitError, UnreadableError
-from toolkit.tires.tir import parse_tir, read_tir
+from toolkit.tires.tir import parse_tir, read_tir, si_number
 from toolkit.tires.tir_evaluate import evaluate_tir
-from toolkit.tires.tir_units import si_number
 from toolkit.tires.tir_write import file_text, in_si
 
 MAKER = SHARED_DATA / "goodyear_feda_tir"

@@ -7,18 +7,20 @@ from collections import Counter
 from collections.abc import Iterator
 
 import pytest
+from cryptography.hazmat.primitives.serialization import PublicFormat
 
-from tests.trust.forgeries import anchors, documents, elsewhere, keys, ledger, requests
+from tests.trust.forgeries import anchors, documents, elsewhere, keys, ledger, places, requests
 from tests.trust.forgeries.changes import Forgery
 from tests.trust.forgeries.laboratory import KEYS, believed, forget, laboratory
 from tests.trust.seal.seal_factory import sealed_pdf, sealed_xml, trust
 from toolkit.trust.people import NAMESPACE
 from toolkit.trust.seal.pdf import check_pdf
 from toolkit.trust.seal.xml import check_xml
+from toolkit.trust.ssh import PublicKey
 
 TABLES = {
     "ledger": (ledger, 900), "keys": (keys, 80), "anchors": (anchors, 100), "requests": (requests, 150),
-    "documents": (documents, 100), "elsewhere": (elsewhere, 60),
+    "documents": (documents, 100), "elsewhere": (elsewhere, 60), "places": (places, 25),
 }  # fmt: skip
 """Each table, and the least number of forgeries in it: a generator that went silent would prove nothing."""
 
@@ -54,3 +56,5 @@ def test_what_is_honest_is_accepted() -> None:
     assert documents._dcc_taken({})
     assert elsewhere._enrolled_as("zoe", "Zoe Example")
     assert elsewhere._of_purpose(NAMESPACE, stated=True)
+    assert keys._enrolled(lambda: keys._point(PublicFormat.UncompressedPoint))
+    assert keys._enrolled(lambda: PublicKey("ssh-rsa", keys._rsa_blob(3072)).line)

@@ -22,7 +22,7 @@ from toolkit.units import si_scale, unit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.audit.columns import Columns
+    from toolkit.audit.model import Columns
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 CONSTANT = "constant"

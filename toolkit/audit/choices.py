@@ -16,7 +16,7 @@ from toolkit.audit.screen import Screen, Signature, layout, screen_of
 from toolkit.errors import RegistryError
 
 if TYPE_CHECKING:
-    from toolkit.audit.columns import Columns
+    from toolkit.audit.model import Columns
     from toolkit.calibration.registry.registry import Registry
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from toolkit.audit.columns import Columns
+    from toolkit.audit.model import Columns
     from toolkit.recording.model import Recording
     from toolkit.reduction.blocks import Block
 

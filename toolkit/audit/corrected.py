@@ -19,10 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
-from toolkit.audit.model import CLEAN
+from toolkit.audit.model import CLEAN, columns_of
 from toolkit.calibration.registry.registry import instrument_of
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import OutputError, ToolkitError

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.audit.candidates import Group, cannot_correct, describe, group_of
-from toolkit.audit.columns import Columns
-from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
+from toolkit.audit.model import Columns, Grade, Identification, Repair, Segment, Skipped, worst
 from toolkit.audit.runs import Hit, Partition, Reach, Runs, products, reach_of, without_chance
 from toolkit.audit.screen import Key, Screen, probe_rows, screen_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
-from toolkit.audit.model import CLEAN, TELLS, Identification
+from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, columns_of
 from toolkit.audit.quality import impossible
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
 from toolkit.reduction.blocks import Block, block_means, find_blocks, is_tare
+from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.units import si_scale
 
@@ -162,23 +162,24 @@ def inspect_file(
     """
     context = context_of(path, machine=machine)
     recording = read_recording(path, context.machine)
-    if not context.is_tare:
-        split_blocks(recording, context.machine)  # refuses a file that holds no load at all
     columns = columns_of(recording)
     choice = (
         None
         if registry is None
         else choose(registry, context.machine.name, on=context.date, known_at=known_at)
     )
-    identification, corrector, corrected = None, None, None
+    corrector = None if choice is None else choice.in_force or choice.today
+    loaded_recording = with_load(recording, machine=context.machine, record=corrector)
+    if not context.is_tare:
+        split_blocks(loaded_recording, context.machine)  # refuses a file that holds no load at all
+    identification, corrected = None, None
     if choice is not None:
         if columns.loads:
             identification = identify_columns(
                 columns, choice.records, on=context.date, in_force=choice.in_force, void=choice.void
             )
-        corrector = choice.in_force or choice.today
         corrected = None if corrector is None else _corrected(columns, corrector)
-    first, *blocks = _blocks(recording, corrected)
+    first, *blocks = _blocks(loaded_recording, corrected)
     loaded = [block for block in blocks if not block.tare] or blocks
     rows = sum(block.last_row - block.first_row + 1 for block in loaded)
     return Inspection(

@@ -13,12 +13,11 @@ from typing import Any, cast
 
 from toolkit.audit.candidates import cannot_correct
 from toolkit.audit.choices import Choices
-from toolkit.audit.columns import columns_of
 from toolkit.audit.conditions import Change, changes
 from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
-from toolkit.audit.model import Grade, Identification
+from toolkit.audit.model import Grade, Identification, columns_of
 from toolkit.audit.quality import impossible, quality
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
@@ -31,6 +30,7 @@ from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
+from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
 
 
@@ -111,7 +111,9 @@ class Auditor:
         context, trouble = self._context(path, data or b"")
         try:
             recording = read_recording(path, context.machine, data=data)
-            blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
+            choice = self.choices.on(context.machine.name, context.date)
+            loaded = with_load(recording, machine=context.machine, record=choice.in_force)
+            blocks = () if context.is_tare else split_blocks(loaded, context.machine)[0]
         except ToolkitError as error:
             sha256 = large if data is None else sha256_bytes(data)
             if workbook and data is not None and own_output(data):
@@ -122,7 +124,6 @@ class Auditor:
             return unreadable(name, reason, sha256=sha256, size=size, context=trouble)
         columns = columns_of(recording)
         instrument = context.machine.name
-        choice = self.choices.on(instrument, context.date)
         screen = self.choices.screen(instrument, columns)
         in_force = choice.in_force
         fits = in_force is not None and cannot_correct(in_force, columns) is None
@@ -141,7 +142,7 @@ class Auditor:
         reversal = table.get("reversal")
         direction = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
         sae = signs(context.machine.axes, "SAE", direction)
-        changed = changes(recording, columns, blocks, new, turn=sae["SA"])
+        changed = changes(loaded, columns, blocks, new, turn=sae["SA"])
         return FileAudit(
             path=name,
             sha256=recording.sha256,

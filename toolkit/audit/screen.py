@@ -22,7 +22,7 @@ from toolkit.units import si_scale
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.audit.columns import Columns
+    from toolkit.audit.model import Columns
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 _PROBE = 6  # rows that are looked at first

@@ -21,9 +21,9 @@ import numpy as np
 from toolkit.audit.candidates import cannot_correct
 from toolkit.audit.choices import Choices
 from toolkit.audit.cluster import run_on_cluster
-from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
+from toolkit.audit.model import columns_of
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.calibration.control.as_found import AsFound, as_found, as_found_history, phase_of
 from toolkit.calibration.registry.registry import Registry, instrument_of

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.choices import Choices
-from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
-from toolkit.audit.model import CLEAN
+from toolkit.audit.model import CLEAN, columns_of
 from toolkit.errors import ToolkitError
 from toolkit.recording.read import read_recording
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from toolkit.characteristics.catalogue import by_name, tables
+from toolkit.characteristics.catalogue import by_name, summary, tables
 from toolkit.characteristics.characteristic import BOTH, Characteristic
 from toolkit.characteristics.groups import DirectionFit
 from toolkit.characteristics.uncertain import Part, Uncertain
@@ -15,6 +15,11 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from toolkit.estimate import Estimate
+
+
+_SAME_LOAD = 0.04  # loads within this part of a summary's load are its load
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,3 +181,31 @@ def _record(row: Row) -> tuple[object, ...]:
     U, k = estimate.expanded()
     interval = (estimate.value - U, estimate.value + U)
     return (*head, estimate.value, estimate.u, U, k, estimate.dof, *interval, estimate.unit, None)
+
+
+def summary_load(characteristics: Characteristics, rated_load_N: float | None) -> float | None:
+    """Return the load of the summary [N]: the one nearest the rated load, else the middle one."""
+    loads = characteristics.loads_N
+    if not loads:
+        return None
+    if rated_load_N:
+        return min(loads, key=lambda load: abs(load - rated_load_N))
+    return loads[len(loads) // 2]
+
+
+def summary_estimates(
+    characteristics: Characteristics, rated_load_N: float | None
+) -> dict[str, Estimate | None]:
+    """Return the values of the summary by their names, in printed units; of directions the forward run."""
+    load = summary_load(characteristics, rated_load_N)
+    estimates: dict[str, Estimate | None] = {}
+    for characteristic in summary():
+        rotation = "forward" if characteristic.scope == "direction" else None
+        rows = characteristics.of(characteristic.name, rotation=rotation)
+        near = (row for row in rows if load is not None and abs(row.load_N - load) <= _SAME_LOAD * load)
+        row = next(near, None)
+        estimate = None if row is None else row.estimate
+        estimates[str(characteristic.summary)] = (
+            None if estimate is None else estimate.scaled(characteristic.factor, "")
+        )
+    return estimates

@@ -17,8 +17,8 @@ from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain, merged
 from toolkit.estimate import Estimate
-from toolkit.tires.catalog import model
 from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
+from toolkit.tires.models import model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -25,8 +25,8 @@ import numpy as np
 
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.reduction.common_load import at_one_angle, slopes
-from toolkit.tires.catalog import model
 from toolkit.tires.evaluate import slope_at, value_at
+from toolkit.tires.models import model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

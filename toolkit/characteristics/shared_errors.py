@@ -27,8 +27,7 @@ from toolkit.calibration.uncertainty.common_errors import record_covariance
 from toolkit.channels import seen_by_cells, signs
 from toolkit.characteristics.uncertain import Part
 from toolkit.machine import TypeB
-from toolkit.reduction.corrections import u_SA
-from toolkit.reduction.tare import zero_shifts
+from toolkit.reduction.corrections import u_SA, zero_shifts
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:

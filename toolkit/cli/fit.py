@@ -139,7 +139,7 @@ def command(
             fit = next(fit for fit in fitted.globals if fit.model == into)
             findings += write_fit(
                 tir, fit, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m,
-                use=fitted.use,
+                use=fitted.use, road=fitted.road,
             )  # fmt: skip
     payload: dict[str, Any] = {
         **fit_payload(fitted),

@@ -1,4 +1,4 @@
-"""`toolkit init, doctor, docs, qualify, explain`: the home, the computer, the manual, the digits."""
+"""`toolkit init, migrate, doctor, docs, qualify, explain`: the home, the computer, the manual, the digits."""
 
 from __future__ import annotations
 
@@ -49,6 +49,29 @@ def init(
     )
     answer({"home": real_path(folder), "written": list(written)}, text, as_json=json, quiet=quiet)
     return 0
+
+
+@answers("toolkit.lab.migrate:MigrateAnswer")
+def migrate(
+    home: Annotated[Path, typer.Argument(metavar="HOME", help="The home, as an older version left it.")],
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check and tell; write nothing.")] = False,
+    undo: Annotated[bool, typer.Option("--undo", help="Put back what the last migration replaced.")] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Check a home of an older version whole, and bring its files to this one.
+
+    Every record is refitted and held against its ledger, every other file read whole. Templates that a
+    version shipped and nobody changed become today's; what they were is kept in migrations/. Records and
+    ledgers are never written to. Done twice, it finds nothing to do.
+
+    Example: toolkit migrate lab --dry-run
+    """
+    from toolkit.lab import migrate as migration
+
+    payload, text = migration.undo(home) if undo else migration.migrate(home, dry_run=dry_run)
+    answer(payload, text, as_json=json, quiet=quiet)
+    return int(any(file["state"] == "refused" for file in payload["files"]))
 
 
 @answers("toolkit.lab.doctor:DoctorAnswer")

@@ -76,6 +76,7 @@ def _register() -> None:
 
     app.command(demo.NAME)(demo.command)
     app.command("init")(installation.init)
+    app.command("migrate")(installation.migrate)
     app.command("doctor")(installation.doctor)
     app.command("docs")(installation.docs)
     for module in (inspect, calibrate):

@@ -66,6 +66,10 @@ def session(
     criterion: Annotated[
         str, typer.Option("--criterion", help="D, I or G: of what the loads are optimal.")
     ] = "D",
+    two_levels: Annotated[
+        bool,
+        typer.Option("--two-levels", help="Allow plans at which no misfit of the equations can be seen."),
+    ] = False,
     seed: Annotated[
         int, typer.Option("--seed", min=0, help="Of the search and of the simulated sessions.")
     ] = 0,
@@ -87,8 +91,9 @@ def session(
 
     The fewest loads that keep a stated U, or the least U in a stated time or number of loads; without any of
     these today's U within a twentieth. U is that of 'toolkit calibration budget', with what the record knows
-    of the scatter within runs and between them. Check loads verify the sign of every coefficient by five
-    tolerances.
+    of the scatter within runs and between them. Every load has three levels and some rows are repeated, so
+    that a misfit of an equation is seen: loads that cannot end with 2, unless --two-levels. Check loads
+    verify the sign of every coefficient by five tolerances.
 
     --out gets SESSION.toml, loads.csv and check.csv, which 'toolkit calibrate' reads once the readings are
     filled in, and the operator's sheet; with --template as Word and PDF too.
@@ -107,7 +112,7 @@ def session(
     started = time.perf_counter()
     order = PlanOrder(
         instrument=instrument, session=session_file, fixtures=fixtures, demands=tuple(demands or ()),
-        minutes=minutes, loads=loads, criterion=criterion, seed=seed, on=day(on),
+        minutes=minutes, loads=loads, criterion=criterion, two_levels=two_levels, seed=seed, on=day(on),
         known_at=day(known_at), out=out, template=document_template(template, out),
     )  # fmt: skip
     payload, text, findings = session_plan_answer(open_registry(calibrations, home), order)

@@ -54,13 +54,19 @@ def protocol(
         typer.Option("--load", metavar="LOAD", help="At which load, '833 lbf'; repeatable; default: all."),
     ] = None,
     minutes: Annotated[
-        float, typer.Option("--minutes", min=0.0, help="Time on the machine at most.")
+        float, typer.Option("--minutes", help="Time on the machine at most.")
     ] = math.inf,
     between_files: Annotated[
         float | None,
         typer.Option("--between-files", metavar="SECONDS", min=0.0,
                      help="From one recording to the next; default 30."),
     ] = None,
+    sliding: Annotated[
+        float, typer.Option("--sliding", metavar="KJ", help="Energy that may slide away: wear of the tread.")
+    ] = math.inf,
+    rise: Annotated[
+        float, typer.Option("--rise", metavar="K", help="Warmth of the tread over the room; pauses keep it.")
+    ] = math.inf,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -90,7 +96,8 @@ def protocol(
     started = time.perf_counter()
     order = ProtocolOrder(
         like=like, demands=tuple(u or ()), loads=tuple(load or ()), minutes=minutes,
-        between_files_s=between_files, calibration=calibration, calibrations=calibrations, home=home,
+        between_files_s=between_files, sliding_kJ=sliding, rise_K=rise,
+        calibration=calibration, calibrations=calibrations, home=home,
         draft=draft,
     )  # fmt: skip
     opened = document_template(template, out)

@@ -23,10 +23,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from toolkit.comparison.mandel import Consistency, Departure, consistencies
+from toolkit.comparison.differences import grubbs_p
 from toolkit.comparison.model import Spread
-from toolkit.comparison.precision import factor_spread, spread
-from toolkit.comparison.significance import grubbs_p
+from toolkit.comparison.precision import Consistency, Departure, consistencies, factor_spread, spread
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 

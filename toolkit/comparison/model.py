@@ -14,8 +14,8 @@ Mode = Literal["table", "surfaces", "tires", "repeats"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 Kind = Literal["test", "table", "characteristics"]
 # The two tables of a comparison; in each the error of all its decisions together is controlled.
-Part = Literal["characteristics", "curves"]
-PARTS: tuple[Part, ...] = get_args(Part)
+Section = Literal["characteristics", "curves"]
+SECTIONS: tuple[Section, ...] = get_args(Section)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class Difference:
     uncertain; ``p_holm`` is adjusted for all decisions of its table; ``significant`` at the table's level.
     """
 
-    part: Part
+    part: Section
     name: str
     rotation: str
     SA_rad: float | None

@@ -62,7 +62,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
     from toolkit.audit.archive import audit_archive, inventory
     from toolkit.audit.corrected import check_target, write_copies
     from toolkit.audit.linked import link, read_reports
-    from toolkit.audit.parquet import check_parquet, write_parquet
+    from toolkit.audit.serial import check_parquet, write_parquet
     from toolkit.audit.since_good import drift_since, drifted_files, drifted_tests
     from toolkit.lab.amended import amend
     from toolkit.lab.home import open_registry

@@ -218,14 +218,14 @@ def comparison_text(
     comparison: Comparison, style: Style, findings: Sequence[Finding], drawn: Mapping[str, Path]
 ) -> str:
     """Return a comparison for people."""
-    from toolkit.comparison.model import PARTS
+    from toolkit.comparison.model import SECTIONS
     from toolkit.report.comparison.cells import conclusion, shown_rows
 
     simulated = "  SIMULATED" if any(entry.simulated for entry in comparison.entries) else ""
     marks = simulated + mark_words(*comparison.uses)
     parts = [f"comparison of {comparison.mode}, reference {comparison.reference.label}{marks}"]
     parts += [signature_words(*comparison.uses), _conditions(comparison), conclusion(comparison)]
-    for part in PARTS:
+    for part in SECTIONS:
         rows, which = shown_rows(comparison, part)
         if any(difference.part == part for difference in comparison.differences):
             parts.append(f"{part}: {which}; * marks what is significant")

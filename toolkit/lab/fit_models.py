@@ -15,6 +15,7 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.lab.resolve import Resolved
+    from toolkit.machine.definition import Drum
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import GlobalModel, ModelFit
@@ -28,7 +29,8 @@ class Fitted:
 
     ``curves`` are the fits of single loads with their ``rotations``; ``globals`` those over all loads, of the
     rows in ``data``; ``radius_m`` the tire's free radius where it is known; ``use`` the calibration record
-    that computed the forces, None for a table; ``sweeps`` what a continuous test was split into.
+    that computed the forces, None for a table; ``sweeps`` what a continuous test was split into; ``road``
+    what the tire rolled on, None where only a table tells of the test.
     """
 
     data: Measured
@@ -40,6 +42,7 @@ class Fitted:
     radius_m: float | None
     use: CalibrationUse | None = None
     sweeps: Sweeps | None = None
+    road: Drum | None = None
 
 
 def fit_table_models(
@@ -154,9 +157,9 @@ def fit_resolved(
     from toolkit.characteristics.groups import group
     from toolkit.lab.tire_files import STAND_IN_RADIUS
     from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.catalog import fit_model
     from toolkit.tires.fit import Curve, why_not
     from toolkit.tires.global_data import measured
+    from toolkit.tires.models import fit_model
     from toolkit.tires.table_fit import fit_findings
 
     groups = group(resolved.result.reduced)
@@ -202,12 +205,13 @@ def fit_resolved(
         data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius,
         seconds,
     )  # fmt: skip
-    return replace(fitted, use=resolved.result.reduced.calibration)
+    roads = [recording.machine.drum for _, recording in resolved.recordings]
+    return replace(fitted, use=resolved.result.reduced.calibration, road=roads[0] if roads else None)
 
 
 def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalModel, ...]]:
-    from toolkit.tires.catalog import find
     from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.models import find
 
     models = [find(name) for name in names]
     over_loads = tuple(model for model in models if isinstance(model, GlobalModel))
@@ -275,7 +279,7 @@ def model_choice(choices: Sequence[str]) -> tuple[str, ...]:
     FitError
         no model of a name is built: to be told before anything is read
     """
-    from toolkit.tires.catalog import find, model_names
+    from toolkit.tires.models import find, model_names
 
     names = [name for choice in choices for name in (model_names() if choice == "all" else (choice,))]
     for name in names:

@@ -24,9 +24,9 @@ def check_fmu(fmu: Path, source: Path, names: Sequence[str], fmi: str) -> str:
         none of the models is over all loads, or more than one; ``fmi`` is no version; the file would replace
         the table
     """
-    from toolkit.tires.catalog import find
     from toolkit.tires.fmu.description import VERSIONS
     from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.models import find
 
     fitting = [name for name in names if isinstance(find(name), GlobalModel)]
     if len(fitting) != 1:
@@ -64,11 +64,11 @@ def write_fit_fmu(
         the model's equations have no C
     """
     from toolkit.publication import write_result
-    from toolkit.tires.catalog import find
     from toolkit.tires.fmu.archive import fmu_of
     from toolkit.tires.fmu.equations import equations_of_file, equations_of_fit
     from toolkit.tires.global_data import what_varies
     from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.models import find
     from toolkit.tires.tir import parse_tir
     from toolkit.tires.tir_write import FITTYP, tir_text, tire_fit
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Kind = Literal["test", "audit", "diagnosis", "case", "plan"]
 
 ANSWER, CASE, PLAN = "diagnosis.json", "case.toml", "plan.json"
-_ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "node_modules"))
+_ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "migrations", "node_modules"))
 
 _WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses", "models", "plans"))
 

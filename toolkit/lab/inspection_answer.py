@@ -12,8 +12,8 @@ from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines, table
 
 if TYPE_CHECKING:
+    from toolkit.audit.estimate import Interval
     from toolkit.audit.inspection import Inspection, LoadBlock
-    from toolkit.audit.intervals import Interval
     from toolkit.audit.model import Segment as AuditSegment
 
 
@@ -161,7 +161,7 @@ _SIGNS = {1: "+", -1: "-", 0: "open"}
 
 def intervals_of(inspection: Inspection) -> tuple[Interval, ...]:
     """Return what the printed digits allow each coefficient of each load."""
-    from toolkit.audit.intervals import coefficient_intervals
+    from toolkit.audit.estimate import coefficient_intervals
 
     return tuple(
         interval

@@ -11,17 +11,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
 from toolkit.files import sha256_file
-from toolkit.inputs import PDF_FILE, read_input, read_regular
+from toolkit.inputs import PDF_FILE, read_input
 from toolkit.lab.proofs import PROOF
-from toolkit.publication import publication
-from toolkit.trust.requested import Requested
 from toolkit.trust.signing import HERE
 
 if TYPE_CHECKING:
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from toolkit.lab.sealing import Sealing
     from toolkit.report.content import ReportContent
     from toolkit.trust.anchor import Anchor
-    from toolkit.trust.requests import Request
 
 Issue = Callable[[Path, Sequence[Path], int, str], Mapping[str, Any]]
 """Issues a PDF of so many pages in place, with the files that are handed over with it and the hash of what it
@@ -78,11 +75,7 @@ class Issuing:
         use = content.calibrations[0]
         place = place_of_symbol(pdf, pages, content)
         hashes = {file.name: _hash(file) for file in others}
-        try:
-            anchor = self._anchor(use.id, {"name": document, "content": digest, **hashes}, decided)
-        except Requested as outcome:
-            _show(outcome.request, others)
-            raise
+        anchor = self._anchor(use.id, {"name": document, "content": digest, **hashes}, others, decided)
         ledger = {"schema": 1, **anchor.as_dict()}
         for file in others:
             if file.suffix == ".xml":
@@ -100,14 +93,19 @@ class Issuing:
         pdf.write_bytes(data if self.sealing is None else self.sealing.seal_pdf(data, document))
         return ledger
 
-    def _anchor(self, record_id: str, document: Mapping[str, str], decided: str) -> Anchor:
+    def _anchor(
+        self, record_id: str, document: Mapping[str, str], files: Sequence[Path], decided: str
+    ) -> Anchor:
         from toolkit.calibration.registry.issuing import issue
         from toolkit.calibration.registry.registry import instrument_of
         from toolkit.lab.people import checkpoint_of, lines_of
         from toolkit.trust.anchor import anchor_of
         from toolkit.trust.ssh import ED25519
 
-        seq = issue(self.registry, record_id, document, decided=decided, named=self.named)
+        registry = self.registry
+        if registry.travel.request is not None:
+            registry = registry.travelling(replace(registry.travel, files=tuple(files)))
+        seq = issue(registry, record_id, document, decided=decided, named=self.named)
         instrument = instrument_of(record_id)
         # The entry is what people sign, by whatever key; of the checkpoint only Ed25519 is a signature.
         signers = [signer for signer in self.registry.signers if signer.public.kind == ED25519]
@@ -150,17 +148,9 @@ def open_issuing(
     return Issuing(registry=registry, sealing=sealing, named=tuple(named))
 
 
-def _show(request: Request, files: Sequence[Path]) -> None:
-    """Lay beside a request the files whose hashes it has: nobody should sign what cannot be read."""
-    if request.path is not None:
-        with publication(request.path.with_name(f"{request.path.stem}.documents")) as stage:
-            for file in files:
-                (stage / file.name).write_bytes(read_regular(file))
-
-
 def _hash(file: Path) -> str:
     """Return the hash that the entry holds of a file: a digital certificate's is that of its content."""
     from toolkit.inputs import DCC_FILE
     from toolkit.trust.seal.xml_proof import content_hash
 
-    return content_hash(read_input(file, DCC_FILE)) if file.suffix == ".xml" else sha256_file(file)
+    return str(content_hash(read_input(file, DCC_FILE))) if file.suffix == ".xml" else sha256_file(file)

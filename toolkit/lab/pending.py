@@ -74,7 +74,7 @@ def decide(home: Path, registry: Registry, name: str, order: Order) -> Any:
     if version is None:
         return carry_out(registry, order)
     _check_stated(registry, order, version)
-    return carry_out(_travelling(registry, Travel(request=path)), order)
+    return carry_out(registry.travelling(Travel(request=path)), order)
 
 
 def pending_request(home: Path, registry: Registry, name: str) -> Pending | None:
@@ -208,7 +208,7 @@ def _signed(home: Path, registry: Registry, pending: Pending, answer: Request) -
         write_result(_path(home, pending.id), merged.request.text)
         return False
     order = order_of(merged.request.body, session_file(home, pending.id))
-    outcome = carry_out(_travelling(registry, Travel(answers=(merged.request,))), order)
+    outcome = carry_out(registry.travelling(Travel(answers=(merged.request,))), order)
     if findings := getattr(outcome, "findings", ()) if order.action == "approve" else ():
         raise TrustError(
             "a gate stands against what was signed", where=pending.id,
@@ -292,12 +292,6 @@ def _check_stated(registry: Registry, order: Order, version: Version) -> None:
         reason = "nobody of this name is enrolled" if person is None else able[person.id]
         if reason is not None:
             raise _not_allowed(order.action, name, reason)
-
-
-def _travelling(registry: Registry, travel: Travel) -> Registry:
-    from toolkit.calibration.registry.registry import Registry as Opened
-
-    return Opened(registry.folder, lock_file=registry.lock_file, travel=travel)
 
 
 def _path(home: Path, name: str) -> Path:

@@ -21,9 +21,9 @@ from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
 from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import leaf_hash, root_of
-from toolkit.trust.people import MEANINGS, Action, Demand, Key, People, Person, Role
+from toolkit.trust.people import MEANINGS, RECOVERY, Action, Demand, Key, People, Person, Role
 from toolkit.trust.ssh import parse_public
-from toolkit.trust.witness import SUFFIX, countersign
+from toolkit.trust.witness import SUFFIX, countersign, place, remembered
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -79,7 +79,6 @@ class WitnessAnswer(TypedDict):
     checkpoint: str
 
 
-RECOVERY = "recovery"
 _HEAD = re.compile(r"\b[0-9a-f]{64}\b")
 
 
@@ -299,15 +298,44 @@ def check_against(registry: Registry, instrument: str | None, document: Path) ->
 def witness(
     registry: Registry, instrument: str, folder: Path, *, name: str, signer: Signer
 ) -> tuple[Checkpoint, int]:
-    """Let a witness countersign an instrument's ledger; return the checkpoint and the size it knew before."""
+    """Let a witness countersign an instrument's ledger; return the checkpoint and the size it knew before.
+
+    Raises
+    ------
+    TrustError
+        ``not-allowed``: a key of the laboratory's own people; ``ledger-fork``, ``ledger-rollback``
+    """
+    versions = registry.people().history.versions
+    owner = next((person for v in versions if (person := v.people.owner(signer.public)) is not None), None)
+    if owner is not None:
+        raise TrustError(
+            "a witness is somebody else than the laboratory", where="--key", got=f"the key of {owner.id}",
+            expected="a key of the second place, with which nobody decides here",
+            next_step="make the witness a key of its own: toolkit person key FILE; nothing was signed",
+            rule="not-allowed",
+        )  # fmt: skip
     texts = lines_of(registry, instrument)
     copy = registry.folder.parent / "trust" / "witnessed" / f"{instrument}-{name}{SUFFIX}"
     check_file(copy)  # before the witness signs: it never forgets
+    _demand_memory(folder, f"{ORIGIN}{instrument}", copy)
     signed = countersign(
         folder, name, signer, checkpoint_of(registry, instrument), texts, time=int(time.time())
     )
     write_atomic(copy, signed.checkpoint.text)
     return signed.checkpoint, signed.before
+
+
+def _demand_memory(folder: Path, origin: str, copy: Path) -> None:
+    """Refuse a witness that knows less than it has signed here: it would sign a fork of what it forgot."""
+    signed, known = remembered(copy), remembered(place(folder, origin))
+    if signed is not None and (known is None or known.size < signed.size):
+        raise TrustError(
+            "the witness has forgotten what it signed", where=folder,
+            got="no checkpoint of this ledger" if known is None else f"a checkpoint of {known.size} entries",
+            expected=f"its checkpoint of {signed.size} entries, as in {copy}",
+            next_step="find out who changed the witness's folder, and put its file there again; a new place "
+            "is a witness by another --name; nothing was signed", rule="ledger-rollback",
+        )  # fmt: skip
 
 
 def _printed(texts: Sequence[str], document: Path) -> Comparison:
@@ -334,9 +362,6 @@ def _head(text: str) -> str | None:
 def _enter(
     registry: Registry, people: People, signers: Sequence[Signer], reason: str, by: str | None
 ) -> PeopleLog:
-    heads = {
-        name: (len(registry.ledger(name).entries), registry.head(name)) for name in registry.instruments()
-    }
     now = registry.people().history.now
     deciding = people if now is None else now.people
     answered = [str(answer.body["by"]) for answer in registry.travel.answers]
@@ -348,7 +373,7 @@ def _enter(
             next_step="add --by ID; nothing was changed", rule="person",
         )  # fmt: skip
     return enrol(
-        registry.folder, people, signers, by=named or "nobody", reason=reason, heads=heads,
+        registry.folder, people, signers, by=named or "nobody", reason=reason,
         lock_file=registry.lock_file, travel=registry.travel,
     )  # fmt: skip
 

@@ -61,6 +61,7 @@ class PlanOrder:
     minutes: float | None = None
     loads: int | None = None
     criterion: Criterion = "D"
+    two_levels: bool = False
     seed: int = 0
     on: date | None = None
     known_at: date | None = None
@@ -88,7 +89,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
     record, loads, check, text = _basis(registry, order)
     demand = Demand(
         U=tuple(_demand(record, entry) for entry in order.demands), minutes=order.minutes,
-        loads=order.loads, criterion=order.criterion, seed=order.seed,
+        loads=order.loads, criterion=order.criterion, seed=order.seed, two_levels=order.two_levels,
     )  # fmt: skip
     if len({name for name, _ in demand.U}) < len(demand.U):
         raise _wrong("a load is asked for twice", "--u", ", ".join(order.demands), "each load once")

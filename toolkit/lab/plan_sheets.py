@@ -133,6 +133,10 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
     sizes = (units.shown(load, "N")[0] for load in design.loads_N)
     loads = f"{', '.join(f'{size:.0f}' for size in sizes)} {force}"
     record = "" if plan.calibration is None else f", {plan.calibration}"
+
+    def wait(pause: float) -> str:
+        return f"pause of {pause:.0f} s, " if pause > max(own.pauses_s) else ""
+
     return PlanSheet(
         kind="test",
         subject=plan.machine,
@@ -145,9 +149,9 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
             _expected(value, units) for value in plan.values
         ),
         steps=tuple(
-            Step(run=rotation, action=f"slip angle {angle:g} deg", applied=loads)
+            Step(run=rotation, action=f"{wait(pause)}slip angle {angle:g} deg", applied=loads)
             for rotation in design.rotations
-            for angle in design.slip_angles_deg
+            for angle, pause in zip(design.slip_angles_deg, design.pauses_s, strict=True)
         ),
         assumptions=plan.assumptions,
         gives_up=plan.gives_up,

@@ -55,6 +55,8 @@ class ProtocolOrder:
     loads: tuple[str, ...] = ()
     minutes: float = math.inf
     between_files_s: float | None = None
+    sliding_kJ: float = math.inf
+    rise_K: float = math.inf
     calibration: str | None = None
     calibrations: Path | None = None
     home: Path | None = None
@@ -83,9 +85,9 @@ def plan_test(
     from toolkit.lab.plan_sheets import protocol_sheet, sheet_text, write_plan
     from toolkit.machine import load_machine
     from toolkit.planning.demands import parse_demand
-    from toolkit.planning.design import pace_of
     from toolkit.planning.printed_units import units_of
     from toolkit.planning.protocol_plan import plan_protocol
+    from toolkit.planning.tread import Tread
 
     demands = tuple(dict.fromkeys(parse_demand(text) for text in order.demands or DEMANDS))
     _refuse_doubled([demand.label for demand in demands])
@@ -93,12 +95,16 @@ def plan_test(
     tell("the earlier test")
     earlier, like, tire = _earlier(order)
     own = load_machine(earlier.machine.name)
+    tread = dataclasses.replace(
+        Tread.of(own, earlier, between_files_s=order.between_files_s),
+        energy_J=1e3 * order.sliding_kJ, rise_K=order.rise_K,
+    )  # fmt: skip
     plan = plan_protocol(
         earlier, demands, _loads(order.loads, earlier), own=own, like=like, minutes=order.minutes,
-        pace=pace_of(own, between_files_s=order.between_files_s), tell=tell,
+        tread=tread, tell=tell,
     )  # fmt: skip
     if not plan.feasible:
-        raise _infeasible(plan, order.minutes)
+        raise _beyond(plan, order) or _infeasible(plan, order.minutes)
     payload: dict[str, Any] = answer(plan) | {"out": out, "files": {}, "findings": []}
     units = units_of(own.protocol)
     if out is not None:
@@ -118,11 +124,18 @@ def _refuse_doubled(labels: Sequence[str]) -> None:
 
 
 def _refuse_endless(order: ProtocolOrder) -> None:
-    if order.between_files_s is not None and not math.isfinite(order.between_files_s):
+    limits = {
+        "--minutes": (order.minutes, "minutes above 0"),
+        "--sliding": (order.sliding_kJ, "kJ above 0"),
+        "--rise": (order.rise_K, "kelvins above 0"),
+    }
+    wrong = {name: stated for name, stated in limits.items() if not stated[0] > 0}
+    if order.between_files_s is not None and not 0 <= order.between_files_s < math.inf:
+        wrong["--between-files"] = (order.between_files_s, "seconds, zero or more")
+    for name, (size, expected) in wrong.items():
         raise ConfigError(
-            "a time is no number", where="--between-files", got=order.between_files_s,
-            expected="seconds, zero or more", next_step="state a time, or leave the option out",
-            rule="plan-infeasible",
+            "a limit is no number that a test can keep", where=name, got=size, expected=expected,
+            next_step="state such a number, or leave the option out", rule="plan-infeasible",
         )  # fmt: skip
 
 
@@ -237,6 +250,30 @@ def _wrong_load(actual: str, expected: str) -> ConfigError:
     )  # fmt: skip
 
 
+def _beyond(plan: ProtocolPlan, order: ProtocolOrder) -> ConfigError | None:
+    """Return the error of limits of the tread that the nearest plan does not keep; None where it does."""
+    design = plan.plan
+    asked = {
+        "--sliding": (order.sliding_kJ, design.sliding_kJ, "kJ"),
+        "--rise": (order.rise_K, design.rise_K, "K"),
+    }
+    beyond = {name: entry for name, entry in asked.items() if entry[1] > entry[0]}
+    if not beyond and design.minutes <= order.minutes:
+        return None
+    if not beyond:
+        beyond = {"--minutes": (order.minutes, design.minutes, "min")}
+    return ConfigError(
+        "no test spares the tread so far", where=", ".join(beyond),
+        got=", ".join(f"{name} {limit:g} {unit}" for name, (limit, _, unit) in beyond.items()),
+        expected="nearest: " + ", ".join(f"{_up(size)} {unit}" for _, size, unit in beyond.values()),
+        next_step="allow as much, or ask for fewer or smaller loads", rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def _up(size: float) -> str:
+    return f"{math.ceil(10 * size) / 10:g}"
+
+
 def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
     """Return the error of demands that no design meets, with the nearest plan."""
     from toolkit.estimate import round_uncertainty
@@ -317,18 +354,23 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
         "U in its time",
     ]
     directions = " and ".join(design.rotations)
+    waits = ", ".join(f"{pause:.0f}" for pause in design.pauses_s)
+    pauses = [f"  pauses       {waits} s before each"] if max(design.pauses_s) > max(own.pauses_s) else []
     loads = [units.shown(load, "N")[0] for load in design.loads_N]
     lines = [
         f"{design.rows} rows in {design.minutes:.1f} min: {len(design.slip_angles_deg)} slip angles at "
         f"{len(design.loads_N)} loads, drum {directions}",
         f"  slip angles  {', '.join(f'{angle:g}' for angle in design.slip_angles_deg)} deg, in this order",
         f"  loads        {', '.join(f'{load:.0f}' for load in loads)} {units.force}",
+        *pauses,
         f"  like         {plan.like}"
         + (f", record {plan.calibration}" if plan.calibration is not None else ""),
         "",
         table(head, rows, align="<>>>>>>"),
         "",
         f"protocol of {plan.machine}: {own.rows} rows in {own.minutes:.1f} min",
+        f"tread: {design.sliding_kJ:.0f} kJ slide away, by the protocol {own.sliding_kJ:.0f} kJ; a recording "
+        f"warms it by {design.rise_K:.1f} K at most",
     ]
     if plan.alike is not None:
         lines.append(

@@ -42,9 +42,9 @@ def results_answer(resolved: Resolved) -> dict[str, Any]:
 
 def recordings_answer(folder: Path, registry: Registry) -> dict[str, Any]:
     """Return each recording of a test's folder as `audit` answers it, with its loads row by row."""
-    from toolkit.audit.columns import columns_of
     from toolkit.audit.context import context_of
     from toolkit.audit.identify import recompute
+    from toolkit.audit.model import columns_of
     from toolkit.audit.one_file import Auditor, OwnOutput
     from toolkit.audit.serial import to_plain
     from toolkit.recording.folder import read_test_folder

@@ -18,7 +18,7 @@ from typing import Any
 
 from toolkit.channels import CHANNELS, channel_of
 from toolkit.declared import Source, refuse
-from toolkit.declared.outline import outline
+from toolkit.declared.describe import outline
 from toolkit.declared.reading import attempt
 from toolkit.declared.writing import value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError

@@ -94,7 +94,7 @@ class TireFit(Face):
         fit = next(fit for fit in self.result.globals if fit.model == surfaces)
         write_fit(
             Path(path), fit, self.result.data, source=Path(self.source), side=side.upper(),
-            radius_m=self.result.radius_m, use=self.result.use,
+            radius_m=self.result.radius_m, use=self.result.use, road=self.result.road,
         )  # fmt: skip
         return Path(path)
 
@@ -190,7 +190,7 @@ class Tire(Face):
         import numpy as np
 
         from toolkit.report.content import Curve, Plot
-        from toolkit.tires.tir_units import si_number
+        from toolkit.tires.tir import si_number
 
         angles, nominal = np.linspace(-12.0, 12.0, 97), si_number(self.result, "FNOMIN")
         loads = [round(share * nominal) for share in (0.5, 1.0, 1.5)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
-from toolkit.declared import Above, AtLeast, Distinct, Entry, Fault, Format, Keyed, Size, Unit
+from toolkit.declared import Above, AtLeast, Distinct, Entry, Fault, Format, Keyed, Quantity, Size, Unit
 from toolkit.errors import ConfigError
 from toolkit.units import unit
 
@@ -136,7 +136,7 @@ def loads_of_fixtures(stated: LoadingFixtures, record: CalibrationRecord, path: 
                     continue
                 rows.append(load)
                 mounts.append(mount)
-                labels.append(f"{weight:.6g} N")
+                labels.append(_written(weight))
                 amounts.append(weight)
                 minutes.append(fixture.minutes)
                 setup[mount] = fixture.setup_minutes
@@ -152,6 +152,12 @@ def loads_of_fixtures(stated: LoadingFixtures, record: CalibrationRecord, path: 
         amount=np.array(amounts), minutes=np.array(minutes), setup_minutes=setup,
         run_minutes=stated.run_minutes, refused=refused,
     )  # fmt: skip
+
+
+def _written(weight: float) -> str:
+    """Return a weight as the file has it."""
+    size, name = (weight.value, weight.unit) if isinstance(weight, Quantity) else (weight, "N")
+    return f"{size:.6g} {name}"
 
 
 def loads_of_record(record: CalibrationRecord, tables: list[Table]) -> FeasibleLoads:

@@ -108,15 +108,21 @@ class Knowledge:
             rotation=None,
         )  # fmt: skip
 
-    def responses(self, loads: NDArray[np.float64], up: NDArray[np.bool_]) -> tuple[Response, ...]:
+    def responses(
+        self, loads: NDArray[np.float64], up: NDArray[np.bool_], *, misfits: float = 1.0
+    ) -> tuple[Response, ...]:
         """Return each load's model over feasible rows for the choice of rows.
 
         Beside the equation's terms, a misfit bent like powers of the load, a difference of the directions,
         and every run's zero and gain are allowed for: each of the size that the last session showed, of one
         repeatability at least, so that what it was too small to show can be seen in the next.
+
+        Parameters
+        ----------
+        misfits : times that size of the misfit
         """
         return tuple(
-            _response(self.terms(fit, loads), loads[:, at] / fit.largest, up, own, self.runs[at])
+            _response(self.terms(fit, loads), loads[:, at] / fit.largest, up, own, self.runs[at], misfits)
             for at, (fit, own) in enumerate(self._pairs())
         )
 
@@ -233,6 +239,7 @@ def _response(
     up: NDArray[np.bool_],
     own: Scatter,
     runs: RunScatter,
+    misfits: float,
 ) -> Response:
     """Return the model of one load, in units of its repeatability."""
     within = own.runs.within
@@ -240,6 +247,7 @@ def _response(
     bent = np.stack([relative**power for power in range(2, HIGHEST_POWER + 1)], axis=1)
     apart = np.stack([side, side * relative, side * relative**2], axis=1)
     misfit, reversal = (max(size, within) / within for size in (own.misfit, own.reversal))
+    misfit *= misfits
     zero, gain = (max(size, within) / within for size in (runs.zero, runs.gain))
     wanted = terms.shape[1]
     scaled = _unit_columns(terms)

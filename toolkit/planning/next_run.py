@@ -3,7 +3,8 @@
 A run is a recording of the case with factors changed one by one (`exchange`): how fast its inputs
 go, how far, which of them alone moves, a condition such as the way the drum turns or how the tire stands on
 its hub. Inputs stay within what was recorded, or within limits that are given. A channel that is another
-one's rate of change stays that.
+one's rate of change stays that. A covariate is measured and not set: it goes on as it was recorded, unless a
+limit is given, which says that it can be set.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.simulators.setting import pauses
 from toolkit.planning.exchange import Alternatives, exchanged
 from toolkit.planning.members import Member, Predicted, expected_log_evidence, predict
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,8 +32,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Limits = Mapping[str, tuple[float, float]]
 
+Level = Literal["low", "high"]
+
 _RATES = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SIZES = (0.0, 0.5, 1.0, 2.0, 4.0)
+_LEVELS: tuple[Level, ...] = ("low", "high")
+_OF_A_RECORDING = ("phase", "date", "order", "repeat_of", "file")  # and of no other run
 _IS_RATE = 0.98  # of the variance of a channel that another one's derivative explains
 _ROUNDS = 2
 _CERTAIN = 2 * VERDICT.close
@@ -42,12 +49,14 @@ _TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
 class Change:
     """What is changed of a recording: nothing by default.
 
-    ``rate`` of the inputs, ``sizes`` of each about its middle, ``conditions`` that differ.
+    ``rate`` of the inputs, ``sizes`` of each about its middle, ``levels`` of those that are moved to
+    an end of their limits, ``conditions`` that differ.
     """
 
     run: str
     rate: float = 1.0
     sizes: tuple[tuple[str, float], ...] = ()
+    levels: tuple[tuple[str, Level], ...] = ()
     conditions: tuple[tuple[str, str], ...] = ()
 
     def words(self) -> tuple[str, ...]:
@@ -60,6 +69,7 @@ class Change:
                 statements.append(
                     f"{name} held at its middle" if size == 0 else f"{name} {size:g} times as far"
                 )
+        statements += [f"{name} as {level} as its limits allow" for name, level in self.levels]
         statements += [f"{key}: {value}" for key, value in self.conditions]
         return tuple(statements)
 
@@ -103,13 +113,12 @@ class RunSearch:
     def best(self) -> Change:
         """Return the change of a recording that parts the members furthest."""
         start = Change(run=self.problem.runs[0].name)
-        factors = range(len(self._factors(start)))
+        factors = range(len(self.factors(start)))
         return exchanged(start, self._alternatives, lambda: factors, sweeps=_ROUNDS)
 
     def _alternatives(self, change: Change, factor: int) -> Alternatives[Change]:
-        changes = (change, *self._factors(change)[factor])
-        # Each once: a run that is learned twice is known by two numbers.
-        runs = [self._run(new) for new in dict.fromkeys(changes) if new not in self.judged]
+        changes = (change, *self.factors(change)[factor])
+        runs = [self._run(new) for new in changes if new not in self.judged]
         if self.until() or not self.judged:
             self.learn([run for run in runs if run is not None])
         losses = np.array([-self.value(alternative) for alternative in changes])
@@ -150,9 +159,9 @@ class RunSearch:
             if a is not b
         )
 
-    def _factors(self, change: Change) -> list[tuple[Change, ...]]:
+    def factors(self, change: Change) -> list[tuple[Change, ...]]:
         """Return what each factor of a change may be instead: the recording first."""
-        names = [name for name, source in movable(self.problem) if source is None]
+        names = [name for name, source in movable(self.problem, self.limits) if source is None]
         factors = [
             tuple(dataclasses.replace(change, run=run.name) for run in self.problem.runs),
             # Faster, and where a rate of change is limited, as much less far.
@@ -167,6 +176,9 @@ class RunSearch:
             factors.append(
                 tuple(dataclasses.replace(change, sizes=(*others, (name, size))) for size in _SIZES)
             )
+            flat = tuple(entry for entry in change.levels if entry[0] != name)
+            moved = (dataclasses.replace(change, levels=(*flat, (name, level))) for level in _LEVELS)
+            factors.append((dataclasses.replace(change, levels=flat), *moved))
         for key, values in conditions(self.problem).items():
             rest = tuple(entry for entry in change.conditions if entry[0] != key)
             turned = (dataclasses.replace(change, conditions=(*rest, (key, value))) for value in values)
@@ -209,25 +221,26 @@ def conditions(problem: Problem) -> dict[str, tuple[str, ...]]:
     values: dict[str, tuple[str, ...]] = {}
     for run in problem.case.runs:
         for key, value in run.conditions.items():
-            if key not in ("phase", "date", "order", "repeat_of", "file"):
+            if key not in _OF_A_RECORDING:
                 values[key] = tuple(dict.fromkeys((*values.get(key, ()), value)))
     if problem.case.simulation.kind == "machine":
         values |= _TURNS
     return values
 
 
-def movable(problem: Problem) -> tuple[tuple[str, str | None], ...]:
-    """Return the inputs that go up and down, each with the one whose rate of change it is.
+def movable(problem: Problem, limits: Limits) -> tuple[tuple[str, str | None], ...]:
+    """Return the channels that a run may move, each with the one whose rate of change it is.
 
-    A channel that only grows, such as a shaft's angle, goes on as it was recorded.
+    Inputs that go up and down, what they are the rates of change of or have for one, and what has a limit. A
+    channel that only grows, such as a shaft's angle, goes on as it was recorded.
     """
     run = max(problem.runs, key=lambda run: run.rows)
-    names = [
-        channel.name
-        for channel in problem.case.drivers
-        if channel.name in run.columns and _goes_back(run.columns[channel.name])
-    ]
-    return tuple((name, _source(run, name, names)) for name in names)
+    present = [channel for channel in problem.case.drivers if channel.name in run.columns]
+    names = [c.name for c in present if c.name in limits or _goes_back(run.columns[c.name])]
+    sources = {name: _source(run, name, names) for name in names}
+    settable = {c.name for c in present if c.role == "input" or c.name in limits}
+    families = {_root(name, sources) for name in settable.intersection(names)}
+    return tuple((name, sources[name]) for name in names if _root(name, sources) in families)
 
 
 def _goes_back(column: Array) -> bool:
@@ -257,8 +270,8 @@ def changed(problem: Problem, change: Change, limits: Limits) -> Run | None:
     phase = np.mod((run.t - run.t[0]) * change.rate / span, 2.0) if span > 0 else np.zeros(run.rows)
     back = phase > 1.0
     at = run.t[0] + span * np.where(back, 2.0 - phase, phase)
-    sizes, columns = dict(change.sizes), dict(run.columns)
-    sources = dict(movable(problem))
+    sizes, levels, columns = dict(change.sizes), dict(change.levels), dict(run.columns)
+    sources = dict(movable(problem, limits))
     for name, source in sources.items():
         column = run.columns[name]
         depth, root = 0, source
@@ -268,16 +281,35 @@ def changed(problem: Problem, change: Change, limits: Limits) -> Run | None:
         moved = np.interp(at, run.t, column)
         turn = np.where(back, -1.0, 1.0) ** depth * change.rate**depth
         size = sizes.get(_root(name, sources), 1.0)
-        columns[name] = middle + size * (moved * turn - middle)
+        column = middle + size * (moved * turn - middle)
         low, high = limits.get(name, reach(problem, name))
+        if name in levels:
+            column = column + (low - column.min() if levels[name] == "low" else high - column.max())
+        columns[name] = column
         slack = 1e-9 * max(abs(low), abs(high), 1e-300)
-        if columns[name].min() < low - slack or columns[name].max() > high + slack:
+        if column.min() < low - slack or column.max() > high + slack:
             return None
-    declared = {**run.declared, **dict(change.conditions)}
+    later = _later(problem, run)
+    for channel in problem.case.channels:
+        if channel.role == "time":
+            columns[channel.name] = run.columns[channel.name] + later / unit(channel.unit).factor
+    kept = {key: value for key, value in run.conditions.items() if key not in _OF_A_RECORDING}
     return dataclasses.replace(
-        run, name="next.csv", columns=columns, conditions={**run.conditions, **dict(change.conditions)},
-        declared=declared,
+        run, name="next.csv", t=run.t + later, columns=columns,
+        conditions=kept | dict(change.conditions), declared={**run.declared, **dict(change.conditions)},
     )  # fmt: skip
+
+
+def _later(problem: Problem, run: Run) -> float:
+    """Return how much later than a recording the next run is [s]; 0 where each run has a clock of its own.
+
+    After the last one, by the pause that runs had on average.
+    """
+    runs = problem.case.runs
+    between = pauses(runs)
+    if between is None or not len(between):
+        return 0.0
+    return float(runs[-1].t[-1] + np.median(between) - run.t[0])
 
 
 def _root(name: str, sources: Mapping[str, str | None]) -> str:

@@ -42,4 +42,5 @@ ASSUMPTIONS = (
     "the true cause is a member of the class, with parameters near those fitted",
     "the noise of the run is that of the recordings",
     "inputs stay within what was recorded, or the limits that were given",
+    "covariates without a limit are as in the recording that is changed",
 )

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from toolkit.channels import Rotation
 from toolkit.declared import Entry, toml_text
 from toolkit.planning.demands import Demand
-from toolkit.planning.design import Design, Pace, ordered, standard
+from toolkit.planning.design import Design, ordered, standard
 from toolkit.planning.printed_units import PrintedUnits, units_of
 from toolkit.planning.protocol_search import Found, ProtocolSearch, Question, least_plan
 from toolkit.planning.reach import Reach
+from toolkit.planning.tread import Tread, tread_statement
 from toolkit.tires.fit import MIN_POINTS
 
 if TYPE_CHECKING:
@@ -54,7 +55,10 @@ class PlannedDesign:
     loads_N: Annotated[tuple[float, ...], Entry("in each recording")]
     rotations: Annotated[tuple[Rotation, ...], Entry("directions of the drum")]
     rows: Annotated[int, Entry("conditions of the reduced test")]
-    minutes: Annotated[float, Entry("time on the machine")]
+    minutes: Annotated[float, Entry("time on the machine, pauses among it")]
+    sliding_kJ: Annotated[float, Entry("energy that slides away in it, to which the tread's wear goes")]
+    rise_K: Annotated[float, Entry("of a cold tread over the room, by the recording that warms it most")]
+    pauses_s: Annotated[tuple[float, ...], Entry("before each direction's recordings, in their order")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +87,7 @@ def plan_protocol(
     loads_N: tuple[float, ...],
     *,
     own: Machine,
-    pace: Pace,
+    tread: Tread,
     like: str,
     minutes: float = math.inf,
     tell: Callable[[str], None] = lambda _text: None,
@@ -95,6 +99,7 @@ def plan_protocol(
     earlier : what is known of the tire, the machine and their scatter
     demands, loads_N : what is asked for, at which nominal loads of the earlier test
     own : the machine with its own protocol, which the plan is compared with
+    tread : what the tire's tread may be put to
     minutes : the time on the machine at most
 
     Raises
@@ -106,25 +111,28 @@ def plan_protocol(
     protocol = protocol_design(earlier, own)
     question = Question.beside(protocol, earlier=earlier, demands=demands, loads_N=loads_N)
     tell("the protocol")
-    of_protocol = Found(design=protocol, reaches=question.reaches(protocol), minutes=pace.minutes(protocol))
-    found = least_plan(question, pace, minutes=minutes, tell=tell)
-    alike, same_time = (None, None) if found.worst > 1 else (found, in_time(question, pace, protocol))
+    # The protocol itself has no limits, and so no pauses but its own.
+    free = dataclasses.replace(tread, energy_J=math.inf, rise_K=math.inf)
+    of_protocol = Found(design=protocol, reaches=question.reaches(protocol), minutes=free.minutes(protocol))
+    found = least_plan(question, tread, minutes=minutes, tell=tell)
+    alike, same_time = (found, in_time(question, free, protocol)) if found.feasible else (None, None)
     open_demands = tuple(Demand(name=demand.name, SA_rad=demand.SA_rad) for demand in demands)
-    if alike is not None and (open_demands != demands or not math.isinf(minutes)):
+    limited = not all(map(math.isinf, (minutes, tread.energy_J, tread.rise_K)))
+    if alike is not None and (open_demands != demands or limited):
         tell("the protocol's uncertainties in fewer rows")
         as_protocol = Question.beside(protocol, earlier=earlier, demands=open_demands, loads_N=loads_N)
-        alike = least_plan(as_protocol, pace, tell=tell)
+        alike = least_plan(as_protocol, free, tell=tell)
     return ProtocolPlan(
-        feasible=found.worst <= 1,
+        feasible=found.feasible,
         machine=own.name,
         like=like,
         calibration=None if earlier.shared.record is None else earlier.shared.record.id,
-        plan=_shown(found.design, found.minutes),
-        protocol=_shown(protocol, of_protocol.minutes, in_order=True),
-        alike=None if alike is None or alike.worst > 1 else _shown(alike.design, alike.minutes),
-        same_time=None if same_time is None else _shown(same_time.design, same_time.minutes),
+        plan=_shown(found.design, tread),
+        protocol=_shown(protocol, free, in_order=True),
+        alike=None if alike is None or not alike.feasible else _shown(alike.design, free),
+        same_time=None if same_time is None else _shown(same_time.design, free),
         values=_values(question, found, of_protocol, same_time),
-        assumptions=_assumptions(earlier, pace, units),
+        assumptions=_assumptions(earlier, tread, units),
         gives_up=_gives_up(found.design, protocol, units),
     )
 
@@ -136,21 +144,25 @@ def protocol_design(earlier: EarlierTest, own: Machine) -> Design:
     return design if known else dataclasses.replace(design, loads_N=earlier.loads_N)
 
 
-def in_time(question: Question, pace: Pace, protocol: Design) -> Found | None:
+def in_time(question: Question, tread: Tread, protocol: Design) -> Found | None:
     """Return the best design at the protocol's loads that takes no longer; None where it has no curve."""
-    search = ProtocolSearch(question, pace, tuple(sorted(protocol.loads_N)))
-    most = search.most_within(pace.minutes(protocol))
+    search = ProtocolSearch(question, tread, tuple(sorted(protocol.loads_N)))
+    most = search.most_within(tread.minutes(protocol))
     return search.best(most) if most >= MIN_POINTS else None
 
 
-def _shown(design: Design, minutes: float, *, in_order: bool = False) -> PlannedDesign:
+def _shown(design: Design, tread: Tread, *, in_order: bool = False) -> PlannedDesign:
     angles = design.slip_angles_rad if in_order else ordered(design.slip_angles_rad, seed=_SEED)
+    design = dataclasses.replace(design, slip_angles_rad=angles)
     return PlannedDesign(
         slip_angles_deg=tuple(round(math.degrees(a), 6) + 0.0 for a in angles),
         loads_N=tuple(float(load) for load in design.loads_N),
         rotations=design.rotations,
         rows=design.rows,
-        minutes=minutes,
+        minutes=tread.minutes(design),
+        sliding_kJ=float(tread.energies_J(design).sum()) / 1e3,
+        rise_K=float(tread.rises_K(design).max()),
+        pauses_s=tuple(tread.pauses_s(design).tolist()),
     )
 
 
@@ -185,11 +197,12 @@ def _key(reach: Reach) -> tuple[str, float]:
     return reach.demand.label, reach.load_N
 
 
-def _assumptions(earlier: EarlierTest, pace: Pace, units: PrintedUnits) -> tuple[str, ...]:
+def _assumptions(earlier: EarlierTest, tread: Tread, units: PrintedUnits) -> tuple[str, ...]:
     def scatter(place: int, unit: str) -> str:
         size, printed = units.shown(math.sqrt(earlier.variances[place]), unit)
         return f"{size:.2g} {printed.replace('*', '·')}"
 
+    pace = tread.pace
     angle = math.degrees(math.sqrt(earlier.variances[3]))
     statements = [
         "the tire is like that of the earlier test: its curves say where the slip angles are needed",
@@ -207,6 +220,12 @@ def _assumptions(earlier: EarlierTest, pace: Pace, units: PrintedUnits) -> tuple
             f"no run of the earlier test has the drum {' and '.join(earlier.mirrored)}: its curves are taken "
             "for those of the other direction"
         )
+    if not math.isinf(tread.energy_J):
+        statements.append(
+            "the tread wears by the energy that slides away: |FY| V sin|SA|, as at the earlier test"
+        )
+    if not math.isinf(tread.rise_K):
+        statements.append(tread_statement())
     if earlier.shared.record is None:
         statements.append("no calibration record is at hand: its share of the uncertainty is left out")
     return tuple(statements)

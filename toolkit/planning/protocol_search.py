@@ -15,10 +15,11 @@ from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import by_name
 from toolkit.errors import ConfigError
 from toolkit.planning.demands import Demand
-from toolkit.planning.design import Design, Pace, steps_of
+from toolkit.planning.design import Design, steps_of
 from toolkit.planning.exchange import Points, PointSearch
 from toolkit.planning.reach import Reach, is_of, worst
 from toolkit.planning.screen import screen_of
+from toolkit.planning.tread import Exposure, Tread
 from toolkit.tires.fit import MIN_POINTS
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _PEAK_SHARE = 0.99
 _SAME_RAD = 1e-9
 _MOST = 30  # slip angles in each direction
+_BEYOND = 1e3  # what a design that goes beyond its limits pays for as much again
 _STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
 _ALIKE = 1.05
@@ -141,16 +143,22 @@ class Question:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """A design with what it reaches; ``worst`` is the largest of U over demand."""
+    """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth."""
 
     design: Design
     reaches: tuple[Reach, ...]
     minutes: float
+    excess: float = 0.0
 
     @property
     def worst(self) -> float:
         """The largest of U over what was demanded; at most 1 where all demands are met."""
         return max((reach.ratio for reach in self.reaches), default=math.inf)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every demand is met within the limits."""
+        return self.worst <= 1 and self.excess <= 0
 
 
 class ProtocolSearch:
@@ -159,13 +167,21 @@ class ProtocolSearch:
     def __init__(
         self,
         question: Question,
-        pace: Pace,
+        tread: Tread,
         loads_N: tuple[float, ...],
+        *,
+        minutes: float = math.inf,
         tell: Callable[[str], None] = lambda _text: None,
     ) -> None:
-        self.question, self.pace, self.loads_N, self._tell = question, pace, loads_N, tell
+        self.question, self.tread, self.loads_N, self._tell = question, tread, loads_N, tell
         self.candidates = question.candidates_rad
         full = self.design(tuple(range(len(self.candidates))))
+        self.exposure = Exposure(
+            energies_J=tread.energies_J(full),
+            minutes=np.array([tread.minutes(self.design((i,))) for i in range(len(self.candidates))]),
+            energy_limit_J=tread.energy_J,
+            minutes_limit=minutes,
+        )
         self.full = self.found(full)
         self._screen = screen_of(question.earlier, full, self.full.reaches)
         self._points = PointSearch(self._criterion, len(self.candidates))
@@ -178,7 +194,11 @@ class ProtocolSearch:
 
     def found(self, design: Design) -> Found:
         """Return a design with what it reaches."""
-        return Found(design=design, reaches=self.question.reaches(design), minutes=self.pace.minutes(design))
+        points = [self.candidates.index(angle) for angle in design.slip_angles_rad]
+        return Found(
+            design=design, reaches=self.question.reaches(design), minutes=self.tread.minutes(design),
+            excess=self.exposure.excess(points),
+        )  # fmt: skip
 
     def best(self, size: int) -> Found:
         """Return the best design of a number of recordings in each direction."""
@@ -198,29 +218,29 @@ class ProtocolSearch:
     def least(self, most: int) -> Found | None:
         """Return the best design of the fewest slip angles, at most so many, that meets every demand."""
         low, high = MIN_POINTS, most
-        if high < low or self.best(high).worst > 1:
+        if high < low or not self.best(high).feasible:
             return None
         while low < high:
             middle = (low + high) // 2
-            low, high = (low, middle) if self.best(middle).worst <= 1 else (middle + 1, high)
+            low, high = (low, middle) if self.best(middle).feasible else (middle + 1, high)
         return self.best(high)
 
     def most_within(self, minutes: float) -> int:
         """Return how many slip angles fit into a time."""
-        of_each = self.pace.minutes(self.design((0,)))
-        return int(min(minutes / of_each + 1e-9, _MOST))
+        return int(min(minutes / self.exposure.minutes.min() + 1e-9, _MOST))
 
     def _criterion(self, designs: Sequence[Points]) -> NDArray[np.float64]:
         losses = np.full(len(designs), math.inf)
         serves = np.array([self.question.covers(points) for points in designs])
         if serves.any():
             losses[serves] = self._screen.criterion(np.array(designs)[serves])
+            losses += [_BEYOND * self.exposure.excess(points) for points in designs]
         return losses
 
 
 def least_plan(
     question: Question,
-    pace: Pace,
+    tread: Tread,
     *,
     minutes: float = math.inf,
     tell: Callable[[str], None] = lambda _text: None,
@@ -228,8 +248,8 @@ def least_plan(
     """Return the shortest design that meets every demand, or the nearest to it that the time allows.
 
     Further loads beside those that are asked for are tried, nearest first: by its neighbours a block is
-    carried to the load that all blocks share. ``worst`` of what is returned is above 1 where no design
-    meets the demands.
+    carried to the load that all blocks share. What is returned is not ``feasible`` where no design meets the
+    demands within time, and what the tread may be put to.
 
     Raises
     ------
@@ -239,8 +259,8 @@ def least_plan(
     met, missed, shortest = None, None, math.inf
     for loads in load_sets(question):
         tell(f"{len(loads)} loads")
-        search = ProtocolSearch(question, pace, loads, tell)
-        shortest = min(shortest, pace.minutes(search.design((0,) * MIN_POINTS)))
+        search = ProtocolSearch(question, tread, loads, minutes=minutes, tell=tell)
+        shortest = min(shortest, MIN_POINTS * float(search.exposure.minutes.min()))
         points = search.most_within(min(minutes, math.inf if met is None else met.minutes))
         if points < MIN_POINTS:
             continue
@@ -249,7 +269,8 @@ def least_plan(
             met = least if met is None or least.minutes < met.minutes else met
         elif met is None:
             nearest = search.best(points)
-            missed = nearest if missed is None or nearest.worst < missed.worst else missed
+            nearer = missed is None or (nearest.excess, nearest.worst) < (missed.excess, missed.worst)
+            missed = nearest if nearer else missed
     if met is None and missed is None:
         raise ConfigError(
             "no test fits into the time", where="--minutes", got=f"{minutes:g} min",

@@ -20,7 +20,7 @@ import numpy as np
 from toolkit.characteristics.catalogue import by_name
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.characteristics.reading import Reader
-from toolkit.tires.catalog import model
+from toolkit.tires.models import model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

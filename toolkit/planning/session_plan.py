@@ -128,7 +128,6 @@ class _Finished:
             [[budget.U for budget in knowledge.simulated(table, rng)] for _ in range(self.demand.simulated)]
         )
         outlook = self._outlook(design, table, drawn, answers)
-        replicates = len(load) - len(np.unique(np.column_stack([load, up]), axis=0))
         return SessionPlan(
             record=knowledge.record.id,
             instrument=knowledge.record.instrument,
@@ -145,7 +144,7 @@ class _Finished:
             minutes=minutes,
             rows_today=knowledge.loads.rows,
             check_today=0 if knowledge.check is None else knowledge.check.rows,
-            replicates=replicates,
+            replicates=self.search.repeats(design.chosen),
             simulated=self.demand.simulated,
             assumptions=self._assumptions(),
             gives_up=self._gives_up(design, outlook),
@@ -205,7 +204,8 @@ class _Finished:
             "readings are independent of each other but for the zero and the gain of their run",
             "what the record's budget takes from statements (reference, resolution, creep, zero) stays",
             "a misfit, a difference of the directions, a zero and a gain of each run are allowed for with "
-            "one repeatability at least, also where the last session showed none",
+            "one repeatability at least, also where the last session showed none; a misfit with more where "
+            "the loads would otherwise not show it",
         )
 
     def _gives_up(self, design: Design, outlook: tuple[Outlook, ...]) -> tuple[str, ...]:

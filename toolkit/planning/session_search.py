@@ -13,9 +13,11 @@ from toolkit.calibration.fit.findings import FEW_POINTS
 from toolkit.errors import ConfigError
 from toolkit.planning.check_loads import choose_check_loads
 from toolkit.planning.criteria import Criterion
-from toolkit.planning.row_exchange import Price, exchange, loss
+from toolkit.planning.row_exchange import Price, Response, exchange, loss
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from toolkit.calibration.session.table import Table
@@ -29,6 +31,8 @@ SLACK = 1.05
 _SEARCH_STARTS, _FINAL_STARTS = 1, 4
 _LARGE = 0.5  # of the largest load
 _SHARES = (1.0, 0.3, 0.1)  # of what a minute is worth: as few mounts as the runs' differences allow
+FEWEST_LEVELS, FEWEST_REPEATS = 3, 3
+_MISFITS = (1.0, 3.0, 10.0, 30.0)  # times the misfit that is allowed for, until it is seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +40,7 @@ class Demand:
     """What a plan is asked for: U at the largest load [the record's unit] by load; minutes and loads at most.
 
     The check loads count in the minutes, not in the loads. ``simulated`` sessions tell how sure U is.
+    ``two_levels`` allows plans at which no misfit of the equations can be seen.
     """
 
     U: tuple[tuple[str, float], ...] = ()
@@ -44,6 +49,7 @@ class Demand:
     criterion: Criterion = "D"
     seed: int = 0
     simulated: int = 40
+    two_levels: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,7 +82,11 @@ class SessionSearch:
         self.place = np.concatenate([np.arange(len(feasible.loads)), down])
         self.loads = feasible.loads[self.place]
         self.up = np.arange(len(self.place)) < len(feasible.loads)
-        self.responses = knowledge.responses(self.loads, self.up)
+        self._bent = [
+            knowledge.responses(self.loads, self.up, misfits=size)
+            for size in _MISFITS[: 1 if demand.two_levels else None]
+        ]
+        self.responses = self._bent[0]
         self.asked = np.array([dict(demand.U).get(name, math.inf) for name in knowledge.names])
         self.today = np.array([budget.U for budget in knowledge.repeated()])
         if not demand.U and not self.limited:
@@ -96,6 +106,7 @@ class SessionSearch:
                 next_step="state them in a file of fixtures: --fixtures FILE", rule="plan-fixtures",
             )  # fmt: skip
         self._refuse_what_cannot_be_told()
+        self._refuse_what_shows_no_misfit()
 
     def _refuse_what_cannot_be_told(self) -> None:
         for fit, response in zip(self.knowledge.record.loads, self.responses, strict=True):
@@ -116,6 +127,37 @@ class SessionSearch:
                     rule="plan-fixtures",
                 )  # fmt: skip
 
+    def _refuse_what_shows_no_misfit(self) -> None:
+        """Refuse feasible loads of too few levels, unless that is asked for."""
+        every = np.tile(np.arange(len(self.place)), FEWEST_RUNS)
+        blind = self._blind(every, np.repeat(np.arange(FEWEST_RUNS), len(self.place)))
+        if blind and not self.demand.two_levels:
+            raise ConfigError(
+                "the feasible loads have too few levels to show a misfit", where=self.feasible.source,
+                got=f"no misfit of the equation of {', '.join(blind)} can be seen",
+                expected=f"{FEWEST_LEVELS} levels of each load at least, more for equations with powers",
+                next_step="add weights between; nearest: --two-levels plans with these loads, and no misfit "
+                "of an equation will be seen",
+                rule="plan-infeasible",
+            )  # fmt: skip
+
+    def _blind(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> list[str]:
+        """Return the loads of which rows show no misfit of the equation."""
+        visible = self.knowledge.visible_misfit(self.table(chosen, run))
+        levels = [len(np.unique(column)) for column in self.loads[chosen].T]
+        named = zip(self.knowledge.names, visible, levels, strict=True)
+        return [name for name, size, count in named if size is None or count < FEWEST_LEVELS]
+
+    def repeats(self, chosen: NDArray[np.intp]) -> int:
+        """Return how many rows repeat another run's: by these a misfit is told from scatter."""
+        return len(chosen) - len(np.unique(chosen))
+
+    def _shows_misfit(self, design: Design) -> bool:
+        """Tell whether a misfit can be seen: levels enough, and repeats that say what scatter is."""
+        if self.demand.two_levels:
+            return True
+        return self.repeats(design.chosen) >= FEWEST_REPEATS and not self._blind(design.chosen, design.run)
+
     def design(self, runs: int, per_run: int, starts: int = _SEARCH_STARTS) -> Design:
         """Return the design of a number of runs and rows in each."""
         key = (runs, per_run)
@@ -123,29 +165,35 @@ class SessionSearch:
             return self._designs[key]
         run = np.repeat(np.arange(runs), per_run)
         rng = np.random.default_rng([self.demand.seed, runs, per_run])
-        chosen = self._exchanged(run, rng, starts, None)
-        if self.feasible.setup_minutes is not None:
-            price = self._price(chosen, run)
-            for share in _SHARES:
-                cheaper = self._exchanged(
-                    run, rng, starts, dataclasses.replace(price, weight=share * price.weight)
-                )
-                if self._seen_in_runs(cheaper, run):
-                    chosen = cheaper
-                    break
-        budgets = self.knowledge.expected(self.table(chosen, run))
-        design = Design(
-            chosen=chosen, run=run, U=np.array([budget.U for budget in budgets]),
-            minutes=self.minutes(chosen, run, self.check),
-        )  # fmt: skip
+        for responses in self._bent:
+            chosen = self._chosen(responses, run, rng, starts)
+            budgets = self.knowledge.expected(self.table(chosen, run))
+            design = Design(
+                chosen=chosen, run=run, U=np.array([budget.U for budget in budgets]),
+                minutes=self.minutes(chosen, run, self.check),
+            )  # fmt: skip
+            if self._shows_misfit(design):
+                break
         self._designs[key] = design
         return design
 
-    def _exchanged(
-        self, run: NDArray[np.intp], rng: np.random.Generator, starts: int, price: Price | None
+    def _chosen(
+        self, responses: Sequence[Response], run: NDArray[np.intp], rng: np.random.Generator, starts: int
     ) -> NDArray[np.intp]:
-        by = self.demand.criterion
-        return exchange(self.responses, run, by, rng, starts=starts, price=price, once=True)
+        """Return the rows of an exchange; where time is stated, with as few mounts as the runs allow."""
+
+        def exchanged(price: Price | None) -> NDArray[np.intp]:
+            return exchange(responses, run, self.demand.criterion, rng, starts=starts, price=price, once=True)
+
+        chosen = exchanged(None)
+        if self.feasible.setup_minutes is None:
+            return chosen
+        price = self._price(chosen, run)
+        for share in _SHARES:
+            cheaper = exchanged(dataclasses.replace(price, weight=share * price.weight))
+            if self._seen_in_runs(cheaper, run):
+                return cheaper
+        return chosen
 
     def _seen_in_runs(self, chosen: NDArray[np.intp], run: NDArray[np.intp]) -> bool:
         """Tell whether every load is large in as many runs as tell how runs differ."""
@@ -248,10 +296,13 @@ class SessionSearch:
         return self.design(runs, high)
 
     def _keeps(self, design: Design) -> bool:
-        return bool(np.all(self.asked * (1 + 1e-9) - design.U >= 0))
+        return self._shows_misfit(design) and bool(np.all(self.asked * (1 + 1e-9) - design.U >= 0))
 
     def _refuse_uncertainty(self) -> None:
-        best = min(self._designs.values(), key=lambda design: float(np.max(design.U / self.asked)))
+        best = min(
+            self._designs.values(),
+            key=lambda design: (not self._shows_misfit(design), float(np.max(design.U / self.asked))),
+        )
         worst = int(np.argmax(best.U / self.asked))
         budget = self.knowledge.today[worst]
         holding = max(
@@ -295,6 +346,7 @@ class SessionSearch:
             shortest.append(self.design(runs, low))
             if self._within(shortest[-1]):
                 inside.append(self._longest_of(runs, low, high))
+        inside = [design for design in inside if self._shows_misfit(design)] or inside
         if not inside:
             nearest = min(shortest, key=self._cost)
             if not refuse:
@@ -307,8 +359,16 @@ class SessionSearch:
                 rule="plan-infeasible",
             )  # fmt: skip
         best = min(inside, key=lambda design: float(np.max(design.U / self.today)))
+        if refuse and not self._shows_misfit(best):
+            raise ConfigError(
+                "no session within the limits shows a misfit", where=f"--{self._limit_word}",
+                got=self._limit_text(),
+                expected=f"{FEWEST_LEVELS} levels of each load, and {FEWEST_REPEATS} repeats",
+                next_step=f"allow more; nearest: {best.text} with --two-levels, at which no misfit is seen",
+                rule="plan-infeasible",
+            )  # fmt: skip
         final = self.design(best.runs, len(best.run) // best.runs, _FINAL_STARTS) if refuse else best
-        return final if self._within(final) else best
+        return final if self._within(final) and self._shows_misfit(final) else best
 
     def _longest_of(self, runs: int, low: int, high: int) -> Design:
         """Return the longest design of a number of runs within the limits; ``low`` rows a run are within."""

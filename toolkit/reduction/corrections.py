@@ -1,25 +1,32 @@
-"""A machine's corrections on the rows of a recording, in the machine's axes, before they are averaged.
+"""What is taken off the rows of a recording before they are averaged: tare and the machine's corrections.
 
-What an effect of the catalogue adds is taken away again: the loads first, then the slip angle, which the
-corrected moment may turn.
+The tare is what the unloaded machine indicates. What an effect of the catalogue adds is taken away again, in
+the machine's axes: the loads first, then the slip angle, which the corrected moment may turn.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.apply import apply_record
 from toolkit.effects import forward
 from toolkit.findings import Finding
+from toolkit.reduction.averaging import means
+from toolkit.reduction.blocks import Block
+from toolkit.reduction.model import Tare
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
+    from toolkit.recording.model import Recording
 
 
 def corrected(
@@ -55,3 +62,104 @@ def correction_findings(machine: Machine) -> list[Finding]:
         )
         for correction in machine.corrections
     ]
+
+
+def tare_of_file(recording: Recording) -> Tare:
+    """Return the tare from a recording that holds nothing else: the mean of every row."""
+    block = Block(start=0, stop=recording.rows, mean_FZ=0.0)
+    return _tare([(recording, [block])], source=f"file {recording.name}")
+
+
+def choose_tares(
+    files: Sequence[tuple[Recording, Sequence[Block]]],
+    *,
+    declared: Tare | None,
+    machine: Machine,
+    record: CalibrationRecord,
+) -> tuple[Tare, ...]:
+    """Return the tare of every file of a test.
+
+    Parameters
+    ----------
+    files : each recording with its tare blocks
+    declared : the tare of ``test.toml``, which goes before every block
+
+    Notes
+    -----
+    A block serves its own file only where every file has one. Otherwise the mean of the blocks serves all,
+    so that one curve never holds tared and untared points.
+    """
+    if declared is not None:
+        return (declared,) * len(files)
+    having = [(recording, blocks) for recording, blocks in files if blocks]
+    if not having:
+        return (_open_zero([recording for recording, _ in files], machine=machine, record=record),) * len(
+            files
+        )
+    if len(having) == len(files):
+        return tuple(_tare([block], source="block") for block in having)
+    shared = _tare(having, source=f"mean of the tare blocks in {len(having)} of {len(files)} files")
+    return (shared,) * len(files)
+
+
+def zero_shifts(
+    record: CalibrationRecord, indications: NDArray[np.float64], u: Sequence[float]
+) -> dict[str, NDArray[np.float64]]:
+    """Return how far each cell's open zero moves each load [SI]: load -> (cells, rows).
+
+    Parameters
+    ----------
+    indications : (cells, rows) untared, in the record's order and units
+    u : (cells,) standard uncertainty of each cell's zero, in the same units
+    """
+    names = record.indications
+    units = dict(zip(names, record.indication_units, strict=True))
+
+    def loads(cell: int, sign: float) -> dict[str, NDArray[np.float64]]:
+        moved = {name: indications[i] + sign * u[i] * (i == cell) for i, name in enumerate(names)}
+        return apply_record(record, moved, units=units)
+
+    pairs = [(loads(cell, 1.0), loads(cell, -1.0)) for cell in range(len(names))]
+    return {
+        fit.load: np.stack([(up[fit.load] - down[fit.load]) / 2 for up, down in pairs])
+        for fit in record.loads
+    }
+
+
+def _tare(files: Sequence[tuple[Recording, Sequence[Block]]], *, source: str) -> Tare:
+    """Return the mean of the tare rows and how sure it is.
+
+    Of one file: from the scatter of its rows, their autocorrelation included. Of several files: from the
+    scatter of the files' own tares, which a drift of the zero enters too, where that is the larger.
+    """
+    first = files[0][0]
+    names = [channel.symbol for channel in first.series if channel.role == "indication"]
+    rows = [
+        np.stack([np.concatenate([recording[name].values[b.rows] for b in blocks]) for name in names])
+        for recording, blocks in files
+    ]
+    every_row = np.concatenate(rows, axis=1)
+    u = np.array([mean.u for mean in means(every_row)])
+    if len(rows) > 1:
+        block_means = np.array([row.mean(axis=1) for row in rows])
+        u = np.maximum(u, block_means.std(axis=0, ddof=1) / np.sqrt(len(rows)))
+    values = every_row.mean(axis=1)
+    unit = next(channel.unit for channel in first.series if channel.role == "indication")
+    return Tare(
+        source=source,
+        values=tuple(zip(names, values.tolist(), strict=True)),
+        unit=unit,
+        u=tuple(zip(names, u.tolist(), strict=True)) if every_row.shape[1] > 1 else (),
+    )
+
+
+def _open_zero(recordings: Sequence[Recording], *, machine: Machine, record: CalibrationRecord) -> Tare:
+    """Return a missing tare: what the machine states of an untared zero, as a part of each cell's range."""
+    relative = machine.stated_uncertainty("zero").relative
+    u = []
+    for cell in record.cells:
+        ends = [abs(end) for end in (cell.minimum, cell.maximum) if end is not None]
+        # A legacy record knows no range: the largest indication of the test stands for it.
+        extent = max(ends) if ends else max(float(np.max(np.abs(r[cell.name].values))) for r in recordings)
+        u.append((cell.name, relative * extent))
+    return Tare(source="none", values=(), unit=record.indication_units[0], u=tuple(u))

@@ -51,8 +51,8 @@ def fit_figures(
 
 def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[ModelFit]) -> tuple[Plot, ...]:
     """Return curves and residuals against slip angle of every model and channel, one colour a load."""
-    from toolkit.tires.catalog import find
     from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.models import find
 
     shown, _, _ = binned(data)
     plots = []

@@ -16,10 +16,10 @@ from toolkit.effects.signals import Drive, drive
 from toolkit.errors import ConfigError
 from toolkit.inputs import TIRE_FILE, read_input
 from toolkit.publication import publication
-from toolkit.simulation.case_plan import COLUMNS, CaseParameter
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.file_tire import FileTire
 from toolkit.simulation.plan import Plan
+from toolkit.simulation.plan_file import COLUMNS, CaseParameter
 from toolkit.simulation.run import VirtualFile, VirtualTest
 from toolkit.simulation.steady import steady_of
 from toolkit.simulation.write import shown, unit_of

@@ -15,10 +15,9 @@ import numpy as np
 from toolkit.channels import Rotation
 from toolkit.effects.signals import TireForces
 from toolkit.errors import ConfigError
-from toolkit.tires import mf52, mf61
+from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import state
-from toolkit.tires.tir import TirFile, read_tir
-from toolkit.tires.tir_units import si_number
+from toolkit.tires.tir import TirFile, read_tir, si_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

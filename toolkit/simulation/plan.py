@@ -22,16 +22,14 @@ from toolkit.machine.default import SIMULATED_MACHINE
 from toolkit.machine.definition import Machine, load_machine
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth, RoadTruth
-from toolkit.simulation.case_plan import CasePlan
 from toolkit.simulation.cells import CellsTruth
 from toolkit.simulation.effect_text import parse_effect
 from toolkit.simulation.file_tire import FileTire, read_file_tire
 from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
-from toolkit.simulation.plan_file import Kind, PlanFile, Record, SessionTruth, TireEntries, filled
+from toolkit.simulation.plan_file import CasePlan, Kind, PlanFile, Record, SessionTruth, TireEntries, filled
 from toolkit.simulation.steps import Motion, RunSteps, protocol_runs, stated_runs
 from toolkit.simulation.tire import TireTruth
-from toolkit.tires.tir import TirFile, TirLine
-from toolkit.tires.tir_units import si_number
+from toolkit.tires.tir import TirFile, TirLine, si_number
 from toolkit.units import to_si
 
 _NEW = "SCALING_COEFFICIENTS"  # where a coefficient goes that the file leaves to its default

@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import json
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.use import UNSIGNED
@@ -34,6 +35,9 @@ SHEETS = (
     "findings",
     "raw",
 )
+
+LATER_SHEETS = ("at_angles", "points", "budgets")
+"""What the files of the first builds, before 1.0.0, had not yet."""
 
 _UNITS = {"SA": "rad", "FX": "N", "FZ": "N", "FY": "N", "MX": "N*m", "MY": "N*m", "MZ": "N*m"}
 HUB = "hub_"
@@ -74,12 +78,19 @@ def optional(value: Any) -> float | None:
     return None if value in ("", None) else float(value)
 
 
-def content_hash(result: TestResult) -> str:
-    """Return the SHA-256 of a result's canonical JSON: every number in its shortest exact form."""
+def content_hash(result: TestResult, *, before_intervals: bool = False) -> str:
+    """Return the SHA-256 of a result's canonical JSON: every number in its shortest exact form.
+
+    ``before_intervals``: as the first files had it, whose parameters have no intervals of 95 %.
+    """
     content = {
         "reduced": dataclasses.asdict(result.reduced),
         "characteristics": _characteristics(result.characteristics),
     }
+    if before_intervals:
+        for fit in content["characteristics"]["fits"]:
+            for parameter in (*_parameters(fit["FY"]), *_parameters(fit["MZ"])):
+                del parameter["interval95"]
     for condition in content["reduced"][
         "conditions"
     ]:  # nor has a test of a hub that measures FY and MZ alone
@@ -95,6 +106,10 @@ def content_hash(result: TestResult) -> str:
         del content["reduced"]["calibration"]["signature"]
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _parameters(fit: dict[str, Any] | None) -> Sequence[dict[str, Any]]:
+    return () if fit is None else fit["parameters"]
 
 
 # The lists of the first files stand in their hash even where they are empty; later ones only with entries.

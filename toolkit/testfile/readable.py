@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.characteristics.catalogue import summary
-from toolkit.characteristics.summary import summary_estimates, summary_load
+from toolkit.characteristics.model import summary_estimates, summary_load
 from toolkit.units import from_si
 
 if TYPE_CHECKING:

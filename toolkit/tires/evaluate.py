@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.estimate import Estimate
-from toolkit.tires.catalog import model
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit
+from toolkit.tires.models import model
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -23,6 +23,7 @@ from toolkit.channels import CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
+from toolkit.recording.csvfile import decimal_sign
 from toolkit.recording.safe_open import gate
 from toolkit.recording.sniff import sniff
 from toolkit.units import unit
@@ -40,6 +41,7 @@ _SYMBOLS = {
 _NEEDED = ("ET", "SA", "FZ", "FY")
 _TITLE = 10  # lines that may stand above the names
 _SEPARATORS = "\t,;"
+_POINTS_FOR_COMMAS = str.maketrans(",.", ".,")  # a point may stand between thousands: no number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -174,6 +176,8 @@ def _of_text(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
         )  # fmt: skip
     names, units, separator, rows_from = header
     rows = []
+    cells_below = (cell for line in lines[rows_from:] for cell in _cells(line, separator))
+    has_commas = decimal_sign(cells_below, separator, where=path) == ","
     for number, line in enumerate(lines[rows_from:], start=rows_from + 1):
         if not line.strip():
             continue
@@ -181,9 +185,10 @@ def _of_text(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
         if len(cells) != len(names):
             raise _cell(path, number, "the row", f"{len(cells)} cells", f"{len(names)} cells", "ragged-row")
         try:
-            rows.append(list(map(float, cells)))
+            pointed = [cell.translate(_POINTS_FOR_COMMAS) for cell in cells] if has_commas else cells
+            rows.append(list(map(float, pointed)))
         except ValueError:
-            bad = next(at for at, cell in enumerate(cells) if not _is_number(cell))
+            bad = next(at for at, cell in enumerate(pointed) if not _is_number(cell))
             raise _cell(path, number, names[bad], repr(cells[bad]), "a number", "text-cell") from None
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     return {name: (values[:, at], text) for at, (name, text) in enumerate(zip(names, units, strict=True))}

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.tires.global_model import Responses
+from toolkit.tires.global_model import Responses, parameters
 from toolkit.tires.mf_combined import Forces
-from toolkit.tires.parameter_table import parameters
 from toolkit.tires.slip import State, state
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.tires.kernel import Problems, State, assess, at_limit, sine, theta_of
-from toolkit.tires.places import median, shares
+from toolkit.tires.quality import median, shares
 from toolkit.tires.starts import pick
 
 if TYPE_CHECKING:

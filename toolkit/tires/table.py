@@ -2,9 +2,10 @@
 
     SA [deg],FZ [N],FY [N],MZ [N*m]        optional: IA [deg], P [kPa], V [km/h], FX [N], KAPPA [1], t [s]
 
-A column is called by its channel's symbol, name or alias, in any case. FZ may have either sign and
-is the load. The axis system is declared, never guessed. A column of text, named `calibration` and without a
-unit, may say how the record stands that the numbers rest on: `convert` writes it.
+Where semicolons or tabs stand between the cells, numbers may have decimal commas. A column is called by its
+channel's symbol, name or alias, in any case. FZ may have either sign and is the load. The axis system is
+declared, never guessed. A column of text, named `calibration` and without a unit, may say how the record
+stands that the numbers rest on: `convert` writes it.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
 from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
+from toolkit.recording.csvfile import decimal_sign, first_line
 from toolkit.tires.plausibility import LARGEST
 from toolkit.units import unit
 
@@ -181,8 +183,8 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
             "the table is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",
             expected=_SHAPE, next_step="save it as 'CSV UTF-8'", rule="encoding",
         ) from error  # fmt: skip
-    first = next((line for line in text.splitlines() if line.strip(" ,;\t")), "")
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;", key=first.count), strict=True)
+    separator = max(",;\t", key=first_line(text).count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
     try:
         lines = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
     except csv.Error as error:
@@ -195,7 +197,15 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
             "the table is empty", where=path, got="no text", expected=_SHAPE, next_step="check the path",
             rule="no-data",
         )  # fmt: skip
+    if decimal_sign((cell for _, cells in lines[1:] for cell in cells), separator, where=path) == ",":
+        lines[1:] = [(row, [_pointed(cell) for cell in cells]) for row, cells in lines[1:]]
     return lines
+
+
+def _pointed(cell: str) -> str:
+    """Return a number with a decimal comma as one with a point; anything else as it is written."""
+    pointed = cell.replace(",", ".")
+    return pointed if "." not in cell and _NUMBER.fullmatch(pointed.strip()) else cell
 
 
 def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
@@ -238,10 +248,8 @@ def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[
                 f"row {row}, column {name.strip()!r}: no number",
                 where=f"{path}, row {row}, column {name.strip()!r}",
                 got=repr(text) if text else "an empty cell",
-                expected="a finite number with a decimal point",
-                next_step="save the table again with points for decimal commas"
-                if "," in text and _NUMBER.fullmatch(text.replace(",", ".", 1))
-                else "remove or mend that row",
+                expected="a finite number, with the decimal sign of the others",
+                next_step="remove or mend that row",
                 rule="text-cell" if text else "empty-cell",
             )
         numbers.append(number)

@@ -13,13 +13,13 @@ from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.reduction.physics import departures, of_sizes
-from toolkit.tires.catalog import fit_model
 from toolkit.tires.evaluate import slope_estimate_at, value_at
 from toolkit.tires.fit import Curve, fit_curves, why_not
 from toolkit.tires.global_data import load_blocks
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit, Loss, TireModel
-from toolkit.tires.places import median, shares
+from toolkit.tires.models import fit_model
 from toolkit.tires.plausibility import size_findings
+from toolkit.tires.quality import median, shares
 from toolkit.tires.table import TireTable
 from toolkit.units import in_both
 

@@ -8,11 +8,10 @@ import numpy as np
 
 from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
-from toolkit.tires import mf52, mf61
 from toolkit.tires.mf_combined import Forces
+from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import ANGLES, Angles, state
-from toolkit.tires.tir import TirFile
-from toolkit.tires.tir_units import factors, scale, si_number
+from toolkit.tires.tir import TirFile, factors, scale, si_number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -17,8 +17,7 @@ from toolkit.findings import Finding
 from toolkit.publication import write_result
 from toolkit.tires.global_data import Measured
 from toolkit.tires.global_model import GlobalModel, GlobalParameter, ModelFit
-from toolkit.tires.tir import TirFile, TirLine
-from toolkit.tires.tir_units import SI, factors, scale
+from toolkit.tires.tir import SI, TirFile, TirLine, factors, scale
 
 FITTYP = {"mf52": 6.0, "mf61": 61.0, "mf62": 61.0}
 SIDES = ("LEFT", "RIGHT", "SYMMETRIC", "UNKNOWN")

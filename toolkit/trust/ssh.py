@@ -110,14 +110,24 @@ def _public(line: str) -> PublicKey:
     return key
 
 
-def public_object(key: PublicKey, *, where: object = None) -> PublicObject:
-    """Return the key for `cryptography`.
+@functools.lru_cache(maxsize=1024)
+def public_object(key: PublicKey) -> PublicObject:
+    """Return the key for `cryptography`; a key has one spelling, so that nobody enrols one as two.
 
     Raises
     ------
     TrustError
         ``weak-key``
     """
+    from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+
+    public = _read_public(key)
+    if public.public_bytes(Encoding.OpenSSH, PublicFormat.OpenSSH).decode() != key.line:
+        raise _refused(f"another spelling of a {key.kind} key", "the key as ssh-keygen writes it")
+    return public
+
+
+def _read_public(key: PublicKey) -> PublicObject:
     from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
 
     parts = _Reader(key.blob).skip()
@@ -130,21 +140,19 @@ def public_object(key: PublicKey, *, where: object = None) -> PublicObject:
             exponent, modulus = parts.integer(), parts.integer()
             parts.end()
             if modulus.bit_length() < RSA_BITS:
-                raise _refused(
-                    f"RSA with {modulus.bit_length()} bits", f"Ed25519, or RSA from {RSA_BITS}", where
-                )
+                raise _refused(f"RSA with {modulus.bit_length()} bits", f"Ed25519, or RSA from {RSA_BITS}")
             return rsa.RSAPublicNumbers(exponent, modulus).public_key()
         if key.kind in _CURVES:
             name, curve, _digest = _CURVES[key.kind]
             if parts.string().decode() != name:
-                raise _refused(f"another curve in {key.kind}", name, where)
+                raise _refused(f"another curve in {key.kind}", name)
             point = parts.string()
             parts.end()
             curves = {"secp256r1": ec.SECP256R1(), "secp384r1": ec.SECP384R1(), "secp521r1": ec.SECP521R1()}
             return ec.EllipticCurvePublicKey.from_encoded_point(curves[curve], point)
     except (ValueError, BadSignatureError) as error:
-        raise _refused(f"a damaged {key.kind} key", "a public key", where) from error
-    raise _refused(key.kind, "ssh-ed25519, ecdsa-sha2-nistp256, or ssh-rsa from 3072 bits", where)
+        raise _refused(f"a damaged {key.kind} key", "a public key") from error
+    raise _refused(key.kind, "ssh-ed25519, ecdsa-sha2-nistp256, or ssh-rsa from 3072 bits")
 
 
 def public_of(private: PrivateObject) -> PublicKey:

@@ -95,11 +95,11 @@ def test_an_issue_changes_nothing_that_an_audit_rests_on_and_a_lost_key_does(hom
     _issue(_registry(home, "anna"))
     assert _registry(home).digest("m15-virtual") == before
     people = _people()
-    enrol(home / "calibrations", people, [KEYS["ben"]], by="ben", reason="again", heads={})
+    enrol(home / "calibrations", people, [KEYS["ben"]], by="ben", reason="again")
     assert _registry(home).digest("m15-virtual") == before
     anna = people.person[0]
     lost = replace(anna, keys=(replace(anna.keys[0], until="2026-01-01T00:00:00Z"),))
-    enrol(home / "calibrations", people.with_person(lost), [KEYS["ben"]], by="ben", reason="lost", heads={})
+    enrol(home / "calibrations", people.with_person(lost), [KEYS["ben"]], by="ben", reason="lost")
     changed = _registry(home).digest("m15-virtual")
     assert changed != before
     withdraw(_registry(home, "ben"), RECORD, on=date(2026, 11, 21), reason="not traceable", by="ben")

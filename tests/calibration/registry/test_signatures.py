@@ -67,11 +67,8 @@ def _registry(home: Path, *signers: str) -> Registry:
 
 def _found(home: Path, policy: Policy | None = None) -> None:
     registry = _registry(home)
-    heads = {
-        name: (len(registry.ledger(name).entries), registry.head(name)) for name in registry.instruments()
-    }
     signers = [KEYS["anna"], KEYS["ben"]]
-    enrol(registry.folder, _people(policy), signers, by="anna", reason="first enrolment", heads=heads)
+    enrol(registry.folder, _people(policy), signers, by="anna", reason="first enrolment")
 
 
 def _withdraw(home: Path, *signers: str) -> Registry:
@@ -147,7 +144,7 @@ def test_two_signatures_are_of_two_people(home: Path) -> None:
 
 def test_the_first_enrolment_takes_two_heads(home: Path) -> None:
     with pytest.raises(TrustError) as refusal:
-        enrol(home / "calibrations", _people(), [KEYS["anna"]], by="anna", reason="first", heads={})
+        enrol(home / "calibrations", _people(), [KEYS["anna"]], by="anna", reason="first")
     assert refusal.value.rule == "not-allowed"
     assert not place_of(home / "calibrations").exists()
 
@@ -156,8 +153,8 @@ def test_people_are_changed_by_a_head_alone(home: Path) -> None:
     _found(home)
     people = _people()
     with pytest.raises(TrustError):
-        enrol(home / "calibrations", people, [KEYS["dora"]], by="dora", reason="x", heads={})
-    log = enrol(home / "calibrations", people, [KEYS["ben"]], by="ben", reason="x", heads={})
+        enrol(home / "calibrations", people, [KEYS["dora"]], by="dora", reason="x")
+    log = enrol(home / "calibrations", people, [KEYS["ben"]], by="ben", reason="x")
     assert len(log.history.versions) == 2
 
 
@@ -255,7 +252,7 @@ def test_another_root_does_not_take_over(home: Path) -> None:
         for name in ("anna", "ben")
     ))  # fmt: skip
     with pytest.raises(TrustError):
-        enrol(home / "calibrations", own, [KEYS["mallory"]], by="anna", reason="x", heads={})
+        enrol(home / "calibrations", own, [KEYS["mallory"]], by="anna", reason="x")
 
 
 def test_a_changed_people_file_is_damage(home: Path) -> None:
@@ -282,7 +279,6 @@ def test_what_a_lost_key_signed_after_its_loss_decides_nothing_and_before_it_hol
             [KEYS["ben"]],
             by="ben",
             reason="lost",
-            heads={},
         )
         registry = _registry(home)
         if until == time:
@@ -326,7 +322,6 @@ def test_the_people_who_signed_a_record_are_named(tmp_path: Path, make_session: 
         [KEYS["anna"]],
         by="anna",
         reason="x",
-        heads={},
     )
     assert _registry(tmp_path).signature("hub-r1") == "unsigned"
 

@@ -15,8 +15,7 @@ import toolkit
 from toolkit.calibration.registry import gates, judgement
 from toolkit.examples.fig4_4 import ROWS, SYMBOLS
 from toolkit.files import read_toml
-from toolkit.qualification.gates import bench, virtual_hub
-from toolkit.qualification.gates.run import check_gates, demonstrations
+from toolkit.qualification.gates import bench, check_gates, demonstrations, virtual_hub
 from toolkit.qualification.gates.values import FIGURE
 from toolkit.qualification.model import Check
 from toolkit.qualification.numbers import FOLDER

@@ -14,12 +14,12 @@ import toolkit
 from tests.conftest import SHARED_DATA
 from tests.tires.fmu.fmu_factory import grid, outputs_of
 from toolkit.errors import ConfigError
-from toolkit.tires.catalog import find
 from toolkit.tires.fmu import archive
 from toolkit.tires.fmu.archive import fmu_of
 from toolkit.tires.fmu.equations import equations_of_file, equations_of_fit
 from toolkit.tires.global_data import measured
 from toolkit.tires.global_model import ModelFit, make_rows
+from toolkit.tires.models import find
 from toolkit.tires.tir import parse_tir, read_tir
 from toolkit.tires.tir_evaluate import evaluate_tir
 

@@ -5,10 +5,10 @@ import pytest
 
 from tests.conftest import SHARED_DATA
 from toolkit.simulation.tire import aligning_moment, lateral_force
-from toolkit.tires.catalog import find
 from toolkit.tires.global_data import measured
 from toolkit.tires.global_fit import fit_global
 from toolkit.tires.global_model import make_rows
+from toolkit.tires.models import find
 
 F0 = 3705.0
 # A passenger tire in each model's words.

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from toolkit.tires.catalog import find
 from toolkit.tires.global_data import measured
 from toolkit.tires.global_fit import fit_global
 from toolkit.tires.global_model import make_rows
+from toolkit.tires.models import find
 from toolkit.tires.models.pacejka94 import aligning, lateral
 
 MODEL = find("pacejka94")

@@ -117,7 +117,7 @@ def _second_home(place: Path) -> Path:
     again = parse_people(text.replace(SINCE, "2020-01-01T00:00:01Z").encode(), where=home)
     with mock.patch.object(people_log, "now", return_value="2025-10-01T00:00:01Z"):
         heads = [KEYS["anna"], KEYS["ben"]]
-        enrol(home / "calibrations", again, heads, by="anna", reason="first enrolment", heads={})
+        enrol(home / "calibrations", again, heads, by="anna", reason="first enrolment")
     for event, name, action in DECISIONS:
         decide(home, event, name, action=action)
     return home
@@ -180,7 +180,7 @@ def _founded_by_stranger() -> bool:
         (other / "calibrations").mkdir(parents=True)
         with mock.patch.object(people_log, "now", return_value="2025-10-01T00:00:00Z"):
             heads = [thieves["anna"], thieves["ben"]]
-            enrol(other / "calibrations", People(person=persons), heads, by="anna", reason="x", heads={})
+            enrol(other / "calibrations", People(person=persons), heads, by="anna", reason="x")
         with mock.patch.dict(KEYS, thieves):
             for event, name, action in DECISIONS:
                 decide(other, event, name, action=action)

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from cryptography.hazmat.primitives import hashes
-from cryptography.hazmat.primitives.asymmetric import dsa, padding, rsa
+from cryptography.hazmat.primitives.asymmetric import dsa, ec, padding, rsa
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
 from tests.trust.forgeries.changes import Forgery
 from tests.trust.forgeries.laboratory import (
@@ -19,6 +20,7 @@ from tests.trust.forgeries.laboratory import (
     RIG,
     believed,
     decide,
+    key_of,
     laboratory,
     lines_of,
     new_signer,
@@ -30,7 +32,7 @@ from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
 from toolkit.trust.decisions import unsigned
-from toolkit.trust.people import NAMESPACE, Key, People, Person
+from toolkit.trust.people import NAMESPACE, RECOVERY, Key, People, Person
 from toolkit.trust.ssh import MAGIC, PublicKey, parse_public
 
 _WITH = {"stranger": "mallory", "expired": "expired", "not yet valid": "later", "another role": "emil"}
@@ -64,6 +66,10 @@ def forgeries() -> Iterator[Forgery]:
             kind="self-approval", what=f"operator {text} in the session, entered by carl, approved by dora",
             accepted=functools.partial(_self_approved, "carl", "dora", operator=text),
         )  # fmt: skip
+    yield Forgery(
+        kind="self-approval", what="entered by anna, approved by the recovery key that she keeps",
+        accepted=_by_recovery,
+    )  # fmt: skip
     yield Forgery(kind="one person twice", what="two keys of one head", accepted=_two_keys)
     for until in ("2026-02-28T00:00:00Z", "2026-03-01T12:00:00Z"):
         yield Forgery(
@@ -112,6 +118,23 @@ def _self_approved(entered: str, name: str, operator: str = "somebody else") -> 
     return True
 
 
+def _by_recovery() -> bool:
+    approval = {**DECISIONS[1][0], "id": "rig-r9", "by": RECOVERY}
+    with laboratory() as home:
+        registry = Registry(home / "calibrations")
+        version = registry.people().history.now
+        assert version is not None
+        kept = Person(id=RECOVERY, name="Recovery key", roles=("head",), keys=(key_of("thief"),))
+        people = version.people.with_person(kept)
+        enrol(registry.folder, people, [KEYS["anna"]], by="anna", reason="kept apart")
+        decide(home, {**DECISIONS[0][0], "id": "rig-r9", "by": "somebody"}, "anna")
+        try:
+            decide(home, approval, "thief")
+        except ToolkitError:
+            return False
+    return True
+
+
 def _two_keys() -> bool:
     """Tell whether two keys of one person found a laboratory, which takes two heads."""
     keys = tuple(Key(key=KEYS[name].public.line, since="2020-01-01T00:00:00Z") for name in ("anna", "thief"))
@@ -120,9 +143,7 @@ def _two_keys() -> bool:
         new = home.parent / "new" / "calibrations"
         new.mkdir(parents=True)
         try:
-            enrol(
-                new, People(person=(person,)), [KEYS["anna"], KEYS["thief"]], by="anna", reason="x", heads={}
-            )
+            enrol(new, People(person=(person,)), [KEYS["anna"], KEYS["thief"]], by="anna", reason="x")
         except ToolkitError:
             return False
     return True
@@ -138,7 +159,7 @@ def _revoked_decides(until: str) -> bool:
         assert dora is not None
         lost = tuple(Key(key=key.key, since=key.since, until=max(key.since, until)) for key in dora.keys)
         people = version.people.with_person(Person(id="dora", name=dora.name, roles=dora.roles, keys=lost))
-        enrol(registry.folder, people, [KEYS["ben"]], by="ben", reason="lost", heads={})
+        enrol(registry.folder, people, [KEYS["ben"]], by="ben", reason="lost")
         return any(entry.event == "approved" for entry in Registry(registry.folder).ledger(RIG).of("rig-r1"))
 
 
@@ -173,9 +194,15 @@ def _dsa() -> dsa.DSAPrivateKey:
     return dsa.generate_private_key(key_size=2048)
 
 
-def _rsa_blob(bits: int) -> bytes:
-    numbers = _rsa(bits).public_key().public_numbers()
-    return _string(b"ssh-rsa") + _number(numbers.e) + _number(numbers.n)
+def _rsa_blob(bits: int, exponent: bytes = b"\1\0\1") -> bytes:
+    return _string(b"ssh-rsa") + _string(exponent) + _number(_rsa(bits).public_key().public_numbers().n)
+
+
+def _point(form: PublicFormat) -> str:
+    kind = b"ecdsa-sha2-nistp256"
+    point = ec.derive_private_key(7, ec.SECP256R1()).public_key().public_bytes(Encoding.X962, form)
+    blob = _string(kind) + _string(b"nistp256") + _string(point)
+    return f"{kind.decode()} {base64.b64encode(blob).decode()}"
 
 
 def _dsa_blob() -> bytes:
@@ -218,6 +245,8 @@ PUBLIC = {
     "RSA of 1024 bits": lambda: PublicKey("ssh-rsa", _rsa_blob(1024)).line,
     "RSA of 2048 bits": lambda: PublicKey("ssh-rsa", _rsa_blob(2048)).line,
     "DSA": lambda: PublicKey("ssh-dss", _dsa_blob()).line,
+    "another spelling, of an RSA key": lambda: PublicKey("ssh-rsa", _rsa_blob(3072, b"\0\0\1\0\1")).line,
+    "another spelling, of a point": lambda: _point(PublicFormat.CompressedPoint),
 }
 
 

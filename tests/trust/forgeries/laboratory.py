@@ -91,7 +91,7 @@ def _founded() -> Path:
     for month, reason in enumerate(("first enrolment", "another policy", "a third version"), start=10):
         with mock.patch.object(people_log, "now", return_value=f"2025-{month}-01T00:00:00Z"):
             signers = [KEYS["anna"], KEYS["ben"]]
-            enrol(home / "calibrations", people(), signers, by="anna", reason=reason, heads={})
+            enrol(home / "calibrations", people(), signers, by="anna", reason=reason)
     for event, name, action in DECISIONS:
         decide(home, event, name, action=action)
     return home

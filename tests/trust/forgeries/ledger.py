@@ -115,7 +115,7 @@ def _ledger_believed(lines: Lines) -> bool:
     except (TypeError, ValueError):
         return False  # no text of a ledger
     ledger, log = parse_ledger(text, head), _log_of_people()
-    return ledger.damage is None and unproved(ledger, log.history, log.taken_over(RIG)) is None
+    return ledger.damage is None and unproved(ledger, log.history, log.places(RIG)) is None
 
 
 def _log_believed(lines: Lines) -> bool:

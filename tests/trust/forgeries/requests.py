@@ -114,7 +114,7 @@ def _after_people() -> bool:
         version = registry.people().history.now
         assert version is not None
         people = replace(version.people, policy=Policy(issue=Demand(roles=("head",))))
-        enrol(registry.folder, people, [KEYS["anna"]], by="anna", reason="another policy", heads={})
+        enrol(registry.folder, people, [KEYS["anna"]], by="anna", reason="another policy")
         return entered(home, text)
 
 

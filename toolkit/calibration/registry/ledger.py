@@ -33,11 +33,9 @@ _MOST = 32  # forms: a ledger has some ten
 _DECODE = json.JSONDecoder().raw_decode
 _NUMBER, _TAKEN = "seq", "sha256"
 _BEFORE, _BEHIND = len(f'"{_TAKEN}":"'), len('",')  # around the hash: an entry has a time, so a comma follows
-_TEXT = r'[^"\\\x00-\x1f]*+'  # with nothing that JSON escapes
+_TEXT = '[^"]*+'  # of a line in which nothing is escaped
+_PLAIN = bytes(byte for byte in range(0x20, 0x100) if byte != ord("\\"))
 _INTEGER = "(0|[1-9][0-9]*+)"
-
-Parts = tuple[dict[str, Any], str]
-"""The entries of a line, and its text without the entry ``sha256``: what that is the hash of."""
 
 
 class LineForm:
@@ -49,25 +47,37 @@ class LineForm:
         for name, value in body.items():
             part = f'"({_TEXT})"' if type(value) is str else f"({_form_of(value)})"
             rows.append(f"{re.escape(canonical(name))}:{_INTEGER if name == _NUMBER else part}")
-        self._match = re.compile(rf"\{{{','.join(rows)}\}}").fullmatch
+        self.match = re.compile(rf"\{{{','.join(rows)}\}}").fullmatch
         self._names = tuple(map(sys.intern, body))
         self._taken = 1 + self._names.index(_TAKEN)
         others = {name: body[name] for name in body if name != _NUMBER and type(body[name]) is not str}
         self._empty = {name: value for name, value in others.items() if not value}
         self._deep = [name for name, value in others.items() if value]
+        self._days = [name for name in _DAYS if body.get(name) is not None]
+        self._lists = [name for name in _LISTS if name in body]
 
-    def parts(self, text: str) -> Parts | None:
-        """Return the parts of a line; None where it has another form."""
-        match = self._match(text)
-        if match is None:
-            return None
+    def parts(self, text: str, match: re.Match[str]) -> Parts:
+        """Return the parts of a line that matches."""
         body: dict[str, Any] = dict(zip(self._names, match.groups(), strict=False))  # a group for each name
         body[_NUMBER] = int(body[_NUMBER])
-        body.update(self._empty)
+        if self._empty:
+            body.update(self._empty)
         for name in self._deep:
             body[name] = json.loads(body[name])
         start, end = match.span(self._taken)
-        return body, text[: start - _BEFORE] + text[end + _BEHIND :]
+        return self, body, text[: start - _BEFORE] + text[end + _BEHIND :]
+
+    def finish(self, body: dict[str, Any]) -> None:
+        """Make of the entries of such a line what `Entry` has: days, and lists that nobody changes."""
+        for name in self._days:
+            body[name] = date.fromisoformat(body[name])
+        for name in self._lists:
+            body[name] = tuple(body[name])
+
+
+Parts = tuple[LineForm | None, dict[str, Any], str]
+"""The form of a line where it is known, its entries, and its text without the entry ``sha256``: what that is
+the hash of."""
 
 
 def _form_of(value: object) -> str:
@@ -89,36 +99,48 @@ class LineForms:
     def __init__(self) -> None:
         self._forms: tuple[LineForm, ...] = ()  # replaced, never changed: threads read ledgers
 
-    def read(self, text: str) -> tuple[Parts, bool]:
-        """Return the parts of a line, and whether it has the form of an earlier one.
+    def read(self, line: bytes) -> Parts:
+        """Return the parts of a line.
 
         Raises
         ------
         ValueError, KeyError, RecursionError
             it is no canonical JSON object, or has no ``sha256``
         """
-        for form in self._forms:
-            if (parts := form.parts(text)) is not None:
-                return parts, True
+        text = line.decode()
+        for form in () if line.translate(None, _PLAIN) else self._forms:
+            if (match := form.match(text)) is not None:
+                return form.parts(text, match)
         body, end = _DECODE(text)
         if end != len(text) or type(body) is not dict:
             raise ValueError("it is no JSON object")
         if canonical(body) != text:
             raise ValueError("its text is not canonical")
-        return _cut(text, body), False
+        entry = f'"{_TAKEN}":"{body[_TAKEN]}",'
+        before, separator, after = text.partition(entry)
+        if separator and entry not in after:
+            return None, body, before + after
+        return None, body, canonical({name: value for name, value in body.items() if name != _TAKEN})
 
-    def add(self, text: str) -> None:
-        """Remember the form of a line that `read` has read and that was an entry."""
+    def learn(self, line: bytes, body: Mapping[str, Any]) -> LineForm:
+        """Return the form of a line that was parsed, and remember it: what such a line states is of its kind.
+
+        Raises
+        ------
+        ValueError, KeyError, TypeError
+            an entry is not of its kind
+        """
+        for key, value in body.items():
+            if type(value) not in _TYPES[key]:
+                raise ValueError(f"{key} is {value!r}")
+        Entry(**body)
+        for row in body.get("signatures", ()):
+            if type(row) is not dict or {*row} != SIGNATURE or not all(type(row[key]) is str for key in row):
+                raise ValueError("a signature states more than its person, its key and its purpose")
+        form = LineForm(line.decode())
         if len(self._forms) < _MOST:
-            self._forms = (*self._forms, LineForm(text))
-
-
-def _cut(text: str, body: dict[str, Any]) -> Parts:
-    entry = f'"{_TAKEN}":"{body[_TAKEN]}",'
-    before, separator, after = text.partition(entry)
-    if separator and entry not in after:
-        return body, before + after
-    return body, canonical({name: value for name, value in body.items() if name != _TAKEN})
+            self._forms = (*self._forms, form)
+        return form
 
 
 LEDGER = "ledger.jsonl"
@@ -148,8 +170,9 @@ class Entry:
     ``discarded``: ``known_on``, ``by``, ``reason``: the end of a candidate that was never approved.
     ``issued``: ``by``, ``document``: what left the laboratory, its ``name``, the hash ``content`` of what it
     says, and the hashes of its files (`registry.issuing`).
-    ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file); the first one has ``heads``:
-    count and last hash of every ledger until then, whose lines need no signature.
+    ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file), ``heads``: count and last hash
+    of every ledger until then, nothing of one that was damaged; older lines but the first have none. Lines
+    before the first one need no signature.
 
     ``clock``: whether a time server kept the clock of the computer that wrote the line; older lines have
     none.
@@ -324,31 +347,17 @@ def _uncollected() -> Iterator[None]:
 
 
 def _entry(line: bytes, number: int, prev: str) -> Entry:
-    text = line.decode("utf-8")
-    (body, remainder), is_known = _FORMS.read(text)
+    form, body, remainder = _FORMS.read(line)
     if hashlib.sha256(remainder.encode()).hexdigest() != body["sha256"]:
         raise ValueError("its hash does not match")
     if body["seq"] != number or body["prev"] != prev:
         raise ValueError("it does not follow the line before")
     if body["event"] not in EVENTS:
         raise ValueError(f"unknown event {body['event']!r}")
-    if not is_known:
-        for key, value in body.items():
-            if type(value) not in _TYPES[key]:
-                raise ValueError(f"{key} is {value!r}")
-        Entry(**body)
-        _FORMS.add(text)
+    form = form or _FORMS.learn(line, body)
     moment(body["time"])
     body["prev"] = prev  # the same text once in memory, not twice
-    for key in _DAYS:
-        if body.get(key) is not None:
-            body[key] = date.fromisoformat(body[key])
-    for key in _LISTS:
-        if key in body:
-            body[key] = tuple(body[key])
-    for row in body.get("signatures", ()):
-        if type(row) is not dict or {*row} != SIGNATURE or not all(isinstance(row[key], str) for key in row):
-            raise ValueError("a signature states more than its person, its key and its purpose")
+    form.finish(body)
     parsed = object.__new__(Entry)
     object.__setattr__(parsed, "__dict__", body)
     return parsed

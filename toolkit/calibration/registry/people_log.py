@@ -2,10 +2,15 @@
 
 It lies beside the calibrations, ``people/`` in the laboratory's home. ``people.toml`` in the home is what
 people read: the newest version. What is typed into it is no decision, and `verify` says so.
+
+An entry names count and last hash of every ledger at that time. What was decided before a version and what
+after it is thereby a matter of places: a stolen key cannot write a line that states a time before its end,
+nor can a ledger lose a line that a version has seen.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +19,8 @@ from typing import Any
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.ledger import START, Ledger
-from toolkit.calibration.registry.signatures import unproved
+from toolkit.calibration.registry.lock import writing
+from toolkit.calibration.registry.signatures import Place, unproved
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import sha256_bytes, write_atomic
@@ -25,21 +31,26 @@ from toolkit.trust.signing import HERE, Signing, Travel
 from toolkit.trust.ssh import PublicKey
 
 FOLDER = "people"
+_NO_LINES = {"count": 0, "sha256": START}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PeopleLog:
     """The people of a laboratory over time.
 
-    ``heads``: count and last hash of each ledger at the time of the first enrolment.
+    ``heads``: of each version, count and last hash of each ledger when it was entered.
     """
 
     history: History
-    heads: Mapping[str, tuple[int, str]]
+    heads: tuple[Mapping[str, Mapping[str, Any]] | None, ...]
 
-    def taken_over(self, instrument: str) -> tuple[int, str]:
-        """Return count and last hash of an instrument's lines that need no signature."""
-        return self.heads.get(instrument, (0, START))
+    def places(self, instrument: str) -> tuple[Place | None, ...]:
+        """Return of each version how many lines an instrument had, and their last hash; None: not known."""
+        return tuple(
+            None if heads is None or not (row := heads.get(instrument, _NO_LINES))
+            else (int(row["count"]), str(row["sha256"]))
+            for heads in self.heads
+        )  # fmt: skip
 
 
 def place_of(calibrations: Path) -> Path:
@@ -57,27 +68,47 @@ def read_people(calibrations: Path) -> PeopleLog:
     """
     folder = place_of(calibrations)
     if not folder.is_dir():
-        return PeopleLog(history=History(), heads={})
+        return PeopleLog(history=History(), heads=())
     ledger = settled.read(folder)
     if ledger.damage is not None:
         raise _damaged(folder, ledger.damage)
     history = _history(folder, ledger)
     if history.now is None:
-        return PeopleLog(history=History(), heads={})
+        return PeopleLog(history=History(), heads=())
     damage = unproved(ledger, history, of_people=True) or _unfounded(ledger, history)
     if damage is not None:
         raise _damaged(folder, damage)
-    heads = {
-        name: (int(row["count"]), str(row["sha256"])) for name, row in (ledger.entries[0].heads or {}).items()
-    }
-    return PeopleLog(history=history, heads=heads)
+    return PeopleLog(history=history, heads=tuple(entry.heads for entry in ledger.entries))
+
+
+def instruments_of(calibrations: Path) -> tuple[str, ...]:
+    """Return the instruments of a registry's folder, sorted."""
+    if not calibrations.is_dir():
+        return ()
+    folders = (path for path in calibrations.iterdir() if path.is_dir() and not path.name.startswith("."))
+    return tuple(sorted(path.name for path in folders if not settled.is_empty(path)))
+
+
+def _heads(calibrations: Path, log: PeopleLog) -> dict[str, dict[str, Any]]:
+    """Return where each ledger ends, under the locks of all; nothing of one that is damaged."""
+    heads: dict[str, dict[str, Any]] = {}
+    for name in instruments_of(calibrations):
+        ledger = settled.state_of(calibrations / name).ledger
+        sound = log.history.now is None or not (
+            ledger.damage or unproved(ledger, log.history, log.places(name))
+        )
+        # Whoever revokes a thief's key does not confirm what the thief wrote.
+        heads[name] = {"count": len(ledger.entries), "sha256": ledger.head} if sound else {}
+    return heads
 
 
 def enrol(
     calibrations: Path, people: People, signers: Sequence[Signer], *, by: str, reason: str,
-    heads: Mapping[str, tuple[int, str]], lock_file: bool = False, travel: Travel = HERE,
+    lock_file: bool = False, travel: Travel = HERE,
 ) -> PeopleLog:  # fmt: skip
     """Enter a version of the people's file, signed; the first one founds the laboratory's trust.
+
+    Nobody writes to any ledger meanwhile: every later line is judged by this version.
 
     Raises
     ------
@@ -94,25 +125,28 @@ def enrol(
     time = travel.answers[0].time if travel.answers else now()
     version = version_of(data, time)  # what nobody could read again is never entered
 
-    def build(ledger: Ledger) -> Change:
-        number = len(ledger.entries) + 1
-        event: dict[str, Any] = {
-            "event": "enrolled", "id": f"people-{number}", "time": time, "by": by,
-            "reason": reason, "file": digest,
-        }  # fmt: skip
-        if number == 1:
-            event["heads"] = {name: {"count": count, "sha256": head} for name, (count, head) in heads.items()}
-        return Change(files={f"people-{number}.toml": data}, event=event)
+    with contextlib.ExitStack() as locks:
+        for name in instruments_of(calibrations):
+            locks.enter_context(writing(calibrations / name, lock_file=lock_file))
+        log = read_people(calibrations)
+        heads, before = _heads(calibrations, log), log.history
 
-    before = read_people(calibrations).history
-    if before.now is None:
-        before = History((version,))
-        if travel.request is None:
-            answered = [public for answer in travel.answers for public in answer.keys(version)]
-            _check_root(people, [*answered, *(signer.public for signer in signers)])
-    signing = Signing(history=before, signers=tuple(signers), travel=travel)
-    commit(folder, build, lock_file=lock_file, signing=signing)
-    write_atomic(calibrations.parent / FILE, data)
+        def build(ledger: Ledger) -> Change:
+            number = len(ledger.entries) + 1
+            event = {
+                "event": "enrolled", "id": f"people-{number}", "time": time, "by": by,
+                "reason": reason, "file": digest, "heads": heads,
+            }  # fmt: skip
+            return Change(files={f"people-{number}.toml": data}, event=event)
+
+        if before.now is None:
+            before = History((version,))
+            if travel.request is None:
+                answered = [public for answer in travel.answers for public in answer.keys(version)]
+                _check_root(people, [*answered, *(signer.public for signer in signers)])
+        signing = Signing(history=before, signers=tuple(signers), travel=travel)
+        commit(folder, build, lock_file=lock_file, signing=signing)
+        write_atomic(calibrations.parent / FILE, data)
     return read_people(calibrations)
 
 

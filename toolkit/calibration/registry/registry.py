@@ -17,7 +17,7 @@ from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.registry.clock import day_of, now, today
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, decisions
-from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, read_people
+from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, instruments_of, read_people
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.refit_many import reproducing
 from toolkit.calibration.registry.signatures import revoked, signature_line, unproved
@@ -81,6 +81,10 @@ class Registry:
         self.travel = travel
         self._proved: dict[tuple[str, str, str], tuple[str | None, frozenset[int]]] = {}
 
+    def travelling(self, travel: Travel) -> Registry:
+        """Return the same registry with another way to the keys elsewhere."""
+        return Registry(self.folder, lock_file=self.lock_file, signers=self.signers, travel=travel)
+
     def now(self) -> str:
         """Return the time of what is decided: of its request, where answers came back."""
         return self.travel.answers[0].time if self.travel.answers else now()
@@ -91,10 +95,7 @@ class Registry:
 
     def instruments(self) -> tuple[str, ...]:
         """Return the instruments, sorted."""
-        if not self.folder.is_dir():
-            return ()
-        folders = (path for path in self.folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-        return tuple(sorted(path.name for path in folders if not settled.is_empty(path)))
+        return instruments_of(self.folder)
 
     def ids(self, instrument: str) -> tuple[str, ...]:
         """Return the ids of an instrument, on disk or in its ledger, oldest first."""
@@ -131,9 +132,20 @@ class Registry:
             nothing is changed, or the message says what state it is in
         """
         people = self.people()
+
+        def of_these_people(ledger: Ledger) -> Change | None:
+            # Under the ledger's lock: nobody enrols anybody until the line is there.
+            if self.people().heads != people.heads:
+                raise RegistryError(
+                    "the people of the laboratory changed meanwhile", where=self.folder / instrument,
+                    got=f"{len(self.people().heads)} versions of them", expected=f"{len(people.heads)}",
+                    next_step="repeat the command; nothing was changed", rule="ledger-moved",
+                )  # fmt: skip
+            return build(ledger)
+
         return commit(
             self.folder / instrument,
-            build,
+            of_these_people,
             lock_file=self.lock_file,
             signing=Signing(history=people.history, signers=self.signers, travel=self.travel),
             judged=lambda ledger: self._judged(instrument, ledger, people),
@@ -146,7 +158,7 @@ class Registry:
         key = (instrument, ledger.head, "" if version is None else version.sha256)
         if key not in self._proved:
             self._proved[key] = (
-                unproved(ledger, people.history, people.taken_over(instrument)),
+                unproved(ledger, people.history, people.places(instrument)),
                 revoked(ledger, people.history),
             )
         damage, void = self._proved[key]

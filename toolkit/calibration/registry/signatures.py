@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
@@ -11,6 +12,7 @@ from toolkit.calibration.records.use import UNSIGNED
 from toolkit.calibration.registry.clock import check_after, clock_state, day_of
 from toolkit.calibration.registry.ledger import BRINGING, START, Entry, Ledger
 from toolkit.errors import TrustError
+from toolkit.inputs import read_regular
 from toolkit.publication import publication
 from toolkit.trust.decisions import SignedLine, action_of, signature_row, statement, unsigned, violations
 from toolkit.trust.merkle import Growing, leaf_hash
@@ -18,6 +20,9 @@ from toolkit.trust.people import Action, History
 from toolkit.trust.requested import Requested
 from toolkit.trust.requests import Request, check_same, check_standing
 from toolkit.trust.signing import HERE, Signing
+
+Place = tuple[int, str]
+"""How many lines a ledger had, and the hash of the last."""
 
 
 def timed_event(event: Mapping[str, Any], ledger: Ledger, signing: Signing | None) -> dict[str, Any]:
@@ -74,8 +79,7 @@ def signed_event(
     path = signing.travel.request
     request = Request(message=message, people=version.text, file=file, operators=operators, path=path)
     if path is not None:
-        with publication(path.parent) as stage:
-            (stage / path.name).write_text(request.text, encoding="utf-8")
+        _write(request, path, signing.travel.files)
         raise Requested(request)
     rows: list[Mapping[str, str]] = []
     publics = [signer.public for signer in signing.signers]
@@ -90,23 +94,38 @@ def signed_event(
     return {**stated, "signatures": rows}
 
 
+def _write(request: Request, path: Path, files: Sequence[Path]) -> None:
+    """Write a request and what it has hashes of, together: nobody should sign what cannot be read."""
+    with publication(path.parent) as stage:
+        (stage / path.name).write_text(request.text, encoding="utf-8")
+        for file in files:
+            documents = stage / f"{path.stem}.documents"
+            documents.mkdir(exist_ok=True)
+            (documents / file.name).write_bytes(read_regular(file))
+
+
 def unproved(
-    ledger: Ledger, history: History, taken_over: tuple[int, str] = (0, START), *, of_people: bool = False
+    ledger: Ledger, history: History, places: Sequence[Place | None] = (), *, of_people: bool = False
 ) -> str | None:
     """Say which line is no decision of the laboratory's people; None where every line is.
 
-    ``taken_over``: count and last hash of the lines that were there before anybody was enrolled.
-    ``of_people``: it is the log of people itself, in which each line is judged by the version before it.
+    ``places``: of each version of the people, count and last hash of the lines that were there before it; the
+    lines before the first one need no signature. ``of_people``: it is the log of people itself, in which each
+    line is judged by the version before it.
     """
-    count, head = taken_over
     if history.now is None:
         signed = next((entry.seq for entry in ledger.entries if entry.signatures), None)
         return None if signed is None else f"line {signed} is signed, and the log of people is missing"
-    if count > len(ledger.entries) or (count and ledger.entries[count - 1].sha256 != head):
-        return f"its first {count} lines are not those that were there when people were enrolled"
+    for number, place in enumerate(places, start=1):
+        if place is not None and _end(ledger, place[0]) != place[1]:
+            there = "" if number == 1 else f" for version {number}"
+            return (
+                f"its first {place[0]} lines are not those that were there when people were enrolled{there}"
+            )
+    unsigned_lines = places[0][0] if places and places[0] is not None else 0
     tree = Growing()
     for entry, text in zip(ledger.entries, ledger.lines, strict=True):
-        if entry.seq > count:
+        if entry.seq > unsigned_lines:
             body = json.loads(text)
             line = SignedLine(
                 seq=entry.seq,
@@ -116,11 +135,27 @@ def unproved(
                 operators=operators_of(ledger, entry.id),
                 root=tree.root(),
             )
-            reasons = violations(line, history.before(entry.seq) if of_people else history)
+            judges = history.before(entry.seq) if of_people else _enrolled_at(history, places, entry.seq)
+            reasons = violations(line, judges)
             if reasons:
                 return f"line {entry.seq} ({entry.event} {entry.id}): {'; '.join(reasons)}"
         tree.add(leaf_hash(text))
     return None
+
+
+def _end(ledger: Ledger, count: int) -> str | None:
+    """Return the hash of a line, zeros for none; None where there are fewer."""
+    if count > len(ledger.entries):
+        return None
+    return ledger.entries[count - 1].sha256 if count else START
+
+
+def _enrolled_at(history: History, places: Sequence[Place | None], seq: int) -> History:
+    """Return the versions of the people among which a line lies; one, where each version knows its place."""
+    known = [(at, place[0]) for at, place in enumerate(places) if place is not None]
+    first = max((at for at, count in known if count < seq), default=0)
+    later = (at for at, count in known if count >= seq and at > first)
+    return History(history.versions[first : min(later, default=None)])
 
 
 def revoked(ledger: Ledger, history: History) -> frozenset[int]:
@@ -130,7 +165,7 @@ def revoked(ledger: Ledger, history: History) -> frozenset[int]:
     """
     return frozenset(
         entry.seq
-        for entry in ledger.entries
+        for entry in (ledger.entries if history.now else ())
         if any(history.revoked(row["key"], entry.time) is not None for row in entry.signatures)
     )
 

@@ -32,10 +32,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.calibration.session.settings import wrong
+from toolkit.calibration.session.settings import quantity, wrong
 from toolkit.errors import SessionError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.quantity import quantity
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:

@@ -33,10 +33,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from toolkit.calibration.session.indications import RATIO, RATIO_DIMENSION, Bridge
-from toolkit.calibration.session.settings import wrong
+from toolkit.calibration.session.settings import quantity, wrong
 from toolkit.errors import UnitError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 SHUNT_TOLERANCE_PERCENT = 0.1

@@ -17,9 +17,8 @@ from typing import Any, cast
 from toolkit.calibration.records.record import ZEROS, Zero, canonical
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.files import number_expected, parse_toml, sha256_bytes
-from toolkit.machine.quantity import quantity
-from toolkit.units import unit
+from toolkit.files import is_number, number_expected, parse_toml, sha256_bytes
+from toolkit.units import si_scale, unit
 
 _ENCODER = json.JSONEncoder(
     sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False, default=str
@@ -307,3 +306,28 @@ def _plain(value: Any, where: object, key: str = "") -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         raise wrong(where, key, value, "a finite number")
     return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+
+
+def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
+    """Return ``{ value, unit }`` as a float in SI; the unit must have the dimension that is named."""
+    if not isinstance(entry, dict) or "value" not in entry or not isinstance(entry.get("unit"), str):
+        raise ConfigError(
+            "a quantity has no unit",
+            where=where,
+            got=entry,
+            expected='{ value = NUMBER, unit = "..." }',
+            next_step="write value and unit",
+            rule="no-unit",
+        )
+    number = entry["value"]
+    # A float that is not finite is refused by the caller, who knows what the number is for.
+    if not is_number(number) and (not isinstance(number, float) or math.isfinite(number)):
+        raise ConfigError(
+            "a quantity's value cannot be used", where=where, got=number,
+            expected=number_expected(number, "a number"),
+            next_step="write value as a plain number", rule="wrong-value",
+        )  # fmt: skip
+    stated = unit(entry["unit"], where=where)
+    if stated.dimension == dimension:
+        return float(number) * stated.factor + stated.offset
+    return float(number) * si_scale(entry["unit"], dimension, where=where)

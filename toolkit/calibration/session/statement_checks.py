@@ -18,10 +18,9 @@ from toolkit.calibration.session.readings import (
     shunt_entry,
     zero_entries,
 )
-from toolkit.calibration.session.settings import wrong, zero_readings
+from toolkit.calibration.session.settings import quantity, wrong, zero_readings
 from toolkit.errors import SessionError, UnitError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.quantity import quantity
 from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:

@@ -17,9 +17,8 @@ import numpy as np
 
 from toolkit.calibration.session.indications import bridge_of, bridges_of
 from toolkit.calibration.session.readings import Scope
-from toolkit.calibration.session.settings import preloads_of, zero_readings
+from toolkit.calibration.session.settings import preloads_of, quantity, zero_readings
 from toolkit.calibration.session.statement_checks import temperature_effect
-from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.diagnosis.answer.answer import FoundLaw, FoundParameter, LawCurve
 from toolkit.diagnosis.policy import LAWS, VERDICT
-from toolkit.effects.formula import formula
+from toolkit.effects.law import formula
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

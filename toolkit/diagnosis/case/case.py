@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.simulation.case_plan import CaseParameter
     from toolkit.simulation.model_file import FittedEffect
+    from toolkit.simulation.plan_file import CaseParameter
 
 Role = Literal["time", "input", "output", "covariate"]
 Kind = Literal["machine", "python", "ode", "fmu", "columns"]

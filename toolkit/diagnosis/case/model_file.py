@@ -10,8 +10,8 @@ from toolkit.diagnosis.case.case import KINDS, Simulation
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
 from toolkit.machine.default import DEFAULT_MACHINE
-from toolkit.simulation.case_plan import CaseParameter
 from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
+from toolkit.simulation.plan_file import CaseParameter
 
 
 def simulation_of(model: ModelFile) -> Simulation:

@@ -10,8 +10,8 @@ from toolkit.declared import Above, Distinct, Entry, Format, Keyed, Size, Text, 
 from toolkit.diagnosis.case.case import Kind, Simulation
 from toolkit.diagnosis.case.model_file import parameters_of, simulation_of, tire_model
 from toolkit.machine.default import DEFAULT_MACHINE
-from toolkit.simulation.case_plan import CaseParameter
 from toolkit.simulation.model_file import ModelFile, read_model
+from toolkit.simulation.plan_file import CaseParameter
 
 FORMAT = Format(
     title="case", schema=1, schema_required=True, wrong="case", missing="case", unit="case",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Pattern
-    from toolkit.simulation.case_plan import CaseParameter
+    from toolkit.simulation.plan_file import CaseParameter
 
     Stacked = dict[str, NDArray[np.float64]]
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.screen import LinearisedFit
-    from toolkit.effects.formula import Formula
+    from toolkit.effects.law import Formula
 
     Array = NDArray[np.float64]
     Stacked = dict[str, Array]

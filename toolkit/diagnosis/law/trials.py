@@ -16,8 +16,7 @@ from toolkit.diagnosis.policy import LAWS, STRUCTURE
 from toolkit.diagnosis.search.unexplained import strongest_events, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.setting import dimension
-from toolkit.effects.formula import formula
-from toolkit.effects.law import ITSELF
+from toolkit.effects.law import ITSELF, formula
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

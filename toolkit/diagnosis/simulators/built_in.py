@@ -17,7 +17,7 @@ from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.law import ITSELF, is_law
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
-from toolkit.simulation.case_plan import CaseParameter
+from toolkit.simulation.plan_file import CaseParameter
 from toolkit.units import unit
 
 if TYPE_CHECKING:

@@ -57,7 +57,7 @@ class CaseCode:
 
     def __init__(self, case: Case, limits: Limits) -> None:
         self._case, self._limits = case, limits
-        self._runs = {run: number for number, run in enumerate((*case.runs, *case.predict))}
+        self._runs = _numbers(case)
         self._make: Callable[..., Handlers] | None = None
         self._worker: Worker | None = None
         self._dead: dict[bytes, FitError] = {}
@@ -118,10 +118,10 @@ class CaseCode:
 
     def learn(self, runs: Sequence[Run]) -> None:
         """Take further runs than those of the case; the next question begins a worker that knows them."""
-        fresh = tuple(run for run in runs if run not in self._runs)
+        fresh = dict.fromkeys(run for run in runs if run not in self._runs)
         if fresh:
             self._case = dataclasses.replace(self._case, predict=(*self._case.predict, *fresh))
-            self._runs |= {run: len(self._runs) + place for place, run in enumerate(fresh)}
+            self._runs = _numbers(self._case)
             self.end()
 
     def number(self, run: Run) -> int:
@@ -196,6 +196,11 @@ class CaseCode:
             "allow more",
             rule=rule,
         )  # fmt: skip
+
+
+def _numbers(case: Case) -> dict[Run, int]:
+    """Return the numbers by which a worker knows the runs of a case: their places in it."""
+    return {run: number for number, run in enumerate((*case.runs, *case.predict))}
 
 
 @contextlib.contextmanager

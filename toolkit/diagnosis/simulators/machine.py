@@ -31,10 +31,9 @@ from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, TireForces, drive
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
-from toolkit.tires import mf52, mf61
+from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import state
-from toolkit.tires.tir import FOREIGN, TirFile, read_tir
-from toolkit.tires.tir_units import si_number
+from toolkit.tires.tir import FOREIGN, TirFile, read_tir, si_number
 from toolkit.units import unit
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,10 +63,17 @@ def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
     Where the runs' clocks go on from one to the next, they are one clock; where each run begins anew, the
     time is that within the run: what passed between runs is not known.
     """
-    starts = [run.t[0] for run in case.runs if run.rows]
-    ends = [run.t[-1] for run in case.runs if run.rows]
-    onward = all(starts[i] >= ends[i - 1] for i in range(1, len(starts)))
-    return run.t - (starts[0] if onward and starts else (run.t[0] if run.rows else 0.0))
+    starts = [known.t[0] for known in case.runs if known.rows]
+    if not starts or pauses(case.runs) is None:
+        starts = [run.t[0] if run.rows else 0.0]
+    return run.t - float(starts[0])
+
+
+def pauses(runs: Sequence[Run]) -> NDArray[np.float64] | None:
+    """Return the time between runs whose clocks go on [s]; None where a clock begins anew."""
+    spans = np.array([(run.t[0], run.t[-1]) for run in runs if run.rows]).reshape(-1, 2)
+    between = spans[1:, 0] - spans[:-1, 1]
+    return between if (between >= 0).all() else None
 
 
 def dimension(text: str) -> str:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from toolkit.effects.applied import AppliedEffect
     from toolkit.effects.effect import Effect
     from toolkit.effects.surroundings import MotionSizes
-    from toolkit.simulation.case_plan import CaseParameter
+    from toolkit.simulation.plan_file import CaseParameter
 
     Arrays = dict[str, NDArray[np.float64]]
     # Signals of an equation, (n,) by name, to force-like terms of shape (n, forces): a `TermPattern`

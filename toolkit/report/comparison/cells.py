@@ -9,7 +9,7 @@ from toolkit.characteristics.catalogue import by_name
 from toolkit.estimate import plus_minus
 
 if TYPE_CHECKING:
-    from toolkit.comparison.model import Comparison, Difference, FactorSpread, Part
+    from toolkit.comparison.model import Comparison, Difference, FactorSpread, Section
     from toolkit.estimate import Estimate
     from toolkit.report.style import Style
 
@@ -51,7 +51,7 @@ def named(name: str, rotation: str, SA_rad: float | None = None, *, title: bool 
     return f"{text}{angle}" + ("" if rotation == "both" else f", {rotation}")
 
 
-def shown_rows(comparison: Comparison, part: Part) -> tuple[tuple[Difference, ...], str]:
+def shown_rows(comparison: Comparison, part: Section) -> tuple[tuple[Difference, ...], str]:
     """Return the rows of a table that people are shown, and in words which they are.
 
     Characteristics: all of them while they are few. Forces at slip angles: the significant ones.

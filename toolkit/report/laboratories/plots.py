@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from toolkit.comparison.mandel import OUTLIER, STRAGGLER, h_limit, k_limit
+from toolkit.comparison.precision import OUTLIER, STRAGGLER, h_limit, k_limit
 from toolkit.report.content import Curve, Plot
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import columns, tables
 from toolkit.characteristics.characteristic import COLUMNS as BUDGET
-from toolkit.characteristics.summary import summary_estimates as estimates_of_summary
-from toolkit.characteristics.summary import summary_load as load_of_summary
+from toolkit.characteristics.model import summary_estimates as estimates_of_summary
+from toolkit.characteristics.model import summary_load as load_of_summary
 from toolkit.estimate import round_to_uncertainty
 from toolkit.report.content import Cell
 from toolkit.report.document import DeclaredTable, Rows

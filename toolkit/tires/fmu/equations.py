@@ -13,8 +13,8 @@ from toolkit.errors import ConfigError
 from toolkit.tires.global_model import Rows
 from toolkit.tires.mf_parameters import MF52, MF61
 from toolkit.tires.recorded import NotRecordedError, Program, record
+from toolkit.tires.tir import si_number
 from toolkit.tires.tir_evaluate import forces_of, positive
-from toolkit.tires.tir_units import si_number
 
 if TYPE_CHECKING:
     from toolkit.tires.global_data import Measured

@@ -24,8 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.tires.contact import directed, half_length, slips, with_load
-from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
-from toolkit.tires.parameter_table import CAMBER, OFFSETS, SHIFT, parameters
+from toolkit.tires.global_model import CAMBER, OFFSETS, SHIFT, GlobalModel, Responses, Rows, Seeds, parameters
 from toolkit.tires.recorded import as_array
 
 if TYPE_CHECKING:

@@ -1,13 +1,13 @@
-"""Magic Formula 6.2 over load, camber, pressure and longitudinal slip; equations in `toolkit.tires.mf61`.
+"""Magic Formula 6.2 over load, camber, pressure and longitudinal slip.
 
-For FX, FY and MZ the equations of 6.2 are those of 6.1; the files differ in FITTYP.
+For FX, FY and MZ its equations are those of 6.1 (`toolkit.tires.models.mf61`); the files differ in FITTYP.
 """
 
 from __future__ import annotations
 
 from toolkit.tires.global_model import GlobalModel
-from toolkit.tires.mf61 import forces
 from toolkit.tires.mf_parameters import MF61, mf_forces, mf_starts
+from toolkit.tires.models.mf61 import forces
 
 MODEL = GlobalModel(
     name="mf62",

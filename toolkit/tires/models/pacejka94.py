@@ -26,8 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.tires.global_model import GlobalModel, Responses
-from toolkit.tires.parameter_table import parameters
+from toolkit.tires.global_model import GlobalModel, Responses, parameters
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import nonzero, sine
 

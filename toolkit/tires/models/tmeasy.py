@@ -33,8 +33,7 @@ from typing import Any
 import numpy as np
 
 from toolkit.tires.contact import directed, slips
-from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
-from toolkit.tires.parameter_table import OFFSETS, SHIFT, parameters
+from toolkit.tires.global_model import OFFSETS, SHIFT, GlobalModel, Responses, Rows, Seeds, parameters
 
 _LEAST = 0.05  # a quadratic in load turns over far out; no value falls below this part of its law
 

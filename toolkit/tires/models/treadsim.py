@@ -30,8 +30,7 @@ import numpy as np
 
 from toolkit.tires.bristles import Tread, balance, middles, sharpened, summed
 from toolkit.tires.contact import bulged, half_length, slips, with_load
-from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
-from toolkit.tires.parameter_table import OFFSETS, SHIFT, parameters
+from toolkit.tires.global_model import OFFSETS, SHIFT, GlobalModel, Responses, Rows, Seeds, parameters
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

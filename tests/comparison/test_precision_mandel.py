@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolkit.comparison.mandel import consistencies, h_limit, k_limit
+from toolkit.comparison.precision import consistencies, h_limit, k_limit
 
 # Glucose in serum, material A, ASTM E691: eight laboratories, three results each, and its table of h and k.
 GLUCOSE = [

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from toolkit.tires import mf52, mf61
 from toolkit.tires.mf_combined import equivalent
+from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import state
 
 F0, R0 = 4000.0, 0.3

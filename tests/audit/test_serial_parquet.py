@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from tests.audit.archive_made import FY, dated, recording, write
 from toolkit.audit.archive import audit_archive
-from toolkit.audit.parquet import check_parquet, write_parquet
+from toolkit.audit.serial import check_parquet, write_parquet
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app
 from toolkit.errors import ConfigError, OutputError

@@ -7,9 +7,8 @@ from toolkit.channels import signs
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.tires.global_data import measured
 from toolkit.tires.global_fit import fit_global
-from toolkit.tires.mf61 import aligning, lateral
 from toolkit.tires.models.magic_formula import value
-from toolkit.tires.models.mf61 import MODEL
+from toolkit.tires.models.mf61 import MODEL, aligning, lateral
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_write import tir_text, tire_fit, write_tir
 

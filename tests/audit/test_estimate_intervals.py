@@ -1,8 +1,8 @@
 import numpy as np
 
 from tests.audit.audit_factory import FY, changed, columns
-from toolkit.audit.columns import columns_of
-from toolkit.audit.intervals import coefficient_intervals, interval_bounds
+from toolkit.audit.estimate import coefficient_intervals, interval_bounds
+from toolkit.audit.model import columns_of
 from toolkit.examples.fig4_4 import packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
@@ -60,7 +60,7 @@ def test_numbers_without_a_square_leave_every_coefficient_open():
 
 
 def test_the_rows_of_a_long_file_are_not_all_needed_but_all_held(monkeypatch):
-    from toolkit.audit import intervals as module
+    from toolkit.audit import estimate as module
 
     solved = []
     bounds_of = module._bounds_of
@@ -82,7 +82,7 @@ def test_the_rows_of_a_long_file_are_not_all_needed_but_all_held(monkeypatch):
 
 
 def test_one_row_of_a_long_file_that_no_equation_gives_is_not_passed_over(monkeypatch):
-    from toolkit.audit import intervals as module
+    from toolkit.audit import estimate as module
 
     file = changed(columns(rows=3000, decimals=2), "FY", 1234, 1.0)
     monkeypatch.setattr(module, "_MANY", 500)

@@ -1,0 +1,266 @@
+"""Classes of many kinds, drawn by the sealed generator: does one proposed run name the right member?
+
+    python -m tests.campaigns.sealed_classes [--minutes 30] [--cases 100] [--seed 25]
+
+Kinds of classes are those that the sealed batches left (`proof/*.jsonl.gz`), as often as they left them. A
+case of the kind is drawn anew, diagnosed, and counts where the answer has a class that holds a true effect.
+`plan next` proposes a run; beside it stand a random change within the same limits and a repeat. The
+generator's truth answers each, later than all recordings, with noise of its own; then the members are fitted
+to all recordings. Named is the one that is ahead of all others by what a diagnosis asks for.
+
+Left out, and counted: kinds that no run of such a plan can ask about (`_OUTSIDE`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from proof import draw, proof_file
+from proof import model as generated
+from proof.catalogue import CONFOUNDED
+from proof.files import write_case
+from tests.coverage.rows import exact_interval
+from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+from toolkit.diagnosis.case.case import Run
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.errors import ToolkitError
+from toolkit.planning.members import Member, class_of, members_of
+from toolkit.planning.next_run import Change, RunSearch, changed
+
+PROOFS = Path(__file__).parents[2] / "proof"
+KINDS = ("proposed", "random", "repeat")
+DIAGNOSIS_S, SEARCH_S = 600.0, 20.0  # of the clock; of the processor
+Kind = tuple[str, str, tuple[str, ...]]  # bucket, family or the class it is drawn for, effects
+
+
+def outside(sealed: Mapping[str, Any]) -> str:
+    """Return why no plan of a run can part what a sealed case holds; nothing where one can."""
+    effects = {effect["name"] for effect in sealed["effects"]}
+    if sealed["kind"] == "columns":
+        return "the simulation is a recorded column, which answers no new input"
+    if sealed["family"] in ("labview", "tire-cells"):
+        return "the cells' recordings and the record are alike in every run, or their writer is not at hand"
+    if effects & {"steer_offset", "plysteer"}:
+        return "both turn the slip angle by a constant, whatever the machine does"
+    if sealed["bucket"] in ("control", "outside"):
+        return "no effect of the catalogue is there"
+    return ""
+
+
+def kinds() -> tuple[list[Kind], Counter[str]]:
+    """Return the kinds of the classes that sealed batches left, as often, and what is left out."""
+    drawn: list[Kind] = []
+    absent: Counter[str] = Counter()
+    for path in sorted(PROOFS.glob("proof-*.jsonl.gz")):
+        batch = proof_file.read(path)
+        for name, case in batch.cases.items():
+            if case.answer is None or case.answer.get("verdict") != "equivalent":
+                continue
+            sealed = batch.sealed[name]
+            reason = outside(sealed)
+            if reason:
+                absent[reason] += 1
+                continue
+            family = next(
+                (label for label, group in CONFOUNDED.items() if sorted(group.members) == sealed["class"]),
+                sealed["family"],
+            )
+            effects = tuple(effect["name"] for effect in sealed["effects"])
+            drawn.append((sealed["bucket"], family, effects))
+    return drawn, absent
+
+
+def problem(case: Path) -> Problem:
+    """Return the problem of a case, its code run in this process."""
+    read = read_case(case)
+    return problem_of(read, model_of(read, None))
+
+
+def carried_out(
+    drawn: draw.Drawn, run: Run, name: str, rng: np.random.Generator
+) -> tuple[generated.Run, dict[str, np.ndarray]]:
+    """Return a planned run and what the truth records of it, after all that was recorded before."""
+    s = drawn.scenario
+    base = next(known for known in s.runs if known.name == name)
+    fine = dict(base.fine)
+    later = float(run.t[0] - base.rows[0])  # as the plan has it: after all that was recorded
+    for channel, declared in s.channels.items():
+        if declared.role in ("input", "covariate") and channel in fine and channel in run.columns:
+            fine[channel] = np.interp(fine["t"], run.t - later, run.columns[channel])
+    if s.family == "drive-force":  # the path is not recorded: it follows the velocity
+        fine["x"] = np.cumsum(fine["v"]) * (fine["t"][1] - fine["t"][0])
+    fine["t"] = fine["t"] + later
+    there = dataclasses.replace(
+        base, name="next.csv", fine=fine, rows=base.rows + later, conditions=run.conditions
+    )
+    alone = dataclasses.replace(s, runs=(there,))
+    before = draw._before_converter(alone, s.true_parameters(), drawn.effects)
+    if s.driven:
+        there = s.driven(there, drawn.effects)
+    return there, draw._recorded(alone, before[0], drawn.effects, 0.0, rng)
+
+
+def with_run(drawn: draw.Drawn, run: Run, name: str, folder: Path, rng: np.random.Generator) -> Problem:
+    """Return the problem with one more run, as the truth answers it."""
+    more, outputs = carried_out(drawn, run, name, rng)
+    s = dataclasses.replace(drawn.scenario, runs=(*drawn.scenario.runs, more))
+    write_case(s, [*drawn.measured, outputs], folder)
+    return problem(folder / "CASE.toml")
+
+
+def random_change(search: RunSearch, rng: np.random.Generator) -> Change:
+    """Return a change of a recording in every factor at random, within the limits."""
+    while True:
+        change = Change(run=search.problem.runs[0].name)
+        for place in range(len(search.factors(change))):
+            alternatives = search.factors(change)[place]
+            change = alternatives[int(rng.integers(len(alternatives)))]
+        if changed(search.problem, change, search.limits) is not None:
+            return change
+
+
+def named(members: tuple[Member, ...]) -> str | None:
+    """Return the effect of the member that is ahead of all others by what a diagnosis asks for."""
+    first, second = members[:2]
+    ahead = first.fit.log_posterior - second.fit.log_posterior > VERDICT.close
+    return first.fit.active[-1].effect.name if ahead else None
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """A class, what the plan said of it, and what was named after each kind of run."""
+
+    kind: Kind
+    members: tuple[str, ...]
+    true: str
+    power: float
+    together: tuple[tuple[str, str], ...]
+    named: dict[str, str | None]
+    steps: str
+
+
+def one(kind: Kind, number: int, seed: int, folder: Path) -> Outcome | str:
+    """Return the outcome of a case, or why it does not count."""
+    bucket, family, effects = kind
+    # Of one effect the sizes of two: a tenth of the noise, as a single one may be, leaves no answer.
+    sizes = "confounded" if bucket == "confounded" else "two"
+    drawn = draw.draw_case(seed, number, sizes, compare=False, picked=(family, effects))
+    write_case(drawn.scenario, drawn.measured, folder / "before")
+    case = folder / "before" / "CASE.toml"
+    diagnosis = diagnose(read_case(case), None, budget_s=DIAGNOSIS_S, limits=None).diagnosis
+    found = next((effect for effect in diagnosis.effects if effect.equivalent_to), None)
+    if found is None:
+        return f"no class: {diagnosis.verdict}"
+    true = [name for name in effects if name in (found.name, *found.equivalent_to)]
+    if len(true) != 1:
+        return "no true effect in the class"
+    return _after(kind, drawn, diagnosis, class_of(diagnosis, case), true[0], case, seed, number)
+
+
+def _after(
+    kind: Kind, drawn: draw.Drawn, diagnosis: Diagnosis, effect: FoundEffect, true: str, case: Path,
+    seed: int, number: int,
+) -> Outcome | str:  # fmt: skip
+    rng = np.random.default_rng([seed, number, 1])
+    posed = problem(case)
+    members = members_of(posed, diagnosis, effect)
+    ends = time.process_time() + SEARCH_S
+    # What has a temperature was set in these plants: a limit says that it can be set again.
+    set_again = {"T", "TA"} & {channel.name for channel in posed.case.drivers}
+    limits = {name: _recorded(posed, name) for name in set_again}
+    search = RunSearch(
+        problem=posed, members=members, limits=limits, until=lambda: time.process_time() < ends
+    )
+    best = search.best()
+    chosen = search.judge(best)
+    if chosen is None:
+        return "no run can be simulated"
+    names: dict[str, str | None] = {}
+    for label, change in zip(
+        KINDS, (best, random_change(search, rng), Change(run=best.run)), strict=True
+    ):  # fmt: skip
+        run = changed(posed, change, limits)
+        assert run is not None
+        more = with_run(drawn, run, change.run, case.parents[1] / label, rng)
+        try:
+            names[label] = named(members_of(more, diagnosis, effect))
+        except ToolkitError:
+            names[label] = None
+    return Outcome(
+        kind=kind, members=tuple(member.fit.active[-1].effect.name for member in members), true=true,
+        power=chosen.power, together=chosen.together, named=names, steps="; ".join(best.words()),
+    )  # fmt: skip
+
+
+def _recorded(posed: Problem, name: str) -> tuple[float, float]:
+    columns = [run.columns[name] for run in posed.case.runs]
+    return min(float(np.nanmin(c)) for c in columns), max(float(np.nanmax(c)) for c in columns)
+
+
+def outcomes(cases: int, minutes: float, seed: int) -> Iterator[Outcome | str]:
+    """Yield the outcomes of drawn cases, until so many count or the processor has had its minutes."""
+    listed, _ = kinds()
+    ends = time.process_time() + 60 * minutes
+    counted = number = 0
+    while counted < cases and time.process_time() < ends:
+        kind = listed[int(np.random.default_rng([seed, number]).integers(len(listed)))]
+        with tempfile.TemporaryDirectory() as folder:
+            outcome = one(kind, number, seed, Path(folder))
+        number += 1
+        counted += isinstance(outcome, Outcome)
+        yield outcome
+
+
+def table(rows: list[Outcome]) -> str:
+    """Return how many are right, wrong and open after each kind of run."""
+    lines = ["| run | right | 95 % | wrong | open |", "|---|---|---|---|---|"]
+    for label in KINDS:
+        right = sum(row.named[label] == row.true for row in rows)
+        none = sum(row.named[label] is None for row in rows)
+        low, high = exact_interval(right, len(rows))
+        lines.append(
+            f"| {label} | {right} of {len(rows)} ({100 * right / max(len(rows), 1):.0f} %) "
+            f"| {100 * low:.0f} to {100 * high:.0f} | {len(rows) - right - none} | {none} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Print every outcome as it comes, then the table."""
+    parser = argparse.ArgumentParser(prog="python -m tests.campaigns.sealed_classes", description=__doc__)
+    parser.add_argument("--cases", type=int, default=100)
+    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--seed", type=int, default=25)
+    given = parser.parse_args()
+    listed, absent = kinds()
+    sys.stdout.write(f"{len(listed)} classes of sealed batches; left out: {dict(absent)}\n")
+    rows: list[Outcome] = []
+    uncounted: Counter[str] = Counter()
+    for outcome in outcomes(given.cases, given.minutes, given.seed):
+        if isinstance(outcome, str):
+            uncounted[outcome] += 1
+            sys.stdout.write(f"  not counted: {outcome}\n")
+        else:
+            rows.append(outcome)
+            sys.stdout.write(f"  {pd.Series(dataclasses.asdict(outcome)).to_dict()}\n")
+        sys.stdout.flush()
+    sys.stdout.write(f"{table(rows)}\nnot counted: {dict(uncounted)}\n")
+
+
+if __name__ == "__main__":
+    main()
