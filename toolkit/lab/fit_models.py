@@ -317,7 +317,7 @@ def fit_options(loss: str, weights: str, rated_load: float | None, radius: float
 
 def write_figures(fitted: Fitted, stage: Path) -> list[str]:
     """Write the figures of all fits into a staging folder; return their names."""
-    from toolkit.report.fit_figures import fit_figures
+    from toolkit.report.test.models import fit_figures
 
     word = fitted.use.word if fitted.use else None
     pictures = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)

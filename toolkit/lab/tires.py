@@ -111,7 +111,7 @@ class TireFit(Face):
     def _plots(self) -> Mapping[str, Plot]:
         from dataclasses import replace
 
-        from toolkit.report.fit_figures import fit_plots
+        from toolkit.report.test.models import fit_plots
 
         fitted = self.result
         word = fitted.use.word if fitted.use else None

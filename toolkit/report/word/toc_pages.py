@@ -6,6 +6,7 @@ import io
 import re
 import subprocess
 import tempfile
+import unicodedata
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,9 +17,9 @@ from lxml import etree
 from toolkit.errors import RenderError
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.bulk import with_rows, without_rows
-from toolkit.report.word.contents import ContentsEntry, contents_fields
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
+from toolkit.report.word.toc import ContentsEntry, contents_fields
 from toolkit.report.word.xml import SDT_CONTENT, SDT_PR, W_P, W_R, W_SDT, W_T, Element, ancestor, parser, q
 
 Edit = Callable[[Element], None]
@@ -33,6 +34,8 @@ _ELEMENTS = frozenset(
 _ELEMENT_NAME = re.compile(rf'<w:name w:val="(?:{"|".join(sorted(_ELEMENTS))})"')
 _FIELDS = (q("w:fldChar"), q("w:fldSimple"), q("w:hyperlink"))
 _LABEL = r"[\s.…·‥_\-]*?(\d+|[ivxlcdmIVXLCDM]+|[A-Z]{1,2})(?=\s|$)"
+
+_SPACE = re.compile("[\\s\u00ad\u200b-\u200f\u202a-\u202e\u2066-\u2069\ufeff]+")
 
 
 def for_printing(docx: bytes, part: str, *, contents: bool) -> bytes:
@@ -132,6 +135,15 @@ def with_numbers(docx: bytes, part: str, titles: Mapping[str, str]) -> bytes:
     return _edited(docx, {part: put})
 
 
+def squeeze(text: str) -> str:
+    """Return text as it is compared: composed, without white space, soft hyphens and direction marks.
+
+    >>> squeeze("1 234,5\\u00ad N")
+    '1234,5N'
+    """
+    return _SPACE.sub("", unicodedata.normalize("NFKC", text))
+
+
 def pdf_text(pdf: Path) -> str:
     """Return a PDF's text, a form feed after each page."""
     with tempfile.TemporaryDirectory(prefix="toolkit-verify-") as folder:
@@ -193,8 +205,6 @@ def titles_of(
     The PDF's title begins with the number that Word gives a heading by itself. A heading that the outline
     has not is left out.
     """
-    from toolkit.report.word.verify_text import squeeze
-
     found = []
     at = 0
     for bookmark, text in headings:

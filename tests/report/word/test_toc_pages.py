@@ -7,7 +7,7 @@ import zipfile
 from pathlib import Path
 
 from tests.report.template_factory import opened, p
-from toolkit.report.word.contents_pages import for_printing
+from toolkit.report.word.toc_pages import for_printing
 
 
 def named(docx: bytes, name: str) -> bytes:

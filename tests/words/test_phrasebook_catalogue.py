@@ -13,8 +13,7 @@ from tests.report.template_factory import FOLDER
 from toolkit.report.word.language import fixed_texts, phrase_of
 from toolkit.report.word.package import open_package, read_template
 from toolkit.report.word.xml import stories
-from toolkit.words.catalogue import SOURCE, languages, locale_of, phrases
-from toolkit.words.phrasebook import PLACE, phrasebook
+from toolkit.words.phrasebook import PLACE, SOURCE, languages, locale_of, phrasebook, phrases
 
 OTHERS = [name for name in languages() if name != SOURCE]
 PACKAGE = FOLDER.parent / "toolkit"

@@ -51,13 +51,13 @@ class ContentsField:
         first, last = ancestor(self.begin, W_P), ancestor(self.end, W_P)
         if first is None or last is None or first.getparent() is not last.getparent():
             return None
-        found = [first]
-        while found[-1] is not last:
-            following = found[-1].getnext()
+        members = [first]
+        while members[-1] is not last:
+            following = members[-1].getnext()
             if following is None:
                 return None
-            found.append(following)
-        return found
+            members.append(following)
+        return members
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,14 +131,14 @@ def write_contents(package: object, root: Element) -> Contents:
     sheet, marks = StyleSheet.of(package), _Bookmarks(root)
     entries: list[ContentsEntry] = []
     for field in fields:
-        own = _entries(field, root, sheet, marks)
-        _rewrite(field, own, sheet, root)
-        entries += own
-    named = {id(p): name for p, name in marks.given}
+        field_entries = _entries(field, root, sheet, marks)
+        _rewrite(field, field_entries, sheet, root)
+        entries += field_entries
+    bookmarks = {id(p): name for p, name in marks.given}
     return Contents(
         entries=tuple(entries),
         headings=tuple(
-            (named.get(id(heading.element), ""), heading.text) for heading in headings(root, sheet)
+            (bookmarks.get(id(heading.element), ""), heading.text) for heading in headings(root, sheet)
         ),
     )
 
@@ -147,9 +147,9 @@ class _Bookmarks:
     """Bookmarks for the paragraphs that are pointed at: the one that Word left there, or a fresh one."""
 
     def __init__(self, root: Element) -> None:
-        used = [one.get(q("w:id")) or "0" for one in root.iter(q("w:bookmarkStart"))]
-        self.ids = count(max((int(one) for one in used if one.lstrip("-").isdigit()), default=0) + 1)
-        self.names = {one.get(q("w:name")) or "" for one in root.iter(q("w:bookmarkStart"))}
+        ids = [start.get(q("w:id")) or "0" for start in root.iter(q("w:bookmarkStart"))]
+        self.ids = count(max((int(start) for start in ids if start.lstrip("-").isdigit()), default=0) + 1)
+        self.names = {start.get(q("w:name")) or "" for start in root.iter(q("w:bookmarkStart"))}
         self.fresh = count(990_000_001)
         self.given: list[tuple[Element, str]] = []
 
@@ -182,8 +182,8 @@ def _entries(
     field: ContentsField, root: Element, sheet: StyleSheet, marks: _Bookmarks
 ) -> list[ContentsEntry]:
     paged = re.search(r"\\n(?!\w)", field.code) is None
-    named = re.search(r'\\[ca]\s+"?([^"\\\s]+)', field.code)
-    if named:
+    caption = re.search(r'\\[ca]\s+"?([^"\\\s]+)', field.code)
+    if caption:
         return [
             ContentsEntry(
                 bookmark=marks.of(p),
@@ -194,19 +194,19 @@ def _entries(
                 paged=paged,
             )
             for p in root.iter(W_P)
-            if not in_fallback(p) and _counts(p, named[1])
+            if not in_fallback(p) and _counts(p, caption[1])
         ]
     lowest, highest, extra, outline = _switches(field.code)
     inside = field.paragraphs or []  # held, so that an identity stays that of one element
-    own = {id(p) for p in inside}
-    found = []
+    members = {id(p) for p in inside}
+    entries = []
     for heading in headings(root, sheet):
         level = extra.get(sheet.names.get(style_of(heading.element), ""))
         if level is None and (heading.by_style or outline) and lowest <= heading.level <= highest:
             level = heading.level
-        if level is None or id(heading.element) in own:
+        if level is None or id(heading.element) in members:
             continue
-        found.append(
+        entries.append(
             ContentsEntry(
                 bookmark=marks.of(heading.element),
                 text=heading.text,
@@ -216,7 +216,7 @@ def _entries(
                 paged=paged,
             )
         )
-    return found
+    return entries
 
 
 def _switches(code: str) -> tuple[int, int, dict[str, int], bool]:
@@ -251,47 +251,47 @@ def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleShe
     linked = re.search(r"\\h(?!\w)", field.code) is not None
     separator = re.search(r'\\p\s+"([^"]*)"', field.code)
     width = _text_width(root)
-    made = [
+    paragraphs = [
         _line(entry, patterns, sheet, width, linked, separator[1] if separator else "\t") for entry in entries
     ]
-    if not made:
-        made = [etree.Element(W_P)]
+    if not paragraphs:
+        paragraphs = [etree.Element(W_P)]
     head = [*before, _mark("begin"), _code(field.code), _mark("separate")]
-    at = 1 if made[0].find(_P_PR) is not None else 0
+    at = 1 if paragraphs[0].find(_P_PR) is not None else 0
     for offset, run in enumerate(head):
-        made[0].insert(at + offset, run)
-    made[-1].append(_mark("end"))
-    for paragraph in made:
+        paragraphs[0].insert(at + offset, run)
+    paragraphs[-1].append(_mark("end"))
+    for paragraph in paragraphs:
         first.addprevious(paragraph)
     for paragraph in old:
         paragraph.getparent().remove(paragraph)
     if tail is not None:
-        made[-1].addnext(tail)
+        paragraphs[-1].addnext(tail)
 
 
 def _siblings_before(paragraph: Element, begin: Element) -> list[Element]:
     run = next(child for child in paragraph if child is begin.getparent() or begin in child.iter(_CHAR))
-    found: list[Element] = []
+    siblings: list[Element] = []
     for child in paragraph:
         if child is run:
-            return found
+            return siblings
         if child.tag != _P_PR:
-            found.append(child)
-    return found
+            siblings.append(child)
+    return siblings
 
 
 def _tail(paragraph: Element, end: Element) -> Element | None:
     """Return what follows the field in its last paragraph, None where that is nothing to keep."""
-    kept = deepcopy(paragraph)
+    tail = deepcopy(paragraph)
     position = list(paragraph.iter()).index(end)
-    twin = list(kept.iter())[position]
-    for run in [c for c in kept if c.tag != _P_PR]:
-        kept.remove(run)
+    twin = list(tail.iter())[position]
+    for run in [c for c in tail if c.tag != _P_PR]:
+        tail.remove(run)
         if run is twin or twin in run.iter():
             break
-    section = kept.find(f"{_P_PR}/{q('w:sectPr')}") is not None
-    more = any(True for _ in kept.iter(q("w:br"), q("w:drawing")))
-    return kept if section or more or paragraph_text(kept).strip() else None
+    section = tail.find(f"{_P_PR}/{q('w:sectPr')}") is not None
+    has_content = any(True for _ in tail.iter(q("w:br"), q("w:drawing")))
+    return tail if section or has_content or paragraph_text(tail).strip() else None
 
 
 def _line(

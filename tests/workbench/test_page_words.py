@@ -9,8 +9,7 @@ import pytest
 from babel.messages.extract import extract
 from babel.messages.pofile import read_po
 
-from toolkit.workbench.page import TEMPLATES, templates
-from toolkit.workbench.words import MESSAGES, SOURCE, TERMS, languages, preferred
+from toolkit.workbench.page import MESSAGES, SOURCE, TEMPLATES, TERMS, languages, preferred, templates
 
 Phrase = str | tuple[str, ...]
 PLACE = re.compile(r"%\((\w+)\)s")

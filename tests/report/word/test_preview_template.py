@@ -8,10 +8,9 @@ from docx import Document
 
 from toolkit.report.kinds import check
 from toolkit.report.style import Style
-from toolkit.report.word.marked_template import marked_pages, marked_template
 from toolkit.report.word.office import Office
 from toolkit.report.word.package import read_template
-from toolkit.report.word.preview import words_of
+from toolkit.report.word.preview import marked_pages, marked_template, words_of
 
 
 def printed(folder: Path, data: bytes) -> Path:

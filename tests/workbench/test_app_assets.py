@@ -6,7 +6,7 @@ import hashlib
 import tomllib
 from pathlib import Path
 
-from toolkit.workbench.assets import STATIC
+from toolkit.workbench.app import STATIC
 
 OWN = {"curves.js", "session.js", "vendored.toml", "work.css", "workbench.css", "workbench.js"}
 
