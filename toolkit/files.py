@@ -118,7 +118,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 class _Beyond(float):
     """A number that is too large for a double: infinity, told as it was written."""
 
-    __slots__ = ("text",)
+    text: str
 
     def __new__(cls, text: str) -> _Beyond:
         """Keep the text beside the value."""
