@@ -103,8 +103,7 @@ from toolkit.declared.marks import (
     Unit,
     UnitName,
 )
-from toolkit.declared.reading import attempt, build, read, read_text
-from toolkit.declared.writing import answer, json_value, plain, toml_text
+from toolkit.declared.text import answer, attempt, build, json_value, plain, read, read_text, toml_text
 
 __all__ = [
     "Above",

@@ -163,7 +163,7 @@ def verified_answer(registry: Registry, head: str | None) -> tuple[VerifyRegistr
 
 def import_answer(registry: Registry, file: Path, *, again: bool) -> tuple[ImportAnswer, str]:
     """Enter a legacy record; return it as JSON and as text."""
-    from toolkit.calibration.registry.legacy import import_legacy
+    from toolkit.calibration.registry.candidate import import_legacy
 
     record, existing = import_legacy(file, registry, again=again)
     entered: ImportedRecord = {

@@ -38,6 +38,7 @@ REPEATED = 0.1
 COARSE_REFERENCE = 0.05
 MOST_NAMED = 10
 _RISK = 0.01
+_MOST_ROWS = 20
 
 
 def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
@@ -333,9 +334,9 @@ def _of_runs(session: Session, rows: list[int]) -> str:
     return f" ({', '.join(texts)})" if texts else ""
 
 
-def _some(rows: list[int], most: int = 20) -> str:
-    text = ", ".join(str(row) for row in rows[:most])
-    return text if len(rows) <= most else f"{text} and {len(rows) - most} more"
+def _some(rows: list[int]) -> str:
+    text = ", ".join(str(row) for row in rows[:_MOST_ROWS])
+    return text if len(rows) <= _MOST_ROWS else f"{text} and {len(rows) - _MOST_ROWS} more"
 
 
 def _inline(lines: str) -> str:

@@ -1,7 +1,6 @@
 """`verify`: every record on disk or in a ledger, and every file that belongs to none.
 
-Many records are shared out among processes, and those of one shape are refitted together (`refit_many`). Each
-passes the same gates, by its own numbers, and the rows are the same and in the same order.
+Many records are shared out among processes; the rows are the same and in the same order.
 """
 
 from __future__ import annotations

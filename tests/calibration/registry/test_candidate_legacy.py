@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from toolkit.calibration.registry.legacy import import_legacy
+from toolkit.calibration.registry.candidate import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import ConfigError, RecordError, ToolkitError

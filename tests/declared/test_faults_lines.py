@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolkit.declared.lines import lines_of
-from toolkit.declared.writing import toml_text
+from toolkit.declared.faults import lines_of
+from toolkit.declared.text import toml_text
 
 WRITTEN = '''# a comment with [brackets] and "quotes
 title = "a # no comment"   # and one
