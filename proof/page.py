@@ -16,6 +16,7 @@ from toolkit.report.pages.drawing import Drawing
 
 from proof.content import Table, closing, intro, span, tables
 from proof.proof_file import path_beside
+from toolkit.report.audit.svg import Drawing
 from toolkit.report.pages import kit
 
 _CHECK = """    python -m proof draw --cases 400 --out DIR              # seed: the operating system's

@@ -55,8 +55,8 @@ RIGS: tuple[Recording, ...] = (
             "Grandprix - Contact - Right - 120 psi.csv":
             "9c9aecad7ae317f076d91928aedd8f86e005e8ce7954b46f501a007bda25681b",
         },
-        missing="rolling resistance, for which the rig was built (the rig's test procedure: coasting in contact "
-        "less coasting in the air); simulated: the drag of the air",
+        missing="rolling resistance, for which the rig was built (the rig's test procedure: coasting in "
+        "contact less coasting in the air); simulated: the drag of the air",
     ),
     Recording(
         name="wheel_in_air", published_at=_DRUM, licence=_CITE, kind="named", names=("quadratic_drag",),

@@ -188,8 +188,19 @@ def test_all_faults_are_told_at_once() -> None:
         "cells.D51.gian: unknown key; did you mean 'gain'?",
         "29 | gian = 2.5",
     ]  # fmt: skip
+    assert error.expected == "what stands with each of them"
     assert error.next_step == "correct every entry that is named; nothing was written"
     assert error.rule == "wrong-value"
+
+
+@pytest.mark.parametrize("text", ["1e400", "-1e400", "inf"])
+def test_a_number_beyond_every_double_is_told_as_it_was_written(text: str) -> None:
+    assert refused(WHOLE.replace("gain = 2.5", f"gain = {text}")).got == text
+
+
+def test_an_entry_of_many_characters_is_told_by_its_beginning() -> None:
+    error = refused(WHOLE.replace("gain = 2.5", f'gain = "{"x" * 100_000}"'))
+    assert max(map(len, str(error).splitlines())) < 1200
 
 
 def test_of_names_that_are_themselves_at_fault_nothing_is_said() -> None:

@@ -243,9 +243,9 @@ def wrong_signs(inspection: Inspection) -> str | None:
 
 
 def _corrected(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]] | None:
-    from toolkit.audit.candidates import unfit
+    from toolkit.audit.candidates import cannot_correct
 
-    return None if unfit(record, columns) is not None else recompute(columns, record)
+    return None if cannot_correct(record, columns) is not None else recompute(columns, record)
 
 
 def _blocks(recording: Recording, corrected: dict[str, NDArray[np.float64]] | None) -> tuple[LoadBlock, ...]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from toolkit.audit.candidates import unfit
+from toolkit.audit.candidates import cannot_correct
 from toolkit.audit.choices import Choices
 from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import Estimate, estimate
@@ -205,7 +205,7 @@ class Auditor:
         instrument = context.machine.name
         screen = self.choices.screen(instrument, columns)
         in_force = choice.in_force
-        fits = in_force is not None and unfit(in_force, columns) is None
+        fits = in_force is not None and cannot_correct(in_force, columns) is None
         new = recompute(columns, in_force) if in_force is not None and fits else None
         identification = identify_columns(
             columns,
@@ -258,7 +258,8 @@ class Auditor:
             source: MachineSource = "default" if file_machine is None else "file"
             machine = load_machine(file_machine or DEFAULT_MACHINE)
             trouble = (
-                f"{error.rule or 'test-toml'}: {error.what} ({error.where}); got {error.got}, "
+                f"{error.rule or 'test-toml'}: {error.what}"
+                f"{'' if error.where is None else f' ({error.where})'}; got {error.got}, "
                 f"expected {error.expected}"
             )
             return Context(machine=machine, machine_source=source, date=None, test_toml=None), trouble

@@ -220,7 +220,7 @@ def _refuse_all(faults: Sequence[Fault], source: Source) -> None:
         f"{len(faults)} entries cannot be used",
         where=source.where,
         got="\n".join([lines[0], *(" " * 12 + text for text in lines[1:])]),
-        expected="; ".join(f"{fault.name or 'the file'}: {fault.near or fault.expected}" for fault in faults),
+        expected="what stands with each of them",
         next_step=_next_step(faults[0], "correct every entry that is named"),
         rule=rules.pop() if len(rules) == 1 else faults[0].form.wrong,
     )

@@ -19,7 +19,7 @@ from toolkit.declared.faults import Fault, Source, refuse
 from toolkit.declared.kinds import Place
 from toolkit.declared.marks import Format
 from toolkit.errors import ConfigError
-from toolkit.files import parse_toml
+from toolkit.files import as_written, parse_toml
 from toolkit.inputs import SETTINGS_FILE, read_input
 
 T = TypeVar("T")
@@ -42,7 +42,7 @@ def read_text(cls: type[T], data: bytes, *, where: object) -> T:
     """Read the content of a file, whose name ``where`` is; errors as `read`."""
     if str(where).endswith(".json"):
         try:
-            table = json.loads(data.decode("utf-8"))
+            table = json.loads(data.decode("utf-8"), parse_float=as_written)
         except (ValueError, RecursionError) as error:
             raise ConfigError(
                 "a file is not JSON", where=where, got=error, expected="JSON in UTF-8",

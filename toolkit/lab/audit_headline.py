@@ -59,7 +59,9 @@ class Headline:
             parts.append(f"{subject} the values of the record in force")
         if self.unjudged:
             further = " more" if self.wrong else ""
-            parts.append(f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known")
+            parts.append(
+                f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known or fits"
+            )
         if self.bare:
             further = " more" if with_values else ""
             verb = (
