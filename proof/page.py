@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
-from toolkit.report.pages.drawing import Drawing
 
 from proof.content import Table, closing, intro, span, tables
 from proof.proof_file import path_beside
