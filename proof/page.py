@@ -15,8 +15,8 @@ from markupsafe import Markup
 
 from proof.content import Table, closing, intro, span, tables
 from proof.proof_file import path_beside
+from toolkit.report.audit.svg import Drawing
 from toolkit.report.pages import kit
-from toolkit.report.pages.drawing import Drawing
 
 _CHECK = """    python -m proof draw --cases 400 --out DIR              # seed: the operating system's
     python -m proof run --out DIR                           # resumable; answers stay sealed

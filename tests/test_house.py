@@ -51,7 +51,8 @@ def test_no_import_cycles() -> None:
 def test_files_are_small() -> None:
     lines = {path: len(path.read_text().splitlines()) for path in ROOT.rglob("*.py")}
     assert max(lines.values()) <= 500, max(lines, key=lines.get)  # type: ignore[arg-type]
-    assert statistics.median(n for n in lines.values() if n > 10) <= 175
+    # Fewer, fuller files: a module of a few lines that one other alone uses is a part of that one.
+    assert statistics.median(n for n in lines.values() if n > 10) <= 200
 
 
 def test_the_public_api_is_small_and_there() -> None:
@@ -81,7 +82,7 @@ def test_every_module_of_the_command_line_holds_a_command() -> None:
     commands = [command.callback for group in groups for command in group.registered_commands]
     homes = {callback.__module__.rpartition(".")[2] for callback in commands if callback is not None}
     modules = {path.stem for path in (ROOT / "cli").glob("*.py")}
-    assert modules - homes == {"__init__", "console", "groups", "main"}
+    assert modules - homes == {"__init__", "console", "groups", "main", "options"}
 
 
 def mirrored(test: Path) -> bool:

@@ -52,14 +52,35 @@ def typed(command: str) -> tuple[str, int]:
 
 def test_every_tutorial_stands_in_the_index() -> None:
     assert sorted(PAGES) == sorted(TUTORIALS.glob("*.md"))
-    assert len(PAGES) == 7
+    assert len(PAGES) == 9
+
+
+EFFORT = {
+    row[1]: tuple(map(int, row.groups()[1:]))
+    for row in re.finditer(
+        r"\]\(tutorials/(\w+)\.md\)[^\n]*\| (\d+) \| (\d+) \| (\d+) \| (\d+) \|$", INDEX, re.M
+    )
+}
+"""By page, as the index tells: commands, entries and options, files written by hand, processor time [s]."""
+_SECONDS = 3  # times as many as told: a machine is slower, or busy
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_the_index_tells_what_a_tutorial_takes(page: Path) -> None:
+    blocks = blocks_of(page.read_text(encoding="utf-8"))
+    consoles = [block for block in blocks if block.language == "console"]
+    words = [shlex.split(command) for block in consoles for command, _ in commands_of(block)]
+    commands = [command for command in words if command[0] == "toolkit"]
+    options = [word for command in commands for word in command if word.startswith("--")]
+    files = [block for block in blocks if file_named(block) is not None]
+    assert EFFORT[page.stem][:3] == (len(commands), len(options), len(files))
 
 
 def test_tutorials_do_what_they_promise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.delenv("TOOLKIT_HOME", raising=False)
     for page in PAGES:
-        text = page.read_text(encoding="utf-8")
+        text, begun = page.read_text(encoding="utf-8"), processor_s()
         # A page begins in an empty folder, or where the page is that it continues.
         continued = re.search(r"continues in `lab/` of\s+\[[^]]+\]\((\w+)\.md\)", text)
         folder = tmp_path / (continued[1] if continued else page.stem)
@@ -74,6 +95,14 @@ def test_tutorials_do_what_they_promise(tmp_path: Path, monkeypatch: pytest.Monk
                     printed, code = typed(command)
                     assert code in {0, 1}, f"{page.name}: $ {command}\n{printed}"
                     assert same(expected, printed), f"{page.name}: $ {command}\n{printed}"
+        taken = processor_s() - begun
+        assert taken < _SECONDS * EFFORT[page.stem][3], f"{page.name}: {taken:.1f} s of processor time"
+
+
+def processor_s() -> float:
+    """Return the processor time of this process and of those that have ended in it [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def same(expected: str, printed: str) -> bool:

@@ -23,6 +23,8 @@ from __future__ import annotations
 
 from typing import Any
 
+LONGEST = 1000  # characters of a line of an error; a header of a hundred columns has fewer
+
 
 class ToolkitError(Exception):
     """An error that a user can act on.
@@ -50,12 +52,13 @@ class ToolkitError(Exception):
         next_step: str | None = None,
         rule: str | None = None,
     ) -> None:
+        what = _readable(what)
         super().__init__(what)
         self.what = what
-        self.where = None if where is None else str(where)
-        self.line = line
-        self.got = None if got is None else str(got)
-        self.expected = None if expected is None else str(expected)
+        self.where = None if where is None else _readable(where)
+        self.line = None if line is None else _readable(line)
+        self.got = None if got is None else _readable(got)
+        self.expected = None if expected is None else _readable(expected)
         self.next_step = next_step
         self.rule = rule
 
@@ -88,6 +91,14 @@ class ToolkitError(Exception):
             "expected": self.expected,
             "next_step": self.next_step,
         }
+
+
+def _readable(part: object) -> str:
+    """Return a part of an error as text whose lines people can read: a cell of megabytes keeps its begin."""
+    return "\n".join(
+        line if len(line) <= LONGEST else f"{line[:LONGEST]} ... ({len(line)} characters)"
+        for line in str(part).split("\n")
+    )
 
 
 def _rebuild(cls: type[ToolkitError], what: str, parts: dict[str, str | None]) -> ToolkitError:

@@ -96,7 +96,7 @@ def round_uncertainty(U: float, *, digits: int = 2) -> str:
     return format(Decimal(int(rounded)).scaleb(place), "f")
 
 
-def round_to_uncertainty(value: float, U: float, *, digits: int = 2) -> str:
+def round_to_uncertainty(value: float, U: float) -> str:
     """Return a value to the last place of its rounded expanded uncertainty (GUM 7.2.6).
 
     >>> round_to_uncertainty(1184.6932, 0.17984), round_to_uncertainty(1184.6932, 1234.0)
@@ -104,7 +104,7 @@ def round_to_uncertainty(value: float, U: float, *, digits: int = 2) -> str:
     """
     if not has_interval(value, U):
         return repr(float(value))
-    place = last_place(U, digits=digits)
+    place = last_place(U)
     # int drops the exponent of a zero, which would print as 0 where its neighbours print 0.00.
     rounded = int(Decimal(repr(float(value))).scaleb(-place).to_integral_value(rounding=ROUND_HALF_EVEN))
     return format(Decimal(rounded).scaleb(place) + 0, "f")

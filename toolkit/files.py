@@ -115,6 +115,31 @@ def read_toml(path: Path) -> dict[str, Any]:
     return parse_toml(read_input(path, SETTINGS_FILE), where=path)
 
 
+class _Beyond(float):
+    """A number that is too large for a double: infinity, told as it was written."""
+
+    text: str
+
+    def __new__(cls, text: str) -> _Beyond:
+        """Keep the text beside the value."""
+        number = super().__new__(cls, text)
+        number.text = text
+        return number
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def as_written(text: str) -> float:
+    """Return the number of a text; one that only its size makes infinite is told as the text.
+
+    >>> str(as_written("1e400")), str(as_written("inf")), as_written("2.5")
+    ('1e400', 'inf', 2.5)
+    """
+    number = float(text)
+    return _Beyond(text) if math.isinf(number) and text.lstrip("+-") != "inf" else number
+
+
 def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
     """Parse the content of a TOML file; ``where`` names it in the message.
 
@@ -124,13 +149,14 @@ def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
         ``not-toml``
     """
     try:
-        return tomllib.loads(data.decode("utf-8-sig"))  # editors of Windows begin a file with a mark
+        # Editors of Windows begin a file with a mark.
+        return tomllib.loads(data.decode("utf-8-sig"), parse_float=as_written)
     except (ValueError, RecursionError) as error:  # a number of thousands of digits, arrays without end
         twice = "Cannot overwrite" in str(error) or "Cannot declare" in str(error)
         raise ConfigError(
             "a settings file is not TOML",
             where=where,
-            got=error,
+            got=str(error).partition("; use sys.")[0],  # what a program could do about digits
             expected="each key once, as a value or as a table" if twice else "TOML 1.0 in UTF-8",
             next_step="mend the line that is named",
             rule="not-toml",

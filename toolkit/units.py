@@ -277,7 +277,7 @@ def _in_words(text: str, meanings: Mapping[str, str]) -> str:
     return _WORD.sub(lambda match: meanings.get(match[0], match[0]), text)
 
 
-def to_si(values: ArrayLike, text: str, *, where: object = None) -> NDArray[np.float64]:
+def to_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
     """Return values in SI; the shape is kept.
 
     >>> to_si([1.0, 2.0], "lbf").round(3).tolist()
@@ -285,7 +285,7 @@ def to_si(values: ArrayLike, text: str, *, where: object = None) -> NDArray[np.f
     >>> float(to_si(20.0, "degC"))
     293.15
     """
-    stated = unit(text, where=where)
+    stated = unit(text)
     return np.asarray(values, dtype=np.float64) * stated.factor + stated.offset
 
 

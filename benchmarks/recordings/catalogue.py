@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from benchmarks.recordings import readers
 from benchmarks.recordings.recording import Recording
+from benchmarks.recordings.rigs import RIGS
 
 _GITHUB = "https://github.com/"
 _DATAPLOT = _GITHUB + "usnistgov/dataplot, commit 19a6caa, lib/data"
@@ -156,4 +157,5 @@ RECORDINGS: tuple[Recording, ...] = (
         missing="the wall stores heat: two thermal masses are fitted to these data (Gori et al., Energy and "
         "Buildings 135, 2017, recalled and not read again); simulated: the steady flow through a resistance",
     ),
+    *RIGS,
 )  # fmt: skip

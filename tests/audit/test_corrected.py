@@ -190,3 +190,16 @@ def test_a_copy_by_a_record_that_is_expired_is_a_draft_or_none(archive, tmp_path
     assert all(one["draft"] and one["unverified"] and "expired" in one["draft_reasons"][0] for one in told)
     title = openpyxl.load_workbook(tmp_path / "drafts" / "test" / "newton.xlsx").properties.title
     assert "DRAFT, NOT APPROVED: m15-r2: expired" in title
+
+
+def test_a_file_far_beyond_the_calibrated_range_has_no_correction(tmp_path):
+    # Columns in lbf under the name of a machine whose cells read mV/V: twenty times its range and more.
+    folder = tmp_path / "archive" / "test"
+    folder.mkdir(parents=True)
+    (folder / "test.toml").write_text('machine = "m15-virtual"\ndate = 2026-05-01\n')
+    write(folder / "lbf.xlsx", recording())
+    made = audit_archive(tmp_path / "archive", REGISTRY, known_at=dt.date(2026, 11, 1))
+    (file,) = made.files
+    assert file.identification is not None
+    assert (file.grade, file.identification.repair) == ("unknown", None)
+    assert write_copies(made, REGISTRY, tmp_path / "fixed") == ()

@@ -85,7 +85,7 @@ class Archive:
 def make_registry(calibrations: Path) -> None:
     """Enter and approve every edition, and withdraw the first."""
     from toolkit.calibration.registry.approval import approve, withdraw
-    from toolkit.calibration.registry.legacy import import_legacy
+    from toolkit.calibration.registry.candidate import import_legacy
     from toolkit.calibration.registry.registry import Registry
 
     registry = Registry(calibrations)

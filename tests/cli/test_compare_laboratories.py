@@ -11,7 +11,7 @@ import pytest
 from tests.cli.test_calibrate import run as run_command
 from toolkit.cli import compare
 from toolkit.errors import ToolkitError
-from toolkit.report.word.contents_pages import pdf_text
+from toolkit.report.word.toc_pages import pdf_text
 
 TEXT = """measurand,laboratory,value [N],U [N]
 conicity,A,10.1,0.4

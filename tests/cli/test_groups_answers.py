@@ -15,9 +15,10 @@ from typing import Any
 import pytest
 import typer
 
-from toolkit.cli.console import Json, answers
+from toolkit.cli.console import Command, answers
 from toolkit.cli.groups import build_group, declared_answers, declared_type, leaves
 from toolkit.cli.main import command_tree, run
+from toolkit.cli.options import Json, Output, RegistryOptions
 from toolkit.declared.answers import answer_schema, departures, tables_of
 from toolkit.lab.home import packaged_home
 from toolkit.simulation.plan import Plan
@@ -155,3 +156,25 @@ def test_an_answer_that_is_not_declared_is_refused_with_those_that_are(
         run(["explain", "--answer", "calibration lst"])
     assert caught.value.code == 2
     assert "calibration list" in capsys.readouterr().err
+
+
+def test_options_of_a_class_are_options_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    app = typer.Typer()
+    seen: list[tuple[int, Path | None, Output]] = []
+
+    @app.command()
+    @Command
+    def axes(number: int, *, place: RegistryOptions, output: Output) -> int:
+        seen.append((number, place.home, output))
+        output.answer({"number": number}, "text for people")
+        return 0
+
+    command = build_group(app, lambda _: None).commands["axes"]
+    assert [name for parameter in command.params for name in parameter.opts] == [
+        "number", "--calibrations", "--home", "--json", "--quiet", "-q",
+    ]  # fmt: skip
+    command(["3", "--json"], standalone_mode=False)
+    assert json.loads(capsys.readouterr().out) == {"schema": 1, "number": 3}
+    command(["4", "-q"], standalone_mode=False)
+    assert capsys.readouterr().out == ""
+    assert seen == [(3, None, Output(json=True)), (4, None, Output(quiet=True))]

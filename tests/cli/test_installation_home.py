@@ -9,7 +9,7 @@ import pytest
 
 from toolkit.cli.main import run
 from toolkit.errors import ConfigError
-from toolkit.lab import doctor
+from toolkit.lab import installation
 from toolkit.lab.home import calibrations_folder, find_home
 
 
@@ -66,7 +66,7 @@ def test_doctor_names_the_command_that_mends(
     monkeypatch.setenv("PATH", "/nonexistent")
     assert code_of("doctor", "--json") == 1
     answer = json.loads(capsys.readouterr().out)
-    assert doctor.PACKAGES in answer["mend"]
+    assert installation.PACKAGES in answer["mend"]
     assert {c["name"] for c in answer["checks"] if not c["ok"]} >= {"soffice", "pdftotext"}
 
 
@@ -84,7 +84,7 @@ def test_wrong_words_end_with_2(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_bug_ends_with_101(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(doctor, "_mending_command", lambda: 1 / 0)
+    monkeypatch.setattr(installation, "_mending_command", lambda: 1 / 0)
     monkeypatch.setenv("PATH", "/nonexistent")
     assert code_of("doctor") == 101
     assert "this is a bug" in capsys.readouterr().err

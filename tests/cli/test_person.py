@@ -137,3 +137,34 @@ def test_a_witness_signs_nothing_that_the_home_cannot_keep(call: Call) -> None:
     code, said = call("ledger", "witness", "m15", "../north", "--name", "north", "--key", "../keys/plain")
     assert (code, "Not a directory" in said) == (2, True), said
     assert not Path("../north").exists()
+
+
+def test_a_witness_that_forgot_does_not_begin_again(call: Call) -> None:
+    keygen(Path("../keys/plain"))
+    witness = ("ledger", "witness", "m15", "../north", "--name", "north", "--key", "../keys/plain")
+    assert call(*witness)[0] == 0
+    for path in Path("../north").iterdir():
+        path.unlink()
+    code, said = call(*witness)
+    assert (code, "has forgotten what it signed" in said) == (2, True), said
+    assert list(Path("../north").iterdir()) == []
+    assert call("ledger", "witness", "m15", "../south", "--name", "south", "--key", "../keys/plain")[0] == 0
+
+
+def test_a_witness_is_none_of_the_laboratorys_people_and_what_is_typed_into_their_file_is_told(
+    call: Call,
+) -> None:
+    for name in ("anna", "ben"):
+        keygen(Path("../keys") / name)
+    words = ("--name", "Anna", "--role", "head", "--key", "../keys/anna.pub", "--sign", "../keys/anna")
+    assert call("person", "enrol", "anna", *words, "--recovery", "../keys/ben")[0] == 0
+    for key in ("anna", "ben"):
+        witness = ("ledger", "witness", "m15", "../north", "--name", "north", "--key", f"../keys/{key}")
+        code, said = call(*witness, "--sign", "../keys/anna")
+        assert (code, "somebody else" in said) == (2, True), said
+    assert call("calibration", "verify")[0] == 0
+    Path("people.toml").write_text(
+        Path("people.toml").read_text().replace("signatures = 1", "signatures = 0")
+    )
+    code, said = call("calibration", "verify")
+    assert (code, "not the newest version of the log of people" in said) == (1, True), said

@@ -16,8 +16,9 @@ from typing import Any
 
 import pytest
 
-from tests.calibration.registry.test_signatures import RECORD, _found, _registry, _rewrite
-from tests.trust.seal.seal_factory import flipped, key, trust
+from tests.calibration.registry.test_signatures import KEYS, RECORD, _found, _registry, _rewrite
+from tests.trust.seal.seal_factory import authority, flipped, key, trust
+from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.approval import withdraw
 from toolkit.calibration.registry.ledger import head_bytes
 from toolkit.errors import ToolkitError
@@ -28,6 +29,7 @@ from toolkit.lab.proofs import anchor_in, registry_ledger
 from toolkit.lab.sealing import Sealing
 from toolkit.lab.verification import Verdict, verify_file
 from toolkit.report.word.package import read_template
+from toolkit.trust.people import NAMESPACE
 from toolkit.trust.seal.pdf import carried_by, proved_pdf
 from toolkit.trust.seal.qr import Place
 from toolkit.trust.seal.x509 import Trust
@@ -95,6 +97,36 @@ def test_what_was_issued_holds(issued: Issued, kind: str, suffix: str) -> None:
     assert (verdict.signature, verdict.code) == ("valid", 0), verdict.why
     assert verdict.issued_by == ("Tire laboratory" if kind == "sealed" else "Anna")
     assert verdict.issued_at is not None
+
+
+@pytest.mark.skipif(shutil.which("xmlsec1") is None, reason="xmlsec1 is not installed")
+def test_other_programs_verify_what_was_issued(issued: Issued) -> None:
+    """The seals of both documents, and the entry in the ledger that their issue is."""
+    folder = issued.home / "sealed"
+    (folder / "root.pem").write_bytes(authority().pem)
+    line = json.loads(_registry(issued.home).ledger("m15-virtual").lines[-2])
+    assert line["event"] == "issued"
+    (signature,) = line["signatures"]
+    message = canonical({name: line[name] for name in line if name not in ("signatures", "sha256")}).encode()
+    (folder / "line.sig").write_text(signature["sig"])
+    (folder / "allowed").write_text(f"anna {KEYS['anna'].public.line}\n")
+    ids = ("--id-attr:Id", "SignedProperties", "--id-attr:Id", "KeyInfo")
+    pdf, xml = (str(issued.file("sealed", suffix)) for suffix in (".pdf", ".xml"))
+    commands = (
+        (["pdfsig", "-nocert", pdf], b"Signature is Valid"),
+        (
+            ["xmlsec1", "--verify", "--trusted-pem", "root.pem", *ids, xml],
+            b"3/3",
+        ),
+        (
+            ["ssh-keygen", "-Y", "verify", "-f", "allowed", "-I", "anna", "-n", NAMESPACE, "-s", "line.sig"],
+            b"Good",
+        ),
+    )
+    for command, words in commands:
+        done = subprocess.run(command, cwd=folder, input=message, capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert words in done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(("kind", "suffix"), FILES)

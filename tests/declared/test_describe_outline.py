@@ -9,7 +9,7 @@ import pytest
 from tests.house.pages import formats
 from toolkit.declared import plain, read_text, starter, table_of
 from toolkit.declared.describe import outline
-from toolkit.declared.reading import attempt
+from toolkit.declared.text import attempt
 
 FORMATS = formats()
 

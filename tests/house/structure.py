@@ -11,7 +11,7 @@ from typing import Any
 
 from tests.house.source import PACKAGE, Module, contracts, layers
 
-NO_COMMAND_ASKED = ("toolkit.cli", "toolkit.cli.main", "toolkit.cli.console")
+NO_COMMAND_ASKED = ("toolkit.cli", "toolkit.cli.main", "toolkit.cli.console", "toolkit.cli.options")
 """The package itself, its entry, and the options and the printing that all commands share."""
 ROOMS = ("report", "diagnosis")
 """Packages whose inside has an order of its own."""

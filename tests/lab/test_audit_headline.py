@@ -50,17 +50,27 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
         (
             [file("unknown", notes=IMPOSSIBLE), file("exact", notes=IMPOSSIBLE), file("exact")],
             "2 files hold an Fy or Mz that no tire has; "
-            "1 file cannot be judged: no record in force is known",
+            "1 file cannot be judged: no record in force is known or fits",
         ),
         (
             [wrong("2014-03-01", 5.25) | {"notes": IMPOSSIBLE}],
             "1 file carries a wrong Fy, up to 5.2 N; cause: E5 negative; in 2014-03",
         ),
-        ([file("unknown")], "1 file cannot be judged: no record in force is known"),
+        (
+            [file("unknown", repair={"FY_max_abs_N": None, "MZ_max_abs_Nm": None})] * 2,
+            "2 files hold no Fy and no Mz of their own",
+        ),
+        (
+            [file("exact"), file("unknown", repair={"FY_max_abs_N": None, "MZ_max_abs_Nm": None})],
+            "The file carries the values of the record in force; "
+            "1 file more holds no Fy and no Mz of its own",
+        ),
+        ([file("unknown")], "1 file cannot be judged: no record in force is known or fits"),
         (
             [file("stale", None), file("unknown")],
             "1 file carries a wrong Fy, up to 10.0 N; cause: computed by m15-r1, which was not in force; "
-            "since when is unknown: no test date; 1 file more cannot be judged: no record in force is known",
+            "since when is unknown: no test date; 1 file more cannot be judged: "
+            "no record in force is known or fits",
         ),
         (
             [wrong("2014-03-01", 5.25, variant="D51<->D52"), *[wrong("2014-03-02", 1.0)] * 2],
@@ -87,3 +97,12 @@ def test_a_table_fits_the_width_and_keeps_numbers_and_the_ends_of_names() -> Non
     assert "2000000.0" in text
     assert "_1.xlsx" in text
     assert "_2.xlsx" in text
+
+
+def test_files_stay_told_apart_where_a_line_is_short() -> None:
+    names = [f"{test}/{name}.xlsx" for test in ("d2019", "d2022b") for name in ("r1", "r2", "swap")]
+    rows = [[name, "column_swap", "m15-r5", "D51->D52->E5->D51", "m15-r5", "122.0"] for name in names]
+    text = table(
+        ["file", "grade", "computed by", "how", "in force", "dFY [N]"], rows, align="<<<<<>", width=60
+    )
+    assert len({line.split()[0] for line in text.splitlines()[2:]}) == len(names)

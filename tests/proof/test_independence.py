@@ -47,7 +47,7 @@ def test_no_module_reaches_the_toolkit_by_another_way(path: Path) -> None:
 def test_the_page_takes_nothing_but_the_page_kit_and_nothing_takes_the_page_to_draw_or_judge() -> None:
     assert {name for name in imports(PAGE) if name.startswith("toolkit")} == {
         "toolkit.report.pages",
-        "toolkit.report.pages.drawing",
+        "toolkit.report.audit.svg",
     }
     callers = [path.stem for path in MODULES if "import page" in path.read_text(encoding="utf-8")]
     assert callers == ["__main__"]

@@ -52,21 +52,29 @@ def truth(angle_deg: float, FZ: float) -> dict[str, float]:
     return {"FX": -0.012 * FZ, "FY": FY, "FZ": FZ, "MX": 0.004 * FY, "MY": 3.0, "MZ": -0.02 * FY}
 
 
-def write_belt(folder: Path, *, hub: bool = True, turned: str | None = None) -> Path:
-    """Write a machine and a test in ``folder``; ``turned`` names a cell whose sign is wrong."""
+def write_belt(
+    folder: Path, *, hub: bool = True, turned: str | None = None, load: bool = True, zero: float = 0.0
+) -> Path:
+    """Write a machine and a test in ``folder``.
+
+    ``turned`` names a cell whose sign is wrong; without ``load`` the machine has no column of its load;
+    ``zero`` [count] is what each cell reads of nothing, and of each file's first rows then.
+    """
     cells = "\n  ".join(
         f'{{ symbol = "{cell}", header = "{cell}", unit = "count", role = "indication" }},' for cell in CELLS
     )
     folder.mkdir(parents=True, exist_ok=True)
     text = BELT.replace("CELLS", cells).replace("HUB\n", HUB if hub else "")
+    if not load:
+        text = text.replace('  { symbol = "FZ", header = "Load", unit = "N", role = "load" },\n', "")
     (folder / "belt.toml").write_text(text)
     test = folder / "test"
     test.mkdir()
     (test / "test.toml").write_text('schema = 1\nmachine = "../belt.toml"\ndate = 2026-03-10\n')
     rng = np.random.default_rng(7)
     for number, angle in enumerate(ANGLES):
-        lines = [",".join(["Load [N]", "SA [deg]", *(f"{cell} [count]" for cell in CELLS)])]
-        for FZ in WHEEL_LOADS:
+        lines = [",".join(["Load [N]", "SA [deg]", *(f"{cell} [count]" for cell in CELLS)][not load :])]
+        for FZ in (*((0.0,) if zero else ()), *WHEEL_LOADS):
             patch = truth(angle, FZ)
             force = np.array([patch["FX"], patch["FY"], -FZ])
             moment = np.array([patch[load] for load in ("MX", "MY", "MZ")])
@@ -75,7 +83,7 @@ def write_belt(folder: Path, *, hub: bool = True, turned: str | None = None) -> 
             if turned is not None:
                 values[CELLS.index(turned)] *= -1
             for _ in range(40):
-                row = [FZ, angle, *(values + 0.2 * rng.normal(size=6))]
+                row = [FZ, angle, *(values + zero + 0.2 * rng.normal(size=6))][not load :]
                 lines.append(",".join(f"{value:.4f}" for value in row))
         (test / f"run_{number}.csv").write_text("\n".join(lines) + "\n")
     return test

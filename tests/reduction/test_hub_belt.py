@@ -9,6 +9,7 @@ import pytest
 
 from tests.reduction.belt_factory import processed, truth, write_belt
 from tests.reduction.hub_factory import record
+from toolkit.errors import ColumnError
 from toolkit.testfile.read import read_test_file
 from toolkit.testfile.write import write_test_file
 
@@ -52,3 +53,24 @@ def test_what_a_hub_measures_beside_them_changes_neither_FY_nor_MZ(tmp_path: Pat
     assert not [name for name in without if "hub" in name]
     for name in ("FY", "MZ", "u_FY", "u_MZ", "FY_common", "MZ_common"):
         assert with_hub[name].tolist() == pytest.approx(without[name].tolist(), rel=0, abs=0)
+
+
+@pytest.mark.parametrize("zero", [0.0, 70.0])
+def test_the_hubs_load_serves_where_a_machine_has_no_other(zero: float, tmp_path: Path) -> None:
+    """The truth comes back, as with a column of the load; with a tare in each file the cells' zeros too."""
+    alone = processed(write_belt(tmp_path / "a", load=False, zero=zero), record(1e-4)).reduced
+    beside = processed(write_belt(tmp_path / "b", zero=zero), record(1e-4)).reduced
+    assert len(alone.conditions) == 10
+    for mine, other in zip(alone.conditions, beside.conditions, strict=True):
+        assert (mine.step_SA, mine.step_FZ) == (other.step_SA, other.step_FZ)
+        assert mine.FZ == pytest.approx(other.step_FZ, abs=0.3)  # of 40 rows that scatter by 0.2 N each
+        assert {entry.load: entry.value for entry in mine.hub}["FZ"] == pytest.approx(mine.FZ, abs=1e-9)
+        assert mine.FY == pytest.approx(other.FY, abs=1e-9)
+    told = [finding for finding in alone.findings if finding.rule == "hub-load"]
+    assert [finding.level for finding in told] == ["note"]
+    assert not [finding for finding in beside.findings if finding.rule == "hub-load"]
+
+
+def test_a_machine_with_no_load_at_all_is_told_so(tmp_path: Path) -> None:
+    with pytest.raises(ColumnError, match="no channel FZ"):
+        processed(write_belt(tmp_path, hub=False, load=False), record(1e-4))

@@ -20,7 +20,7 @@ from toolkit.recording.marks import is_own_output
 from toolkit.report import deliver as deliver_module
 from toolkit.report.deliver import Delivered, deliver
 from toolkit.report.test.content import build_content
-from toolkit.report.word import office, verify, verify_text
+from toolkit.report.word import office, verify
 from toolkit.report.word.fill import Entry, Filled
 from toolkit.report.word.office import Office
 
@@ -83,26 +83,26 @@ def filled(*entries: tuple[str, str], cells: tuple[tuple[str, ...], ...] = ()) -
     return Filled(docx=b"", manifest=manifest, figures=(), cells=cells, missing=(), lint=(), marks_added=())
 
 
-def names(checks: list[verify_text.Check]) -> set[str]:
+def names(checks: list[verify.Check]) -> set[str]:
     return {one.name for one in checks if not one.ok}
 
 
 def test_values_are_compared_without_white_space_and_soft_hyphens() -> None:
     page = "Cornering stiff\u00adness\n12\u00a0345.6 N 0.2\n5\f"
-    assert names(verify_text.text_checks(page, filled(("a", "stiffness 12345.6"), ("b", "0.25")))) == set()
-    assert names(verify_text.text_checks(page, filled(("a", "12345.7")))) == {"values"}
+    assert names(verify.text_checks(page, filled(("a", "stiffness 12345.6"), ("b", "0.25")))) == set()
+    assert names(verify.text_checks(page, filled(("a", "12345.7")))) == {"values"}
 
 
 def test_cells_are_compared_in_their_order() -> None:
     rows = (("-0.30", "371.4"), ("0.70", "-12.0"))
-    assert names(verify_text.text_checks("SA FY -0.30 371.4 0.70 -12.0", filled(cells=rows))) == set()
-    assert names(verify_text.text_checks("SA FY -0.30 371.4 0.70 -12.1", filled(cells=rows))) == {"cells"}
+    assert names(verify.text_checks("SA FY -0.30 371.4 0.70 -12.0", filled(cells=rows))) == set()
+    assert names(verify.text_checks("SA FY -0.30 371.4 0.70 -12.1", filled(cells=rows))) == {"cells"}
 
 
 def test_a_script_that_cannot_be_read_back_is_a_warning_and_a_number_beside_it_is_not() -> None:
-    checks = verify_text.text_checks("smile 5.0", filled(("a", "smile 😀"), ("b", "5.0")))
+    checks = verify.text_checks("smile 5.0", filled(("a", "smile 😀"), ("b", "5.0")))
     assert [(one.name, one.warning) for one in checks if not one.ok] == [("script", True)]
-    assert "values" in names(verify_text.text_checks("smile", filled(("b", "5.0"))))
+    assert "values" in names(verify.text_checks("smile", filled(("b", "5.0"))))
 
 
 def test_loose_fonts_are_found() -> None:
@@ -127,7 +127,7 @@ def test_a_disk_that_is_full_while_a_report_is_made(tmp_path: Path, monkeypatch,
     """The place is to blame: an error of its own, which a watch waits for, and nothing is left."""
     monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
 
-    def full(_filled: Filled) -> list[verify_text.Check]:
+    def full(_filled: Filled) -> list[verify.Check]:
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(deliver_module, "verify_docx", full)
@@ -143,7 +143,7 @@ def test_a_disk_that_is_full_while_a_report_is_made(tmp_path: Path, monkeypatch,
 def test_an_error_that_is_not_the_disk_s_stays_what_it_is(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
 
-    def broken(_filled: Filled) -> list[verify_text.Check]:
+    def broken(_filled: Filled) -> list[verify.Check]:
         raise OSError(errno.ENOEXEC, os.strerror(errno.ENOEXEC))
 
     monkeypatch.setattr(deliver_module, "verify_docx", broken)

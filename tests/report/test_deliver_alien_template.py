@@ -19,11 +19,10 @@ from toolkit.report.deliver import Delivered, deliver
 from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
-from toolkit.report.word.contents_pages import pdf_outline, pdf_text, printed_pages
 from toolkit.report.word.fill import fill
 from toolkit.report.word.package import read_template
-from toolkit.report.word.verify import contents_problems
-from toolkit.report.word.verify_text import text_checks
+from toolkit.report.word.toc_pages import pdf_outline, pdf_text, printed_pages
+from toolkit.report.word.verify import contents_problems, text_checks
 from toolkit.report.word.xml import NS
 
 STYLE = Style(laboratory="Prüflabor Ärmel & Söhne", decimal_comma=True, dates="%d.%m.%Y")
@@ -171,7 +170,7 @@ def test_a_hash_that_a_page_end_cuts_is_found_and_a_number_is_not(tmp_path: Path
 
 
 def test_pages_are_read_with_leaders_and_roman_numbers() -> None:
-    from toolkit.report.word.contents import ContentsEntry
+    from toolkit.report.word.toc import ContentsEntry
 
     def entry(name: str, text: str) -> ContentsEntry:
         return ContentsEntry(bookmark=name, text=text, level=1, heading=True, numbered=False, paged=True)

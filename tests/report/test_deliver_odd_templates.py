@@ -18,9 +18,9 @@ from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
-from toolkit.report.word.contents_pages import pdf_text
 from toolkit.report.word.controls import kept_whole
 from toolkit.report.word.package import read_template
+from toolkit.report.word.toc_pages import pdf_text
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")),

@@ -20,10 +20,10 @@ from toolkit.report.content import ReportContent
 from toolkit.report.deliver import deliver
 from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
-from toolkit.report.word.contents_pages import pdf_text
 from toolkit.report.word.fill import fill
 from toolkit.report.word.package import read_template
-from toolkit.report.word.verify_text import text_checks
+from toolkit.report.word.toc_pages import pdf_text
+from toolkit.report.word.verify import text_checks
 
 REASON = "withdrawn on 2026-05-01: cell overloaded"
 USE = CalibrationUse(id="m15-r2", sha256="c0ffee" * 8, unverified=False, draft_reasons=(REASON,))

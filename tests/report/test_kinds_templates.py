@@ -46,8 +46,8 @@ from toolkit.report.laboratories.content import build_laboratories_content
 from toolkit.report.plan.content import build_plan_content
 from toolkit.report.style import Style, read_style, replace_terms, style_file
 from toolkit.report.test.content import build_content, report_id
-from toolkit.report.word.contents_pages import pdf_outline, pdf_text
 from toolkit.report.word.package import read_template
+from toolkit.report.word.toc_pages import pdf_outline, pdf_text
 from toolkit.report.word.xml import q
 
 DAY = dt.date(2026, 11, 21)

@@ -140,6 +140,8 @@ def test_the_proof_of_a_ledger_of_a_million_entries_signed_by_three_people_fits(
         ("toolkit-proof@v1", "toolkit-proof@v2"),
         ("v1 3", "v1 -3"),
         ("v1 3", "v1"),
+        ("v1 3", "v1 " + "9" * 5000),
+        ("v1 3", "v1 \u0663"),
         ("=\n", "\n"),
         ("m15\n", ""),
     ],

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.registry.plausible import RANGE
 from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
 from toolkit.units import si_scale, unit
 
@@ -84,6 +85,26 @@ def unfit(record: CalibrationRecord, columns: Columns) -> str | None:
             return f"its indications are in {text}, the file's in {have[name]}"
     missing = [load for load in columns.loads if load not in {fit.load for fit in record.loads}]
     return f"it has no equation for {', '.join(missing)}" if missing else None
+
+
+def cannot_correct(record: CalibrationRecord, columns: Columns) -> str | None:
+    """Return why a record's values would not be better than a file's own, None where they may be.
+
+    A program may have computed anything by it. But what lies twenty times beyond the range of the calibration
+    no cell has survived: the column is in another unit, or of another instrument, than the record's.
+    """
+    if (reason := unfit(record, columns)) is not None:
+        return reason
+    for cell in record.cells:
+        if cell.minimum is None or cell.maximum is None:
+            continue  # a legacy record has no range
+        at = columns.names.index(cell.name)
+        largest = float(np.abs(columns.x[:, at]).max(initial=0.0)) * si_scale(columns.units[at])
+        fitted = max(abs(cell.minimum), abs(cell.maximum)) * si_scale(cell.unit)
+        if largest > RANGE * fitted:
+            scale = si_scale(cell.unit)
+            return f"{cell.name} reads {largest / scale:.4g} {cell.unit}, calibrated to {fitted / scale:.4g}"
+    return None
 
 
 def group_of(

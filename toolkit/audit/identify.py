@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.audit.candidates import Group, describe, group_of, unfit
+from toolkit.audit.candidates import Group, cannot_correct, describe, group_of
 from toolkit.audit.model import Columns, Grade, Identification, Repair, Segment, Skipped, worst
 from toolkit.audit.runs import Hit, Partition, Reach, Runs, products, reach_of, without_chance
 from toolkit.audit.screen import Key, Screen, probe_rows, screen_of
@@ -106,7 +106,7 @@ def repair(
     columns: Columns, record: CalibrationRecord, new: Mapping[str, NDArray[np.float64]] | None = None
 ) -> Repair | None:
     """Return what a record would change at most; None where it cannot be applied to the file."""
-    if new is None and unfit(record, columns) is not None:
+    if new is None and cannot_correct(record, columns) is not None:
         return None
     values = recompute(columns, record) if new is None else new
     largest = {

@@ -16,6 +16,7 @@ from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
 from toolkit.reduction.blocks import Block, block_means, find_blocks, is_tare
+from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.units import si_scale
 
@@ -161,23 +162,24 @@ def inspect_file(
     """
     context = context_of(path, machine=machine)
     recording = read_recording(path, context.machine)
-    if not context.is_tare:
-        split_blocks(recording, context.machine)  # refuses a file that holds no load at all
     columns = columns_of(recording)
     choice = (
         None
         if registry is None
         else choose(registry, context.machine.name, on=context.date, known_at=known_at)
     )
-    identification, corrector, corrected = None, None, None
+    corrector = None if choice is None else choice.in_force or choice.today
+    loaded_recording = with_load(recording, machine=context.machine, record=corrector)
+    if not context.is_tare:
+        split_blocks(loaded_recording, context.machine)  # refuses a file that holds no load at all
+    identification, corrected = None, None
     if choice is not None:
         if columns.loads:
             identification = identify_columns(
                 columns, choice.records, on=context.date, in_force=choice.in_force, void=choice.void
             )
-        corrector = choice.in_force or choice.today
         corrected = None if corrector is None else _corrected(columns, corrector)
-    first, *blocks = _blocks(recording, corrected)
+    first, *blocks = _blocks(loaded_recording, corrected)
     loaded = [block for block in blocks if not block.tare] or blocks
     rows = sum(block.last_row - block.first_row + 1 for block in loaded)
     return Inspection(
@@ -241,9 +243,9 @@ def wrong_signs(inspection: Inspection) -> str | None:
 
 
 def _corrected(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]] | None:
-    from toolkit.audit.candidates import unfit
+    from toolkit.audit.candidates import cannot_correct
 
-    return None if unfit(record, columns) is not None else recompute(columns, record)
+    return None if cannot_correct(record, columns) is not None else recompute(columns, record)
 
 
 def _blocks(recording: Recording, corrected: dict[str, NDArray[np.float64]] | None) -> tuple[LoadBlock, ...]:

@@ -9,11 +9,12 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from toolkit.audit.candidates import unfit
+import numpy as np
+
+from toolkit.audit.candidates import cannot_correct
 from toolkit.audit.choices import Choices
-from toolkit.audit.conditions import Change, changes
 from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
@@ -30,7 +31,86 @@ from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
+from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
+from toolkit.reduction.protocol import nearest_load, nearest_step
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from toolkit.audit.model import Columns
+    from toolkit.recording.model import Recording
+    from toolkit.reduction.blocks import Block
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """One load block: its rows (from 1), its means as the file has them, and new minus old [N, N·m].
+
+    In the machine's axes. ``SA_deg`` is None without that channel; ``FY_N`` and ``MZ_Nm`` without the
+    file's own; the changes without a record in force. ``step_SA_deg`` and ``step_FZ_N`` are the nominal
+    condition of the machine's protocol, None where it has none so near.
+    """
+
+    first_row: int
+    last_row: int
+    SA_deg: float | None
+    FZ_N: float
+    FY_N: float | None
+    MZ_Nm: float | None
+    FY_change_N: float | None
+    MZ_change_Nm: float | None
+    step_SA_deg: float | None
+    step_FZ_N: float | None
+
+
+def changes(
+    recording: Recording,
+    columns: Columns,
+    blocks: Sequence[Block],
+    new: Mapping[str, NDArray[np.float64]] | None,
+    *,
+    turn: int = 1,
+) -> tuple[Change, ...]:
+    """Return what the record in force would change in a recording's load blocks.
+
+    ``new`` are FY [N] and MZ [N·m] by that record (`toolkit.audit.identify.recompute`), None without one.
+
+    ``turn`` is the sign of the file's slip angle in SAE axes, in which the protocol's steps are.
+    """
+    if not blocks:
+        return ()
+    protocol = recording.machine.protocol
+    rows: dict[str, NDArray[np.float64]] = {load: recording[load].si for load in columns.loads}
+    if new is not None:
+        rows |= {f"d{load}": new[load] - rows[load] for load in columns.loads}
+    step = None
+    if recording.has("SA"):
+        rows["SA"] = recording["SA"].si
+        step = nearest_step(turn * float(rows["SA"].mean()), protocol)
+    stacked = np.stack(list(rows.values()))
+    table = np.array([stacked[:, block.rows].mean(axis=1) for block in blocks])
+    means = dict(zip(rows, table.T.tolist(), strict=True))
+    nothing = [None] * len(blocks)
+    return tuple(
+        Change(
+            first_row=block.start + 1,
+            last_row=block.stop,
+            SA_deg=None if SA is None else math.degrees(SA),
+            FZ_N=block.mean_FZ,
+            FY_N=FY,
+            MZ_Nm=MZ,
+            FY_change_N=dFY,
+            MZ_change_Nm=dMZ,
+            step_SA_deg=None if step is None else math.degrees(step),
+            step_FZ_N=nearest_load(block.mean_FZ, protocol),
+        )
+        for block, SA, FY, MZ, dFY, dMZ in zip(
+            blocks, *(means.get(name, nothing) for name in ("SA", "FY", "MZ", "dFY", "dMZ")), strict=True
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +190,9 @@ class Auditor:
         context, trouble = self._context(path, data or b"")
         try:
             recording = read_recording(path, context.machine, data=data)
-            blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
+            choice = self.choices.on(context.machine.name, context.date)
+            loaded = with_load(recording, machine=context.machine, record=choice.in_force)
+            blocks = () if context.is_tare else split_blocks(loaded, context.machine)[0]
         except ToolkitError as error:
             sha256 = large if data is None else sha256_bytes(data)
             if workbook and data is not None and own_output(data):
@@ -121,10 +203,9 @@ class Auditor:
             return unreadable(name, reason, sha256=sha256, size=size, context=trouble)
         columns = columns_of(recording)
         instrument = context.machine.name
-        choice = self.choices.on(instrument, context.date)
         screen = self.choices.screen(instrument, columns)
         in_force = choice.in_force
-        fits = in_force is not None and unfit(in_force, columns) is None
+        fits = in_force is not None and cannot_correct(in_force, columns) is None
         new = recompute(columns, in_force) if in_force is not None and fits else None
         identification = identify_columns(
             columns,
@@ -140,7 +221,7 @@ class Auditor:
         reversal = table.get("reversal")
         direction = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
         sae = signs(context.machine.axes, "SAE", direction)
-        changed = changes(recording, columns, blocks, new, turn=sae["SA"])
+        changed = changes(loaded, columns, blocks, new, turn=sae["SA"])
         return FileAudit(
             path=name,
             sha256=recording.sha256,
@@ -177,7 +258,8 @@ class Auditor:
             source: MachineSource = "default" if file_machine is None else "file"
             machine = load_machine(file_machine or DEFAULT_MACHINE)
             trouble = (
-                f"{error.rule or 'test-toml'}: {error.what} ({error.where}); got {error.got}, "
+                f"{error.rule or 'test-toml'}: {error.what}"
+                f"{'' if error.where is None else f' ({error.where})'}; got {error.got}, "
                 f"expected {error.expected}"
             )
             return Context(machine=machine, machine_source=source, date=None, test_toml=None), trouble

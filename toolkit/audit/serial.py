@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.audit.archive_findings import noted
-from toolkit.audit.conditions import Change
 from toolkit.audit.estimate import Coefficient, Equation, Estimate, Nearest
 from toolkit.audit.model import Identification, Repair, Segment, Skipped
-from toolkit.audit.one_file import FileAudit
+from toolkit.audit.one_file import Change, FileAudit
 from toolkit.errors import OutputError
 from toolkit.publication import publication
 from toolkit.recording.extras import needed
@@ -49,16 +48,12 @@ def to_plain(file_audit: FileAudit) -> dict[str, Any]:
         "candidates": [] if identification is None else list(identification.candidates),
         "segments": []
         if identification is None
-        else [_segment(segment) for segment in identification.segments],
+        else [asdict(part) | {"candidates": list(part.candidates)} for part in identification.segments],
         "in_force": None if identification is None else identification.in_force,
-        "repair": None
-        if repair is None
-        else {"FY_max_abs_N": repair.FY_max_abs_N, "MZ_max_abs_Nm": repair.MZ_max_abs_Nm},
+        "repair": None if repair is None else asdict(repair),
         "conditions": [_change(change) for change in file_audit.changes],
         "estimate": None if file_audit.estimate is None else _estimate(file_audit.estimate),
-        "skipped": []
-        if identification is None
-        else [{"id": s.id, "reason": s.reason} for s in identification.skipped],
+        "skipped": [] if identification is None else [asdict(record) for record in identification.skipped],
         "reason": file_audit.reason,
         "test_toml": file_audit.context,
         "units": dict(file_audit.units),
@@ -94,7 +89,7 @@ def from_plain(plain: Mapping[str, Any]) -> FileAudit:
         units=tuple(plain["units"].items()),
         values_sha256=plain["values_sha256"],
         modified=_date(plain["modified"]),
-        changes=tuple(_changed(change) for change in plain["conditions"]),
+        changes=tuple(Change(**change) for change in plain["conditions"]),
         estimate=None if estimate is None else _estimated(estimate),
         notes=tuple(noted(note, plain["path"]) for note in plain["notes"]),
     )
@@ -110,10 +105,6 @@ def _date(text: str | None) -> dt.date | None:
 
 def _change(change: Change) -> dict[str, Any]:
     return {name: getattr(change, name) for name in _CHANGE}
-
-
-def _changed(plain: Mapping[str, Any]) -> Change:
-    return Change(**plain)
 
 
 def _estimate(estimate: Estimate) -> dict[str, Any]:
@@ -155,17 +146,6 @@ def _estimated(plain: Mapping[str, Any]) -> Estimate:
         ),
         nearest=None if plain["nearest"] is None else Nearest(**plain["nearest"]),
     )
-
-
-def _segment(segment: Segment) -> dict[str, Any]:
-    return {
-        "first_row": segment.first_row,
-        "last_row": segment.last_row,
-        "record": segment.record,
-        "variant": segment.variant,
-        "grade": segment.grade,
-        "candidates": list(segment.candidates),
-    }
 
 
 def _identification(plain: Mapping[str, Any]) -> Identification:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.audit.candidates import unfit
+from toolkit.audit.candidates import cannot_correct
 from toolkit.audit.choices import Choices
 from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.context import context_of
@@ -249,7 +249,7 @@ class _Drifted:
         why = (
             "no record was in force"
             if record is None
-            else unfit(record, columns) or unfit(self.true, columns)
+            else cannot_correct(record, columns) or cannot_correct(self.true, columns)
         )
         if record is None or why is not None or columns.loads != ("FY", "MZ"):
             reason = why or "the file has not both Fy and Mz"

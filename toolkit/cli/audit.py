@@ -9,20 +9,8 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import (
-    Calibrations,
-    Draft,
-    Home,
-    Json,
-    KnownAt,
-    Quiet,
-    answers,
-    day,
-    into_file,
-    into_folder,
-    progress,
-    stream,
-)
+from toolkit.cli.console import answers, progress, stream
+from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_file, into_folder
 
 NAME = "audit"
 
@@ -82,10 +70,9 @@ def command(
     ] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Tell for every file of an archive which calibration computed its Fy and Mz.
 
@@ -107,16 +94,16 @@ def command(
     order = AuditOrder(
         archive=archive, known_at=day(known_at), workers=1 if workers is None else workers,
         scheduler=scheduler, out=out, reports=reports, since_good=since_good, repair=repair,
-        template=template, parquet=parquet, draft=draft, calibrations=calibrations, home=home,
+        template=template, parquet=parquet, draft=draft, calibrations=place.calibrations, home=place.home,
     )  # fmt: skip
     began = time.perf_counter()
-    result, written = audit(order, stage=partial(progress, show=not quiet and not json))
-    if json:
+    result, written = audit(order, stage=partial(progress, show=not output.silent))
+    if output.json:
         seconds = time.perf_counter() - began
         rate = len(result.made.files) / seconds if seconds else None
         timing = {"seconds": seconds, "files_per_second": rate, "reused": result.made.reused}
         stream({**payload_of(result), "written": [str(path) for path in written], "timing": timing})
-    elif not quiet:
+    elif not output.quiet:
         width = shutil.get_terminal_size().columns
         typer.echo("\n".join([text_of(result, width=width), *(str(path) for path in written)]))
     return 0 if result.made.clean else 1

@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import (
-    Answers,
-    Home,
-    Json,
-    LockFile,
-    Machine,
-    NewCalibrations,
-    Quiet,
-    RequestFile,
-    Sign,
-    answer,
-    answers,
-    exit_code,
-    into_folder,
-    new_registry,
-    open_signers,
-    open_travel,
-)
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import EntryOptions, Machine, Output, into_folder, new_registry
 from toolkit.errors import ConfigError
 
 NAME = "calibrate"
@@ -42,7 +27,6 @@ Figures = Annotated[
 @answers("toolkit.lab.session_answer:CalibrateAnswer")
 def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
-    calibrations: NewCalibrations = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", callback=new_registry, help="Another name for --calibrations."),
@@ -54,15 +38,11 @@ def command(
     again: Annotated[
         bool, typer.Option("--again", help="Enter a session anew whose record was discarded.")
     ] = False,
-    lock_file: LockFile = False,
-    sign: Sign = None,
-    request: RequestFile = None,
-    answers: Answers = None,
     full: Full = False,
     figures: Figures = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    entering: EntryOptions,
+    output: Output,
 ) -> int:
     """Fit a session: a candidate record and its diagnostics.
 
@@ -73,9 +53,7 @@ def command(
     """
     from toolkit.calibration.control.calibrate import calibrate, rehearse
     from toolkit.calibration.records.use import UNSIGNED
-    from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.answers import refuse_unwritable
-    from toolkit.lab.home import registry_to_write
     from toolkit.lab.sealing import standards_of
     from toolkit.lab.session_answer import (
         NOT_ENTERED,
@@ -85,6 +63,7 @@ def command(
         next_step,
     )
 
+    calibrations = entering.calibrations
     if calibrations is not None and out is not None and calibrations != out:
         raise ConfigError(
             "the registry is named twice",
@@ -94,10 +73,7 @@ def command(
             next_step="leave one of them out; nothing was written",
             rule="usage",
         )
-    registry = Registry(
-        registry_to_write(calibrations or out, home), lock_file=lock_file, signers=open_signers(sign),
-        travel=open_travel(request, answers),
-    )  # fmt: skip
+    registry = replace(entering, calibrations=calibrations or out).registry()
     if dry_run and figures is not None:
         raise ConfigError(
             "a dry run makes no files",
@@ -118,7 +94,7 @@ def command(
     if status == "candidate":
         text += f"\n\nnext: {next_step(registry, candidate.record, machine)}"
     payload: dict[str, Any] = {**fitted, "dry_run": dry_run}
-    if full or as_json or figures is not None:
+    if full or output.json or figures is not None:
         from toolkit.calibration.standards.evaluation import evaluations
 
         payload["standards"] = [row.as_dict() for row in evaluations(candidate.fit)]
@@ -127,5 +103,5 @@ def command(
             payload["loads"][name]["report"] = load
         payload |= report.payload
         text += report.text
-    answer(payload, text, as_json=as_json, quiet=quiet)
+    output.answer(payload, text)
     return 0 if candidate.existing else exit_code(candidate.findings)

@@ -9,31 +9,17 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import (
-    Answers,
-    Calibrations,
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import (
     Draft,
-    Home,
     Id,
-    IssuedBy,
-    Json,
+    IssueOptions,
     KnownAt,
-    LockFile,
-    Quiet,
-    RequestFile,
-    Seal,
-    Sign,
-    TimeStamp,
-    answer,
-    answers,
-    ask_passphrase,
+    Output,
+    RegistryOptions,
     day,
-    exit_code,
     into_file,
     into_folder,
-    open_signers,
-    open_travel,
-    progress,
 )
 
 CERTIFICATE = "certificate"
@@ -73,24 +59,22 @@ def budget(
             "--figure", callback=into_file, help="Draw shares and U over the range: .png, .svg or .pdf."
         ),
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Tell the uncertainty of a record's loads: components with shares, U with k, U over the range.
 
     Example: toolkit calibration budget rig-r2 --load FY --at 4000N
     """
     from toolkit.lab.budget import BudgetOrder, budget_answer, temperature_of
-    from toolkit.lab.home import open_registry
 
     order = BudgetOrder(
         load=load, at=at, indications=indications, trials=trials, seed=seed, digits=digits, figure=figure,
         temperature=temperature_of(temperature_range, temperature_coefficient),
     )  # fmt: skip
-    payload, text, findings = budget_answer(open_registry(calibrations, home), record_id, order)
-    answer(payload, text, as_json=as_json, quiet=quiet)
+    payload, text, findings = budget_answer(place.registry(), record_id, order)
+    output.answer(payload, text)
     return exit_code(findings)
 
 
@@ -112,10 +96,9 @@ def apply(
     ] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Compute the loads of a file of indications by a record, each value with its expanded uncertainty.
 
@@ -125,14 +108,13 @@ def apply(
     """
     from toolkit.lab.applied import apply_answer
     from toolkit.lab.budget import values_of
-    from toolkit.lab.home import open_registry
     from toolkit.lab.record import Record
 
-    registry = open_registry(calibrations, home)
+    registry = place.registry()
     record = Record(result=registry.load(record_id), registry=registry, on=day(on), known_at=day(known_at))
     zero = None if tare is None else values_of(tare, "--tare")
     payload, text, loads = apply_answer(record, data, out, tare=zero, draft=draft)
-    answer(payload, text, as_json=as_json, quiet=quiet)
+    output.answer(payload, text)
     return exit_code(loads.findings)
 
 
@@ -165,21 +147,13 @@ def certificate(
             "with --seal.",
         ),
     ] = False,
-    sign: Sign = None,
-    request: RequestFile = None,
-    issued_by: IssuedBy = None,
-    answers: Answers = None,
-    lock_file: LockFile = False,
-    seal: Seal = None,
-    time_stamp: TimeStamp = None,
     known_at: KnownAt = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep what was not verified in rejected/ of the folder.")
     ] = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    issuing: IssueOptions,
+    output: Output,
 ) -> int:
     """Issue the calibration certificate of a record: Word, verified PDF, and with --dcc the XML.
 
@@ -190,29 +164,22 @@ def certificate(
     Example: toolkit calibration certificate rig-r3 --out certificates --dcc
     """
     from toolkit.lab.certificate import certificate_payload, certificate_text, deliver_certificate
-    from toolkit.lab.home import home_template, open_registry
-    from toolkit.lab.sealing import open_sealing
+    from toolkit.lab.home import home_template
     from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
-    opened = read_template(template or home_template("certificate.docx", home))
-    registry = open_registry(
-        calibrations,
-        home,
-        lock_file=lock_file,
-        signers=open_signers(sign),
-        travel=open_travel(request, answers),
-    )
-    sealing = open_sealing(seal, registry.folder.parent, ask=ask_passphrase, stamps=time_stamp, draft=draft)
-    with progress(None, "certificate", show=not (json or quiet)) as step:
+    opened = read_template(template or home_template("certificate.docx", issuing.home))
+    registry = issuing.registry()
+    sealing = issuing.sealing(registry, draft=draft)
+    with output.progress("certificate") as step:
         issued, delivered = deliver_certificate(
             registry, record_id, opened,
             out or Path.cwd() / f"certificate-{record_id}", issued=day(known_at), draft=draft,
             replaces=replaces, amendment=amendment_reason, dcc=dcc, sealing=sealing, asked=issue,
-            named=issued_by or (), keep=keep, step=step,
+            named=issuing.issued_by or (), keep=keep, step=step,
         )  # fmt: skip
     payload = certificate_payload(issued, delivered, sealing, {"seconds": time.perf_counter() - started})
-    answer(payload, certificate_text(issued, delivered, sealing), as_json=json, quiet=quiet)
+    output.answer(payload, certificate_text(issued, delivered, sealing))
     return 1 if delivered.warnings else exit_code(issued.findings)
 
 
@@ -234,10 +201,9 @@ def standard(
             help="Preloads to the largest force (ISO 376); default: [standard] preloads of the session.",
         ),
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Evaluate one indication under one load by a standard: figures, class, reasons.
 
@@ -246,7 +212,6 @@ def standard(
     from toolkit.calibration.control.standard import evaluate_record
     from toolkit.errors import ConfigError
     from toolkit.lab.control_answer import evaluation_text
-    from toolkit.lab.home import open_registry
 
     if name not in ("e74", "iso376"):
         raise ConfigError(
@@ -254,7 +219,7 @@ def standard(
             next_step="name one of them", rule="usage",
         )  # fmt: skip
     evaluations = evaluate_record(
-        open_registry(calibrations, home), record_id,
+        place.registry(), record_id,
         standard="e74" if name == "e74" else "iso376",
         load=load, indication=indication, degree=degree, preloads=preloads,
     )  # fmt: skip
@@ -263,7 +228,7 @@ def standard(
         "standard": name,
         "evaluations": [evaluation.as_dict() for evaluation in evaluations],
     }
-    answer(payload, "\n\n".join(map(evaluation_text, evaluations)), as_json=as_json, quiet=quiet)
+    output.answer(payload, "\n\n".join(map(evaluation_text, evaluations)))
     return 0
 
 
@@ -280,22 +245,20 @@ def chart(
             "--baseline", min=4, help="First sessions that make the limits; default: all but the last."
         ),
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Chart the error of each check load over the sessions; exit code 1 where the newest breaks a rule.
 
     Example: toolkit calibration chart rig --out chart.png
     """
     from toolkit.lab.control_answer import chart_answer
-    from toolkit.lab.home import open_registry
 
     payload, text, findings = chart_answer(
-        open_registry(calibrations, home), instrument, load=load, baseline=baseline, out=out
+        place.registry(), instrument, load=load, baseline=baseline, out=out
     )
-    answer(payload, text, as_json=as_json, quiet=quiet)
+    output.answer(payload, text)
     return exit_code(findings)
 
 
@@ -305,10 +268,9 @@ def due(
     on: Annotated[
         datetime | None, typer.Option("--on", formats=["%Y-%m-%d"], help="The day to judge; default: today.")
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Tell when each instrument is due, as the ledger says; exit code 1 where one is overdue.
 
@@ -316,9 +278,8 @@ def due(
     """
     from toolkit.calibration.registry.clock import today
     from toolkit.lab.control_answer import due_answer
-    from toolkit.lab.home import open_registry
 
-    registry = open_registry(calibrations, home)
+    registry = place.registry()
     payload, text, findings = due_answer(registry, instrument, day(on) or today())
-    answer(payload, text, as_json=as_json, quiet=quiet)
+    output.answer(payload, text)
     return exit_code(findings)

@@ -8,23 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from toolkit.cli.console import (
-    Calibrations,
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import (
     Draft,
-    Home,
-    Json,
     KnownAt,
+    Output,
     ProtocolFile,
-    Quiet,
     Reader,
-    answer,
-    answers,
+    RegistryOptions,
     day,
-    exit_code,
     into_folder,
-    progress,
 )
-from toolkit.cli.console import reader as choose_reader
+from toolkit.cli.options import reader as choose_reader
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -114,10 +109,9 @@ def command(
     known_at: KnownAt = None,
     draft: Draft = False,
     reader: Reader = "calamine",
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Compare tests with each other, or with a maker's table.
 
@@ -151,8 +145,8 @@ def command(
             )  # fmt: skip
         return _laboratories(
             laboratories, reference, sigma, figures, out,
-            document_template(template, out, default="laboratories.docx", home=home),
-            day(known_at), json=json, quiet=quiet,
+            document_template(template, out, default="laboratories.docx", home=place.home),
+            day(known_at), output,
         )  # fmt: skip
     if not sources or reference is not None or sigma is not None:
         raise ConfigError(
@@ -164,11 +158,11 @@ def command(
     engine = choose_reader(reader)
     style = unit_choice(units or "SI")
     started = time.perf_counter()
-    opened = document_template(template, out, default="comparison.docx", home=home)
-    with progress(None, "reading", show=not (json or quiet)) as step:
+    opened = document_template(template, out, default="comparison.docx", home=place.home)
+    with output.progress("reading") as step:
         entries, findings = read_entries(
-            sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,
-            home=home, draft=draft, reader=engine, step=step,
+            sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=place.calibrations,
+            home=place.home, draft=draft, reader=engine, step=step,
         )  # fmt: skip
     comparison = compare(
         entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility
@@ -188,7 +182,7 @@ def command(
     if document is not None:
         text += f"\n\n{document.pdf}\n{document.docx}\n{document.pages} pages, verified"
         text += "".join(f"\n  warning {warning}" for warning in document.warnings)
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 1 if document is not None and document.warnings else exit_code(attention)
 
 
@@ -200,9 +194,7 @@ def _laboratories(
     out: Path | None,
     opened: Template | None,
     known_at: date | None,
-    *,
-    json: bool,
-    quiet: bool,
+    output: Output,
 ) -> int:
     from datetime import date as calendar
 
@@ -214,6 +206,6 @@ def _laboratories(
         issued=known_at or calendar.today(),  # noqa: DTZ011
     )  # fmt: skip
     payload["timing"] = {"seconds": time.perf_counter() - started}
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     warned = bool((payload["document"] or {}).get("warnings"))
     return max(int(warned), exit_code(findings))

@@ -3,200 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import functools
+import inspect
 import json
 import sys
+import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from datetime import date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.findings import Finding
-    from toolkit.trust.keys import Signer
-    from toolkit.trust.signing import Travel
-
-
-_Command = TypeVar("_Command", bound=Callable[..., int])
-
-
-def into_folder(folder: Path | None) -> Path | None:
-    """Refuse a folder that results cannot enter: the callback of an option, before anything is worked out."""
-    if folder is not None:
-        from toolkit.publication import check_folder
-
-        check_folder(folder)
-    return folder
-
-
-def into_file(path: Path | None) -> Path | None:
-    """Refuse a file that cannot be a result, as `into_folder` does."""
-    if path is not None:
-        from toolkit.publication import check_file
-
-        check_file(path)
-    return path
-
-
-def _home(folder: Path | None) -> Path | None:
-    """Refuse a home that is none: what is named is never passed over, whether it is needed or not."""
-    if folder is not None:
-        from toolkit.lab.home import find_home
-
-        find_home(folder)
-    return folder
-
-
-def _registry(folder: Path | None) -> Path | None:
-    if folder is not None:
-        from toolkit.lab.home import calibrations_folder
-
-        calibrations_folder(folder)
-    return folder
-
-
-def new_registry(folder: Path | None) -> Path | None:
-    """Refuse a registry folder that is none and cannot be made."""
-    if folder is not None:
-        from toolkit.lab.home import registry_to_write
-
-        registry_to_write(folder)
-    return folder
-
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-Calibrations = Annotated[
-    Path | None,
-    typer.Option(
-        "--calibrations",
-        callback=_registry,
-        help="Registry folder; default: calibrations/ of the laboratory's home.",
-    ),
-]
-NewCalibrations = Annotated[
-    Path | None,
-    typer.Option(
-        "--calibrations",
-        callback=new_registry,
-        help="Registry folder, made where there is none; default: calibrations/ of the laboratory's home.",
-    ),
-]
-LockFile = Annotated[
-    bool,
-    typer.Option(
-        "--lock-file",
-        help="Keep other writers out by a lock file, where the file system has no locks; all writers must.",
-    ),
-]
-Sign = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--sign",
-        metavar="KEY",
-        help="Private SSH key that signs, or the public one of a key in the agent; once for each person.",
-    ),
-]
-RequestFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--request",
-        metavar="FILE",
-        callback=into_file,
-        help="Write what is to be signed to FILE, for 'toolkit sign' on another computer; enter nothing.",
-    ),
-]
-IssuedBy = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--issued-by",
-        metavar="ID",
-        help="With --request: who will sign, whose name the document states; once for each person.",
-    ),
-]
-Answers = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--answer",
-        metavar="FILE",
-        help="Enter what was requested, by the answer of 'toolkit sign'; once for each file.",
-    ),
-]
-Machine = Annotated[
-    str | None,
-    typer.Option(
-        "--machine",
-        help="Machine definition that states the cells' polarity; default: the packaged one of the "
-        "instrument's name.",
-    ),
-]
-Home = Annotated[
-    Path | None,
-    typer.Option(
-        "--home",
-        callback=_home,
-        help="Laboratory's home; default: the nearest folder upward with calibrations/.",
-    ),
-]
-Id = Annotated[str, typer.Argument(help="Record id, such as rig-r2.")]
-CalibrationId = Annotated[
-    str | None,
-    typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
-]
-KnownAt = Annotated[
-    datetime | None,
-    typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
-]
-Draft = Annotated[
-    bool,
-    typer.Option(
-        "--draft",
-        help="Allow a record that is not approved and in force; everything made is then marked as a draft.",
-    ),
-]
-Seal = Annotated[
-    Path | None,
-    typer.Option(
-        "--seal",
-        metavar="KEY",
-        help="Seal what is issued by this key, PKCS #12 or PEM; default: TOOLKIT_SEAL_KEY.",
-    ),
-]
-TimeStamp = Annotated[
-    str | None, typer.Option("--time-stamp", metavar="URL", help="Time-stamp server of the seal (RFC 3161).")
-]
-ProtocolFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--protocol", metavar="FILE", help="Protocol (.toml); default: the test's own, else the machine's."
-    ),
-]
-Isolated = Annotated[
-    bool,
-    typer.Option(
-        "--isolated",
-        help="Run the case's own code without network, and with a read-only view of the files but for a "
-        "temporary folder; where the kernel cannot, stop.",
-    ),
-]
-Memory = Annotated[
-    float | None,
-    typer.Option(
-        "--memory", min=0.05, help="GB that each process of the case's own code may take; default 4."
-    ),
-]
-Processes = Annotated[
-    int | None,
-    typer.Option("--processes", min=1, help="Processes that this code may have at once; default 64."),
-]
-Units = Annotated[
-    str, typer.Option("--units", help="SI or lbf, for people; the JSON answer is always in SI.")
-]
-Reader = Annotated[
-    str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
-]
 
 
 def ask_passphrase(key: Path, *, twice: bool = False) -> str:
@@ -232,69 +53,61 @@ def ask_passphrase(key: Path, *, twice: bool = False) -> str:
     )  # fmt: skip
 
 
-def day(moment: datetime | None) -> date | None:
-    """Return the day of a date option, None where it was not given."""
-    return moment.date() if moment else None
+class Command:
+    """A command that takes the options of each dataclass among its parameters one by one.
 
-
-def reader(name: str) -> Literal["calamine", "both"]:
-    """Return the reader that ``--reader`` names, or refuse the word."""
-    if name not in ("calamine", "both"):
-        raise typer.BadParameter("calamine or both", param_hint="--reader")
-    return "both" if name == "both" else "calamine"
-
-
-def open_signers(keys: Sequence[Path] | None) -> tuple[Signer, ...]:
-    """Return the signers of ``--sign``; the passphrase of an encrypted key is asked for on the terminal.
-
-    Raises
-    ------
-    TrustError
-        ``signing-key``, ``weak-key``
+    Options that commands share are declared once, as the fields of such a class (`toolkit.cli.options`).
+    ``answer`` is the declaration of its JSON answer. Its options are worked out when they are asked for.
     """
-    from functools import partial
 
-    from toolkit.trust.keys import open_signer
+    def __init__(self, command: Callable[..., int], answer: str | type | None = None) -> None:
+        self._command, self.answer = command, answer
+        functools.update_wrapper(self, command)
 
-    return tuple(open_signer(key, partial(ask_passphrase, key)) for key in keys or ())
+    def __call__(self, *arguments: Any, **options: Any) -> int:
+        """Run the command; what is not given has its default."""
+        bound = self.__signature__.bind(*arguments, **options)
+        bound.apply_defaults()
+        values = bound.arguments
+        groups = {
+            name: group(**{option.name: values.pop(option.name) for option in dataclasses.fields(group)})
+            for name, group in self._groups.items()
+        }
+        return self._command(**values, **groups)
+
+    @functools.cached_property
+    def _hints(self) -> dict[str, Any]:
+        return typing.get_type_hints(self._command, include_extras=True)
+
+    @functools.cached_property
+    def _groups(self) -> dict[str, Any]:
+        return {name: held for name, held in self._hints.items() if dataclasses.is_dataclass(held)}
+
+    @functools.cached_property
+    def __signature__(self) -> inspect.Signature:
+        """Its options as parameters, those of a class in its place."""
+        parameters: list[inspect.Parameter] = []
+        for parameter in inspect.signature(self._command).parameters.values():
+            group = self._groups.get(parameter.name)
+            if group is None:
+                parameters.append(parameter.replace(annotation=self._hints[parameter.name]))
+                continue
+            hints = typing.get_type_hints(group, include_extras=True)
+            parameters += [
+                inspect.Parameter(
+                    option.name, parameter.KEYWORD_ONLY, default=option.default, annotation=hints[option.name]
+                )
+                for option in dataclasses.fields(group)
+            ]
+        return inspect.Signature(parameters)
 
 
-def open_travel(request: Path | None, answers: Sequence[Path] | None) -> Travel:
-    """Return what travels to keys elsewhere: the request to write, or the answers that came back.
-
-    Raises
-    ------
-    ConfigError
-        ``usage``: both
-    TrustError
-        ``request``: an answer is none
-    """
-    from toolkit.trust.requests import read_request
-    from toolkit.trust.signing import Travel
-
-    if request is not None and answers:
-        from toolkit.errors import ConfigError
-
-        raise ConfigError(
-            "a request and its answer are two steps", where="--request, --answer", got="both",
-            expected="one of the two",
-            next_step="make the request, let it be signed, then give --answer; nothing was changed",
-            rule="usage",
-        )  # fmt: skip
-    return Travel(request=request, answers=tuple(map(read_request, answers or ())))
-
-
-def answers(declared: str | type) -> Callable[[_Command], _Command]:
+def answers(declared: str | type) -> Callable[[Callable[..., int]], Command]:
     """Declare the JSON answer of a command: a type, or ``module:name`` of what is heavy to import.
 
     `toolkit.cli.groups` prints it as page and schema; a test looks for commands without it.
     """
-
-    def declare(command: _Command) -> _Command:
-        command.answer = declared  # type: ignore[attr-defined]
-        return command
-
-    return declare
+    return functools.partial(Command, answer=declared)
 
 
 def answer(payload: Mapping[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:

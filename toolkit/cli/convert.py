@@ -8,19 +8,8 @@ from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import (
-    Calibrations,
-    Draft,
-    Home,
-    Json,
-    KnownAt,
-    Quiet,
-    answer,
-    answers,
-    day,
-    exit_code,
-    into_file,
-)
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_file
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import Timing
 
@@ -56,10 +45,9 @@ def command(
     fmi: Annotated[str, typer.Option("--fmi", help="Version of FMI of an .fmu: 2 or 3.")] = "2",
     known_at: KnownAt = None,
     draft: Draft = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Convert between the formats that are read and written; what the target cannot hold is named.
 
@@ -75,7 +63,9 @@ def command(
     from toolkit.lab.resolve import resolve_test
 
     started = time.perf_counter()
-    resolve = partial(resolve_test, calibrations=calibrations, home=home, known_at=day(known_at), draft=draft)
+    resolve = partial(
+        resolve_test, calibrations=place.calibrations, home=place.home, known_at=day(known_at), draft=draft
+    )
     converted = convert(source, target, axes=axes, fmi=fmi, resolve=resolve)
     text = f"{target} written"
     if converted.findings:
@@ -90,5 +80,5 @@ def command(
         "findings": [finding.as_dict() for finding in converted.findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return exit_code(converted.findings)

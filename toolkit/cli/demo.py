@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json as jsonlib
+import json
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers, into_folder
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output, into_folder
 from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import Timing
 
@@ -65,8 +66,8 @@ def command(
             "--out", callback=into_folder, help="Output folder; one that an earlier demo made is replaced."
         ),
     ] = Path("demo-out"),
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Run the whole path on the packaged example.
 
@@ -79,7 +80,7 @@ def command(
     from toolkit.machine.default import SIMULATED_MACHINE
 
     started = time.perf_counter()
-    say = _silent if json or quiet else typer.echo
+    say = _silent if output.silent else typer.echo
     steps_run: list[Payload] = []
     with _stage(out) as stage:
         steps = _steps(stage)
@@ -102,7 +103,7 @@ def command(
         say(f"      {outcome}\n      {len(figures)} figures\n")
         report = steps_run[-1]
         (stage / _MARK).write_text(
-            jsonlib.dumps({"generator": "toolkit", "content": "demo", "steps": steps_run}, indent=2)
+            json.dumps({"generator": "toolkit", "content": "demo", "steps": steps_run}, indent=2)
         )
     say(f"The report: {out / 'report.pdf'}  ({out / 'report.docx'})")
     say(f"The whole test in one file: {out / 'test.xlsx'}")
@@ -119,7 +120,7 @@ def command(
         "report": report["told"],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, "", as_json=json, quiet=quiet)
+    output.answer(payload, "")
     return 0
 
 
@@ -231,7 +232,7 @@ def _run(context: typer.Context, words: tuple[str, ...]) -> tuple[int, Payload]:
     caught = io.StringIO()
     with contextlib.redirect_stdout(caught):
         code = program.main(args=[*words, "--json"], prog_name="toolkit", standalone_mode=False)
-    payload: Payload = jsonlib.loads(caught.getvalue())
+    payload: Payload = json.loads(caught.getvalue())
     return int(code or 0), payload
 
 

@@ -8,18 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import (
-    Calibrations,
-    Home,
-    Isolated,
-    Json,
-    Memory,
-    Processes,
-    Quiet,
-    answer,
-    answers,
-    into_folder,
-)
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output, RegistryOptions, WorkerOptions, into_folder
 
 NAME = "diagnose"
 
@@ -55,13 +45,10 @@ def command(
             "--by", help="Who releases the opinion on the cause (ISO/IEC 17025, 7.8.7); else a draft."
         ),
     ] = None,
-    isolated: Isolated = False,
-    memory: Memory = None,
-    processes: Processes = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    worker: WorkerOptions,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Diagnose why a simulation and a recording differ.
 
@@ -81,21 +68,21 @@ def command(
     Example: toolkit diagnose case.toml --out answer
     """
     _one_thread()
-    from toolkit.lab.diagnosis import diagnose_case, diagnosis_text, worker_limits, write_diagnosis
+    from toolkit.lab.diagnosis import diagnose_case, diagnosis_text, write_diagnosis
     from toolkit.lab.home import home_template
     from toolkit.report.word.office import find_soffice
     from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
     # What the document needs is judged before anything is searched: it comes with the answer or not at all.
-    chosen = template or (home_template("diagnosis.docx", home) if pdf else None)
+    chosen = template or (home_template("diagnosis.docx", place.home) if pdf else None)
     opened = None if chosen is None else read_template(chosen)
     if opened is not None:
         find_soffice()
     diagnosed = diagnose_case(
-        case, out=out, model=model, calibrations=calibrations, home=home, budget_s=budget,
-        limits=worker_limits(isolated=isolated, memory_GB=memory, processes=processes),
-        tell=_teller(show=not quiet and not json),
+        case, out=out, model=model, calibrations=place.calibrations, home=place.home, budget_s=budget,
+        limits=worker.limits(),
+        tell=_teller(show=not output.silent),
     )  # fmt: skip
     payload = write_diagnosis(
         diagnosed, out, timing=lambda: {"seconds": time.perf_counter() - started}, opened=opened, by=by
@@ -107,7 +94,7 @@ def command(
         warned = bool(document["warnings"])
         text += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"
         text += "".join(f"\n  warning {warning}" for warning in document["warnings"])
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 0 if diagnosed.result.diagnosis.verdict == "nothing" and not warned else 1
 
 

@@ -9,7 +9,8 @@ from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers, exit_code, into_file
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import Output, into_file
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import Timing
 
@@ -48,8 +49,8 @@ def command(
         Path | None,
         typer.Option("--out", callback=into_file, help="Write the grid with FX, FY, MZ to a .csv."),
     ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Evaluate a tire file at every row of a grid: FX, FY [N] and MZ [N*m] are added to it.
 
@@ -85,5 +86,5 @@ def command(
         "findings": [finding.as_dict() for finding in findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, printed, as_json=json, quiet=quiet)
+    output.answer(payload, printed)
     return exit_code(findings)

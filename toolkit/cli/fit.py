@@ -9,18 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import (
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import (
     CalibrationId,
-    Calibrations,
     Draft,
-    Home,
-    Json,
     KnownAt,
-    Quiet,
-    answer,
-    answers,
+    Output,
+    RegistryOptions,
     day,
-    exit_code,
     into_file,
     into_folder,
 )
@@ -87,10 +83,9 @@ def command(
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     draft: Draft = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Fit tire models to a test or a table, every load by itself or all of them at once; no start values.
 
@@ -123,7 +118,7 @@ def command(
     if source.suffix.lower() != ".csv" and not in_field_form:
         fitted = fit_test_models(
             source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius,
-            calibration=calibration, calibrations=calibrations, home=home, known_at=day(known_at),
+            calibration=calibration, calibrations=place.calibrations, home=place.home, known_at=day(known_at),
             draft=draft,
         )  # fmt: skip
     else:
@@ -139,7 +134,7 @@ def command(
             fit = next(fit for fit in fitted.globals if fit.model == into)
             findings += write_fit(
                 tir, fit, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m,
-                use=fitted.use,
+                use=fitted.use, road=fitted.road,
             )  # fmt: skip
     payload: dict[str, Any] = {
         **fit_payload(fitted),
@@ -159,5 +154,5 @@ def command(
         text += f"\n\n{fmu} written: {modelled}, FMI {fmi}"
     if written:
         text += f"\n\n{len(written)} figures in {figures}"
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return exit_code(findings)

@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import (
-    Calibrations,
-    Home,
-    Json,
-    KnownAt,
-    Quiet,
-    answer,
-    answers,
-    day,
-    exit_code,
-)
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import KnownAt, Output, RegistryOptions, day
 
 if TYPE_CHECKING:
     from toolkit.findings import Finding
@@ -39,10 +30,9 @@ def command(
     prove: Annotated[
         bool, typer.Option("--prove", help="The interval that the printed digits allow each coefficient.")
     ] = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Show what recordings hold, and what computed them.
 
@@ -56,7 +46,7 @@ def command(
     from toolkit.lab.home import registry_if_any
     from toolkit.lab.inspection_answer import inspection_payload, inspection_text, intervals_of
 
-    registry = registry_if_any(calibrations, home)
+    registry = registry_if_any(place.calibrations, place.home)
     payloads: list[Inspected | UnreadFile] = []
     texts = []
     findings: list[Finding] = []
@@ -79,5 +69,5 @@ def command(
     payload: dict[str, Any] = {"files": payloads, "findings": [f.as_dict() for f in findings]}
     if len(payloads) == 1:  # one file: its keys stand at the top too
         payload = {**payloads[0], **payload}
-    answer(payload, "\n\n".join(texts), as_json=json, quiet=quiet)
+    output.answer(payload, "\n\n".join(texts))
     return 2 if failed else exit_code(findings)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json as jsonlib
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers, into_file, into_folder
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output, into_file, into_folder
 
 
 class InitAnswer(TypedDict):
@@ -29,8 +30,8 @@ class DocsAnswer(TypedDict):
 @answers(InitAnswer)
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", callback=into_folder, help="The home to make.")],
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Make a laboratory's home folder.
 
@@ -47,7 +48,7 @@ def init(
         f"  calibrations/       fill it with: toolkit calibrate SESSION.toml --home {folder}\n"
         f"  report_templates/   {', '.join(p.name for p in sorted((folder / TEMPLATES).glob('*.docx')))}"
     )
-    answer({"home": real_path(folder), "written": list(written)}, text, as_json=json, quiet=quiet)
+    output.answer({"home": real_path(folder), "written": list(written)}, text)
     return 0
 
 
@@ -56,8 +57,8 @@ def migrate(
     home: Annotated[Path, typer.Argument(metavar="HOME", help="The home, as an older version left it.")],
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Check and tell; write nothing.")] = False,
     undo: Annotated[bool, typer.Option("--undo", help="Put back what the last migration replaced.")] = False,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Check a home of an older version whole, and bring its files to this one.
 
@@ -70,20 +71,20 @@ def migrate(
     from toolkit.lab import migrate as migration
 
     payload, text = migration.undo(home) if undo else migration.migrate(home, dry_run=dry_run)
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return int(any(file["state"] == "refused" for file in payload["files"]))
 
 
-@answers("toolkit.lab.doctor:DoctorAnswer")
-def doctor(json: Json = False, quiet: Quiet = False) -> int:
+@answers("toolkit.lab.installation:DoctorAnswer")
+def doctor(*, output: Output) -> int:
     """Report what this computer lacks, and how to install it.
 
     Example: toolkit doctor
     """
-    from toolkit.lab.doctor import doctor_answer
+    from toolkit.lab.installation import doctor_answer
 
     payload, text = doctor_answer()
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 1 if payload["mend"] else 0
 
 
@@ -92,8 +93,8 @@ def docs(
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the place of its first page and open nothing.")
     ] = False,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Open the documentation, which needs no network: tutorials, how-tos, reference, explanations.
 
@@ -105,18 +106,18 @@ def docs(
 
     page = documentation()
     opened = not no_browser and webbrowser.open(page.as_uri())
-    answer({"page": page, "opened": opened}, str(page), as_json=json, quiet=quiet)
+    output.answer({"page": page, "opened": opened}, str(page))
     return 0
 
 
-@answers("toolkit.lab.qualification_answer:QualifyAnswer")
+@answers("toolkit.lab.installation:QualifyAnswer")
 def qualify(
     out: Annotated[
         Path | None,
         typer.Option("--out", callback=into_file, help="Write the record here: .json, else as text."),
     ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Qualify this installation: certified sets, published examples, golden vectors, and every refusal once.
 
@@ -124,19 +125,19 @@ def qualify(
     """
     from toolkit.declared import json_value
     from toolkit.lab.home import packaged_home
-    from toolkit.lab.qualification_answer import qualification_payload, qualification_text
+    from toolkit.lab.installation import qualification_payload, qualification_text
     from toolkit.publication import write_result
     from toolkit.qualification.run import qualify as run
 
     record = run(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
     payload, text = qualification_payload(record), qualification_text(record)
     if out is not None:
-        document = jsonlib.dumps(
+        document = json.dumps(
             {"schema": 1, **json_value(payload)}, ensure_ascii=False, indent=2, allow_nan=False
         )
         write_result(out, (document if out.suffix.lower() == ".json" else text) + "\n")
         text += f"\nwritten: {out}"
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 0 if record.passed else 1
 
 
@@ -154,8 +155,8 @@ def explain(
         str | None,
         typer.Option("--answer", metavar="COMMAND", help="Print the JSON schema of a command's answer."),
     ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Explain a finding's rule and what to do, an effect that a diagnosis names, or a characteristic.
 
@@ -169,5 +170,5 @@ def explain(
     from toolkit.lab.rules import explained
 
     payload, text = explained(rule)
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return 0

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers, into_file
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output, into_file
 from toolkit.findings import FindingEntry
 
 if TYPE_CHECKING:
@@ -54,8 +55,8 @@ app = typer.Typer(help="Machine definitions: show one, correct one by an answer.
 @answers(MachineAnswer)
 def show(
     machine: Annotated[str, typer.Argument(help="Name of a packaged machine, or the path of a definition.")],
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Show a machine: version, file hash, and every correction with the answer that it comes from.
 
@@ -68,7 +69,7 @@ def show(
     definition = load_machine(machine)
     path = machine_file(machine)
     payload = {"path": path, "sha256": sha256_file(path)} | _payload(definition)
-    answer(payload, _text(definition), as_json=json, quiet=quiet)
+    output.answer(payload, _text(definition))
     return 0
 
 
@@ -95,8 +96,8 @@ def correct(
         datetime | None,
         typer.Option("--on", formats=["%Y-%m-%d"], help="Day of the decision; default today."),
     ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Make the next version of a machine definition, with one effect of an answer as a correction.
 
@@ -127,7 +128,7 @@ def correct(
     text, definition = next_version(machine, correction, out=out, diagnosed_with=fitted)
     write_result(out, text)
     payload = {"path": out} | _payload(definition)
-    answer(payload, f"{_text(definition)}\nwritten to {out}", as_json=json, quiet=quiet)
+    output.answer(payload, f"{_text(definition)}\nwritten to {out}")
     return 0
 
 

@@ -7,28 +7,19 @@ from typing import TYPE_CHECKING, Annotated, TypedDict, cast
 
 import typer
 
-from toolkit.cli.console import (
-    Answers,
-    Calibrations,
-    Home,
-    Json,
-    LockFile,
-    Quiet,
-    RequestFile,
+from toolkit.cli.console import Command, answers, ask_passphrase
+from toolkit.cli.options import (
+    DecisionOptions,
+    Output,
+    RegistryOptions,
     Sign,
-    answer,
-    answers,
-    ask_passphrase,
     into_file,
     into_folder,
     open_signers,
-    open_travel,
 )
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry.registry import Registry
     from toolkit.trust.people import Role
-    from toolkit.trust.signing import Travel
 
 
 class KeyAnswer(TypedDict):
@@ -56,8 +47,8 @@ def key(
         Path, typer.Argument(callback=into_file, help="New private key; its public half is FILE.pub.")
     ],
     comment: Annotated[str, typer.Option("--comment", help="Whose it is.")] = "",
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Make an Ed25519 key, encrypted by a passphrase; keys that people have already serve as well.
 
@@ -67,7 +58,7 @@ def key(
 
     public = make_key(file, ask_passphrase(file, twice=True), comment)
     payload = {"key": str(file), "public": public.line, "fingerprint": public.fingerprint}
-    answer(payload, f"{file}.pub  {public.fingerprint}", as_json=as_json, quiet=quiet)
+    output.answer(payload, f"{file}.pub  {public.fingerprint}")
     return 0
 
 
@@ -83,14 +74,9 @@ def enrol(
         Path | None, typer.Option("--recovery", help="Key that is kept apart: first enrolment by one head.")
     ] = None,
     by: By = None,
-    sign: Sign = None,
-    request: RequestFile = None,
-    answers: Answers = None,
-    calibrations: Calibrations = None,
-    lock_file: LockFile = False,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    entering: DecisionOptions,
+    output: Output,
 ) -> int:
     """Enrol a person, or give one another key; from the first one on decisions are signed.
 
@@ -98,30 +84,26 @@ def enrol(
     """
     from toolkit.lab.people import enrol_person, people_answer
 
-    registry = _registry(
-        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
-    )
+    registry = entering.registry()
     recovered = open_signers([recovery])[0] if recovery is not None else None
     roles = cast("list[Role]", role)
     log = enrol_person(
         registry, person_id, name=name, roles=roles, key=key, reason=reason, recovery=recovered, by=by
     )
-    answer(*people_answer(log), as_json=as_json, quiet=quiet)
+    output.answer(*people_answer(log))
     return 0
 
 
 @person.command("list")
 @answers("toolkit.lab.people:PeopleAnswer")
-def list_people(
-    calibrations: Calibrations = None, home: Home = None, as_json: Json = False, quiet: Quiet = False
-) -> int:
+def list_people(*, place: RegistryOptions, output: Output) -> int:
     """List who is enrolled, with roles and keys.
 
     Example: toolkit person list
     """
     from toolkit.lab.people import people_answer
 
-    answer(*people_answer(_registry(calibrations, home).people()), as_json=as_json, quiet=quiet)
+    output.answer(*people_answer(place.registry().people()))
     return 0
 
 
@@ -135,14 +117,9 @@ def revoke(
     reason: Why,
     key: Annotated[str | None, typer.Option("--key", help="Its fingerprint; default: every key.")] = None,
     by: By = None,
-    sign: Sign = None,
-    request: RequestFile = None,
-    answers: Answers = None,
-    calibrations: Calibrations = None,
-    lock_file: LockFile = False,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    entering: DecisionOptions,
+    output: Output,
 ) -> int:
     """End a person's key from a time on; what it signed before holds, what it signed after decides nothing.
 
@@ -150,11 +127,9 @@ def revoke(
     """
     from toolkit.lab.people import people_answer, revoke_key
 
-    registry = _registry(
-        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
-    )
+    registry = entering.registry()
     log = revoke_key(registry, person_id, fingerprint=key, since=since, reason=reason, by=by)
-    answer(*people_answer(log), as_json=as_json, quiet=quiet)
+    output.answer(*people_answer(log))
     return 0
 
 
@@ -168,14 +143,9 @@ def policy(
         int, typer.Option("--signatures", help="Number of signatures, each of another person.")
     ] = 1,
     by: By = None,
-    sign: Sign = None,
-    request: RequestFile = None,
-    answers: Answers = None,
-    calibrations: Calibrations = None,
-    lock_file: LockFile = False,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    entering: DecisionOptions,
+    output: Output,
 ) -> int:
     """Say whose signatures a decision takes, and how many; what was decided before stays as it was.
 
@@ -188,18 +158,17 @@ def policy(
 
     if action not in get_args(Action):
         raise typer.BadParameter(", ".join(get_args(Action)), param_hint="ACTION")
-    registry = _registry(
-        calibrations, home, lock_file=lock_file, sign=sign, travel=open_travel(request, answers)
-    )
+    registry = entering.registry()
     log = set_demand(
         registry, cast("Action", action), roles=cast("list[Role]", role), signatures=signatures,
         reason=reason, by=by,
     )  # fmt: skip
-    answer(*people_answer(log), as_json=as_json, quiet=quiet)
+    output.answer(*people_answer(log))
     return 0
 
 
 @ledger.command()
+@Command
 def prove(
     instrument: Instrument,
     entry: Annotated[int | None, typer.Option("--entry", help="Entry, from 1; default: the last.")] = None,
@@ -207,8 +176,8 @@ def prove(
     time_stamp: Annotated[
         str | None, typer.Option("--time-stamp", metavar="URL", help="Stamp the checkpoint (RFC 3161).")
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
+    *,
+    place: RegistryOptions,
 ) -> int:
     """Print an entry with the proof that it is in the ledger of today, for `ledger check` on any later day.
 
@@ -216,10 +185,10 @@ def prove(
     """
     from toolkit.lab.people import anchor_document, checkpoint_of
 
-    registry = _registry(calibrations, home, sign=sign)
+    registry = place.registry(sign)
     document = anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument))
     if time_stamp is not None:
-        from toolkit.lab.stamping import stamped
+        from toolkit.lab.sealing import stamped
 
         document = stamped(document, time_stamp)
     typer.echo(document, nl=False)
@@ -238,20 +207,18 @@ def check(
     instrument: Annotated[
         str | None, typer.Argument(help="Instrument; default: the one that the document's proof names.")
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Tell whether today's ledger continues the one of an earlier document; exit code 1 where it does not.
 
     Example: toolkit ledger check --against certificate.pdf
     """
     from toolkit.lab.people import check_against
-    from toolkit.lab.sealing import TRUST, trusted
-    from toolkit.lab.stamping import stamp_of
+    from toolkit.lab.sealing import TRUST, stamp_of, trusted
 
-    registry = _registry(calibrations, home)
+    registry = place.registry()
     concerned, comparison = check_against(registry, instrument, against)
     stamp = stamp_of(against, trusted(registry.folder.parent / TRUST))
     text = f"{comparison.continuity}: {comparison.why}"
@@ -260,7 +227,7 @@ def check(
         text += f"\n{stamp.text}"
         payload["time_stamp"] = f"{stamp.at:%Y-%m-%dT%H:%M:%SZ}"
         payload["time_stamp_by"], payload["time_stamp_state"] = stamp.by, stamp.state
-    answer(payload, text, as_json=as_json, quiet=quiet)
+    output.answer(payload, text)
     return 0 if comparison.continuity == "continues" else 1
 
 
@@ -274,10 +241,9 @@ def witness(
     name: Annotated[str, typer.Option("--name", help="Of the witness.")],
     key: Annotated[Path, typer.Option("--key", help="The witness's private key.")],
     sign: Sign = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Let a second place countersign the ledger; it refuses what is no continuation of what it has signed.
 
@@ -285,7 +251,7 @@ def witness(
     """
     from toolkit.lab.people import witness as countersigned
 
-    registry = _registry(calibrations, home, sign=sign)
+    registry = place.registry(sign)
     signer = open_signers([key])[0]
     checkpoint, before = countersigned(registry, instrument, folder, name=name, signer=signer)
     payload = {
@@ -294,14 +260,5 @@ def witness(
         "before": before,
         "checkpoint": checkpoint.text,
     }
-    answer(payload, checkpoint.text.rstrip("\n"), as_json=as_json, quiet=quiet)
+    output.answer(payload, checkpoint.text.rstrip("\n"))
     return 0
-
-
-def _registry(
-    calibrations: Path | None, home: Path | None, *, lock_file: bool = False,
-    sign: list[Path] | None = None, travel: Travel | None = None,
-) -> Registry:  # fmt: skip
-    from toolkit.lab.home import open_registry
-
-    return open_registry(calibrations, home, lock_file=lock_file, signers=open_signers(sign), travel=travel)

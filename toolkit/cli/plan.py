@@ -10,18 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import (
-    Calibrations,
-    Home,
-    Json,
-    KnownAt,
-    Quiet,
-    answer,
-    answers,
-    day,
-    exit_code,
-    into_folder,
-)
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import KnownAt, Output, RegistryOptions, day, into_folder
 from toolkit.errors import ConfigError
 
 app = typer.Typer(help="Plans: what to measure next: sessions, tests, runs, intervals.", no_args_is_help=True)
@@ -82,10 +72,9 @@ def session(
     out: Out = None,
     template: SheetTemplate = None,
     known_at: KnownAt = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Plan the loads of the next calibration session, in their order.
 
@@ -100,7 +89,7 @@ def session(
 
     Example: toolkit plan session rig --u "FY=1.2 N" --out next
     """
-    from toolkit.lab.home import document_template, open_registry
+    from toolkit.lab.home import document_template
     from toolkit.lab.plan_session import PlanOrder, session_plan_answer
     from toolkit.planning.criteria import CRITERIA
 
@@ -115,9 +104,9 @@ def session(
         minutes=minutes, loads=loads, criterion=criterion, two_levels=two_levels, seed=seed, on=day(on),
         known_at=day(known_at), out=out, template=document_template(template, out),
     )  # fmt: skip
-    payload, text, findings = session_plan_answer(open_registry(calibrations, home), order)
+    payload, text, findings = session_plan_answer(place.registry(), order)
     payload["timing"] = {"seconds": time.perf_counter() - started}
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return max(sheet_code(payload), exit_code(findings))
 
 
@@ -147,10 +136,9 @@ def interval(
         Path | None,
         typer.Option("--template", help="Word template of --out; default: report_templates/plan.docx."),
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Plan when to calibrate again: the longest interval that keeps a reliability at its end.
 
@@ -160,14 +148,14 @@ def interval(
 
     Example: toolkit plan interval rig --reliability 0.95 --tests 200
     """
-    from toolkit.lab.home import document_template, open_registry
+    from toolkit.lab.home import document_template
     from toolkit.lab.plan_interval import interval_plan_answer
 
     started = time.perf_counter()
     payload, text, findings = interval_plan_answer(
-        open_registry(calibrations, home), instrument, reliability=reliability, tests_a_year=tests, load=load,
-        out=out, template=document_template(template, out, default="plan.docx", home=home),
+        place.registry(), instrument, reliability=reliability, tests_a_year=tests, load=load,
+        out=out, template=document_template(template, out, default="plan.docx", home=place.home),
     )  # fmt: skip
     payload["timing"] = {"seconds": time.perf_counter() - started}
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return max(sheet_code(payload), exit_code(findings))

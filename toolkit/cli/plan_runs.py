@@ -9,21 +9,8 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import (
-    CalibrationId,
-    Calibrations,
-    Draft,
-    Home,
-    Isolated,
-    Json,
-    Memory,
-    Processes,
-    Quiet,
-    answer,
-    answers,
-    into_folder,
-    progress,
-)
+from toolkit.cli.console import answers
+from toolkit.cli.options import CalibrationId, Draft, Output, RegistryOptions, WorkerOptions, into_folder
 from toolkit.cli.plan import SheetTemplate, app, sheet_code
 
 
@@ -78,10 +65,9 @@ def protocol(
     template: SheetTemplate = None,
     calibration: CalibrationId = None,
     draft: Draft = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:  # fmt: skip
     """Plan the shortest test that reaches stated uncertainties.
 
@@ -97,14 +83,14 @@ def protocol(
     order = ProtocolOrder(
         like=like, demands=tuple(u or ()), loads=tuple(load or ()), minutes=minutes,
         between_files_s=between_files, sliding_kJ=sliding, rise_K=rise,
-        calibration=calibration, calibrations=calibrations, home=home,
-        draft=draft,
+        calibration=calibration, calibrations=place.calibrations,
+        home=place.home, draft=draft,
     )  # fmt: skip
     opened = document_template(template, out)
-    with progress(None, "planning", show=not (json or quiet)) as step:
+    with output.progress("planning") as step:
         payload, text = plan_test(order, out, template=opened, tell=step)
     payload["timing"] = {"seconds": time.perf_counter() - started}
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return sheet_code(payload)
 
 
@@ -136,13 +122,10 @@ def following(
         ),
     ] = None,
     template: SheetTemplate = None,
-    isolated: Isolated = False,
-    memory: Memory = None,
-    processes: Processes = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    worker: WorkerOptions,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Propose the run that tells the members of a diagnosis' class apart.
 
@@ -152,18 +135,17 @@ def following(
 
     Example: toolkit plan next answer --out next
     """
-    from toolkit.lab.diagnosis import worker_limits
     from toolkit.lab.home import document_template
     from toolkit.lab.next_run import plan_next
 
     started = time.perf_counter()
     opened = document_template(template, out)
-    with progress(None, "planning", show=not (json or quiet)) as step:
+    with output.progress("planning") as step:
         payload, text = plan_next(
-            source, out, case=case, limits=tuple(limit or ()), budget_s=budget, calibrations=calibrations,
-            home=home, worker=worker_limits(isolated=isolated, memory_GB=memory, processes=processes),
-            template=opened, tell=step,
+            source, out, case=case, limits=tuple(limit or ()), budget_s=budget,
+            calibrations=place.calibrations, home=place.home, worker=worker.limits(), template=opened,
+            tell=step,
         )  # fmt: skip
     payload["timing"] = {"seconds": time.perf_counter() - started}
-    answer(payload, text, as_json=json, quiet=quiet)
+    output.answer(payload, text)
     return sheet_code(payload)

@@ -8,25 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toolkit.cli.console import (
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import (
     CalibrationId,
-    Calibrations,
     Draft,
-    Home,
-    Json,
     KnownAt,
+    Output,
     ProtocolFile,
-    Quiet,
     Reader,
+    RegistryOptions,
     Units,
-    answer,
-    answers,
     day,
-    exit_code,
     into_file,
-    progress,
 )
-from toolkit.cli.console import reader as choose_reader
+from toolkit.cli.options import reader as choose_reader
 
 if TYPE_CHECKING:
     from toolkit.lab.process_answer import ProcessAnswer
@@ -49,10 +44,9 @@ def command(
     units: Units = "SI",
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Turn a test's recordings into one reduced test.
 
@@ -70,12 +64,12 @@ def command(
     if out is not None:
         refuse_original(out, suffix=".xlsx")
     started = time.perf_counter()
-    with progress(None, "reading", show=not (json or quiet)) as step:
+    with output.progress("reading") as step:
         resolved = resolve_test(
             test,
             calibration=calibration,
-            calibrations=calibrations,
-            home=home,
+            calibrations=place.calibrations,
+            home=place.home,
             known_at=day(known_at),
             draft=draft,
             reader=engine,
@@ -89,5 +83,5 @@ def command(
         "content_sha256": digest,
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, process_text(resolved, out, style), as_json=json, quiet=quiet)
+    output.answer(payload, process_text(resolved, out, style))
     return exit_code(resolved.findings)

@@ -2,40 +2,25 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import (
-    Answers,
+from toolkit.cli.console import answers
+from toolkit.cli.options import (
     CalibrationId,
-    Calibrations,
     Draft,
-    Home,
-    IssuedBy,
-    Json,
+    IssueOptions,
     KnownAt,
-    LockFile,
+    Output,
     ProtocolFile,
-    Quiet,
     Reader,
-    RequestFile,
-    Seal,
-    Sign,
-    TimeStamp,
-    answer,
-    answers,
-    ask_passphrase,
     day,
     into_folder,
-    open_signers,
-    open_travel,
-    progress,
 )
-from toolkit.cli.console import reader as choose_reader
+from toolkit.cli.options import reader as choose_reader
 
 NAME = "report"
 
@@ -110,13 +95,6 @@ def command(
             "--issue", help="Enter the report in the ledger; its PDF carries the proof. With --seal always."
         ),
     ] = False,
-    sign: Sign = None,
-    request: RequestFile = None,
-    issued_by: IssuedBy = None,
-    answers: Answers = None,
-    lock_file: LockFile = False,
-    seal: Seal = None,
-    time_stamp: TimeStamp = None,
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: Annotated[
@@ -125,10 +103,9 @@ def command(
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep a report that was not verified in rejected/ of the folder.")
     ] = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    issuing: IssueOptions,
+    output: Output,
 ) -> int:
     """Fill the Word template and make the verified PDF.
 
@@ -145,33 +122,17 @@ def command(
 
     engine = choose_reader(reader)
     started = time.perf_counter()
-    issuing = None
-    if (
-        issue
-        or sign
-        or request
-        or answers
-        or seal is not None
-        or time_stamp is not None
-        or os.environ.get("TOOLKIT_SEAL_KEY")
-    ):
-        from toolkit.lab.home import open_registry
+    issued = None
+    if issue or issuing.asked:
         from toolkit.lab.issuing import open_issuing
-        from toolkit.lab.sealing import open_sealing
 
-        registry = open_registry(
-            calibrations,
-            home,
-            lock_file=lock_file,
-            signers=open_signers(sign),
-            travel=open_travel(request, answers),
-        )
-        sealing = open_sealing(
-            seal, registry.folder.parent, ask=ask_passphrase, stamps=time_stamp, draft=draft
-        )
-        issuing = open_issuing(registry, sealing, asked=issue, draft=draft, named=issued_by or ())
+        registry = issuing.registry()
+        issued = open_issuing(
+            registry, issuing.sealing(registry, draft=draft), asked=issue, draft=draft,
+            named=issuing.issued_by or (),
+        )  # fmt: skip
     # LibreOffice and matplotlib take a second to start: beside all that is imported and read here.
-    with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
+    with Office() as office, Drawer() as drawer, output.progress("report") as step:
         from toolkit.lab.answers import unit_choice
         from toolkit.lab.fit_models import model_choice
         from toolkit.lab.handover import diagnosis_of
@@ -184,14 +145,14 @@ def command(
         style = None if units is None else unit_choice(units)
         answer_and_file = diagnosis_of(diagnosis, by, tests)
         # The template is judged before anything is read: its error must not wait for a long reduction.
-        opened = read_template(template or home_template("org.docx", home))
+        opened = read_template(template or home_template("org.docx", issuing.home))
         options = Options(
             template=opened,
             resolve=partial(
                 resolve_test,
                 calibration=calibration,
-                calibrations=calibrations,
-                home=home,
+                calibrations=issuing.calibrations,
+                home=issuing.home,
                 known_at=day(known_at),
                 draft=draft,
                 reader=engine,
@@ -207,11 +168,11 @@ def command(
             diagnosis=answer_and_file,
             allow_missing=allow_missing,
             keep=keep,
-            issuing=issuing,
+            issuing=issued,
         )
         delivered = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
     payload = reports_payload(delivered, {"seconds": time.perf_counter() - started})
-    answer(payload, "\n\n".join(report_text(report) for report in delivered), as_json=json, quiet=quiet)
+    output.answer(payload, "\n\n".join(report_text(report) for report in delivered))
     return max(
         2 if report.resolved is None or isinstance(report.outcome, Exception) else int(attention(report))
         for report in delivered

@@ -8,7 +8,8 @@ from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers, ask_passphrase, into_file
+from toolkit.cli.console import answers, ask_passphrase
+from toolkit.cli.options import Output, into_file
 from toolkit.errors import ConfigError
 
 
@@ -42,8 +43,8 @@ def command(
     yes: Annotated[
         bool, typer.Option("--yes", help="Sign without asking, for use without a terminal.")
     ] = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Show everything that a request asks to sign, and sign it; no laboratory's home is needed here.
 
@@ -58,7 +59,7 @@ def command(
     if agent == (key is not None):
         raise _usage("--key, --agent", "both" if agent else "neither", "one of the two")
     opened = read_request(request)
-    if not (yes and quiet):  # consent is to what was shown
+    if not (yes and output.quiet):  # consent is to what was shown
         typer.echo(request_text(opened), err=True)
     if key is None:
         signer = agent_signer_of(opened)
@@ -72,7 +73,7 @@ def command(
         typer.confirm("sign this?", abort=True, err=True)
     path, person = sign_request(opened, signer, out)
     payload = {"answer": str(path), "by": person.id, "key": signer.public.fingerprint}
-    answer(payload, f"signed by {person.id} ({person.name}): {path}", as_json=as_json, quiet=quiet)
+    output.answer(payload, f"signed by {person.id} ({person.name}): {path}")
     return 0
 
 

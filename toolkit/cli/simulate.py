@@ -7,19 +7,8 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import (
-    Calibrations,
-    Home,
-    Isolated,
-    Json,
-    Memory,
-    Processes,
-    Quiet,
-    answer,
-    answers,
-    exit_code,
-    into_folder,
-)
+from toolkit.cli.console import answers, exit_code
+from toolkit.cli.options import Output, RegistryOptions, WorkerOptions, into_folder
 
 NAME = "simulate"
 
@@ -62,13 +51,10 @@ def command(
     budget: Annotated[
         float, typer.Option("--budget", min=1.0, help="Seconds that a model's own code may take.")
     ] = 600.0,
-    isolated: Isolated = False,
-    memory: Memory = None,
-    processes: Processes = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    worker: WorkerOptions,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Run a test or a session on the virtual machine, or print a maker's flat-surface table.
 
@@ -98,23 +84,31 @@ def command(
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
     from toolkit.lab.answers import finding_lines
-    from toolkit.lab.diagnosis import worker_limits
     from toolkit.lab.simulate import is_model_file, model_answer, simulate_plan
     from toolkit.simulation.plan import read_plan, with_effects
 
     if inputs or condition or is_model_file(plan):
         _refuse_options({"--effect": effect, "--seed": seed, "--csv": csv, "--case": case})
-        limits = worker_limits(isolated=isolated, memory_GB=memory, processes=processes)
+        limits = worker.limits()
         payload, text = model_answer(
-            plan, inputs or [], condition or [], out, calibrations, home, budget_s=budget, limits=limits
+            plan,
+            inputs or [],
+            condition or [],
+            out,
+            place.calibrations,
+            place.home,
+            budget_s=budget,
+            limits=limits,
         )
-        answer(payload, text, as_json=json, quiet=quiet)
+        output.answer(payload, text)
         return 0
     planned = with_effects(read_plan(plan, seed=seed), effect or [])
-    payload, text = simulate_plan(planned, out, calibrations=calibrations, home=home, csv=csv, case=case)
+    payload, text = simulate_plan(
+        planned, out, calibrations=place.calibrations, home=place.home, csv=csv, case=case
+    )
     findings = () if planned.tire_file is None else planned.tire_file.tir.findings()
     payload["findings"] = [finding.as_dict() for finding in findings]
-    answer(payload, "\n".join([text, *finding_lines(findings)]), as_json=json, quiet=quiet)
+    output.answer(payload, "\n".join([text, *finding_lines(findings)]))
     return exit_code(findings)
 
 

@@ -9,7 +9,8 @@ from typing import Annotated, Any, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output
 
 
 class StarterAnswer(TypedDict):
@@ -57,82 +58,90 @@ def _group() -> None:
 @session.command(NEW)
 @answers(StarterAnswer)
 def new_session(
-    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
-    json: Json = False, quiet: Quiet = False,
+    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None, *,
+    output: Output,
 ) -> int:  # fmt: skip
     """Begin a session file; --from takes loads and indications from a table's headers and units.
 
     Example: toolkit session new SESSION.toml --from loads.csv --set instrument=press-7
     """
-    return _begin("session", file, entries, recording, ask=ask, json=json, quiet=quiet)
+    return _begin("session", file, entries, recording, output, ask=ask)
 
 
 @answers(StarterAnswer)
 def new_machine(
-    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
-    json: Json = False, quiet: Quiet = False,
+    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None, *,
+    output: Output,
 ) -> int:  # fmt: skip
     """Begin a machine definition; --from takes the columns from a recording's headers and units.
 
     Example: toolkit machine new belt.toml --from run_01.csv --set name=belt-2
     """
-    return _begin("machine", file, entries, recording, ask=ask, json=json, quiet=quiet)
+    return _begin("machine", file, entries, recording, output, ask=ask)
 
 
 @test.command(NEW)
 @answers(StarterAnswer)
 def new_test(
-    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
-    quiet: Quiet = False,
+    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, *, output: Output,
 ) -> int:  # fmt: skip
     """Begin the test.toml of a folder of recordings.
 
     Example: toolkit test new test.toml --set machine=belt.toml --set date=2026-03-17
     """
-    return _begin("test", file, entries, None, ask=ask, json=json, quiet=quiet)
+    return _begin("test", file, entries, None, output, ask=ask)
 
 
 @case.command(NEW)
 @answers(StarterAnswer)
 def new_case(
-    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None,
-    json: Json = False, quiet: Quiet = False,
+    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None, *,
+    output: Output,
 ) -> int:  # fmt: skip
     """Begin a case: a simulation and the recordings that it is held against; --from takes the channels.
 
     Example: toolkit case new CASE.toml --from run_01.csv --set simulation.kind=machine
     """
-    return _begin("case", file, entries, recording, ask=ask, json=json, quiet=quiet)
+    return _begin("case", file, entries, recording, output, ask=ask)
 
 
 @answers(StarterAnswer)
 def new_plan(
-    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, json: Json = False,
-    quiet: Quiet = False,
+    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, *, output: Output,
 ) -> int:  # fmt: skip
     """Begin a plan of the virtual machine.
 
     Example: toolkit plan new plan.toml --set date=2026-03-17
     """
-    return _begin("plan", file, entries, None, ask=ask, json=json, quiet=quiet)
+    return _begin("plan", file, entries, None, output, ask=ask)
 
 
 def _begin(
-    word: str, file: Path, words: list[str] | None, recording: Path | None, *, ask: bool | None, json: bool,
-    quiet: bool,
-) -> int:  # fmt: skip
+    word: str,
+    file: Path,
+    words: list[str] | None,
+    recording: Path | None,
+    output: Output,
+    *,
+    ask: bool | None,
+) -> int:
     from toolkit.lab.starters import entries_of, refuse_existing, start, starter_text
     from toolkit.publication import write_result
 
     refuse_existing(file)
     entries = entries_of(words or ())
     starter = start(word, entries, recording, file=file)
-    if ask or (ask is None and sys.stdin.isatty() and not (json or quiet)):
+    if ask or (ask is None and sys.stdin.isatty() and not output.silent):
         starter = start(word, entries | _asked(starter.open, starter.helps), recording, file=file)
     write_result(file, starter.text)
-    payload = {"path": file, "guessed": starter.guess.values, "not_guessed": list(starter.guess.silent)}
-    payload |= {"open": list(starter.open), "lacking": starter.guess.lacking}
-    answer(payload, starter_text(word, file, starter), as_json=json, quiet=quiet)
+    payload: StarterAnswer = {
+        "path": file,
+        "guessed": starter.guess.values,
+        "not_guessed": list(starter.guess.silent),
+        "open": list(starter.open),
+        "lacking": starter.guess.lacking,
+    }
+    output.answer(payload, starter_text(word, file, starter))
     return 0
 
 

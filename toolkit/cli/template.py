@@ -8,7 +8,8 @@ from typing import Annotated, NotRequired, TypedDict
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, answers, into_file
+from toolkit.cli.console import answers
+from toolkit.cli.options import Draft, Output, RegistryOptions, into_file
 
 
 class LintEntry(TypedDict):
@@ -78,8 +79,8 @@ app = typer.Typer(help="The contract of report templates.", no_args_is_help=True
 @answers(TemplateCheckAnswer)
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Word template, .docx or .dotx.")],
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Tell what is wrong with a template: 0 clean or mere advice, 1 findings, 2 not a safe Word file.
 
@@ -104,7 +105,7 @@ def check(
         "findings": [finding.as_dict() for finding in findings],
     }
     # Their number tells a template that another program has robbed of its controls.
-    answer(payload, text or f"{file}: no findings; {tags} different tags", as_json=json, quiet=quiet)
+    output.answer(payload, text or f"{file}: no findings; {tags} different tags")
     return 1 if any(finding.level != "note" for finding in findings) else 0
 
 
@@ -129,10 +130,9 @@ def tags(
         Path | None,
         typer.Option("--for-print", metavar="FILE.docx", help="Also a Word file of them, to copy from."),
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """List every tag that a template may use.
 
@@ -156,7 +156,7 @@ def tags(
         from toolkit.lab.resolve import resolve_test
 
         resolved = resolve_test(
-            test, calibration=calibration, calibrations=calibrations, home=home, draft=draft
+            test, calibration=calibration, calibrations=place.calibrations, home=place.home, draft=draft
         )
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
     listed = list_tags(content, style, VOCABULARIES[kind])
@@ -172,7 +172,7 @@ def tags(
     text = table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")
     written = {} if for_print is None else {"written": [str(for_print)]}
     text = text if for_print is None else str(for_print)
-    answer({"tags": listed, **written}, text, as_json=json, quiet=quiet)
+    output.answer({"tags": listed, **written}, text)
     return 0
 
 
@@ -185,8 +185,8 @@ def words(
     template: Annotated[
         Path | None, typer.Option("--template", help="Only the texts that stand in this template.")
     ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """List the phrases that documents print, with their translations: 0 whole, 1 where one is missing.
 
@@ -195,8 +195,7 @@ def words(
     from toolkit.report.word.language import fixed_texts, phrase_of
     from toolkit.report.word.package import open_package, read_template
     from toolkit.report.word.xml import stories
-    from toolkit.words.catalogue import SOURCE, languages, phrases
-    from toolkit.words.phrasebook import phrasebook
+    from toolkit.words.phrasebook import SOURCE, languages, phrasebook, phrases
 
     translated = [name for name in languages() if name != SOURCE]
     if language is not None and language not in translated:
@@ -223,12 +222,7 @@ def words(
         for name in ("phrase", *listed_languages)
     ]
     lines.append(f"{len(rows)} phrases, {len(missing)} translations missing")
-    answer(
-        {"languages": listed_languages, "phrases": rows, "missing": missing},
-        "\n".join(lines),
-        as_json=json,
-        quiet=quiet,
-    )
+    output.answer({"languages": listed_languages, "phrases": rows, "missing": missing}, "\n".join(lines))
     return 1 if missing else 0
 
 
@@ -250,8 +244,8 @@ def new(
         str, typer.Option("--language", help="Its texts in this language: en, de or fr.")
     ] = "en",
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Write a fresh copy of one of the toolkit's templates and its style file, to be changed in Word.
 
@@ -263,7 +257,7 @@ def new(
     from toolkit.report.style import style_file, style_in_language
     from toolkit.report.word.language import in_language
     from toolkit.report.word.package import read_template
-    from toolkit.words.catalogue import SOURCE, languages
+    from toolkit.words.phrasebook import SOURCE, languages
 
     sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
     if like not in sources:
@@ -289,7 +283,7 @@ def new(
         toml = toml if language == SOURCE else style_in_language(toml, language)
         (stage / file.name).write_bytes(words)
         (stage / style.name).write_text(toml, encoding="utf-8")
-    answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
+    output.answer({"template": file, "style": style}, f"{file}\n{style}")
     return 0
 
 

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, answers
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output, RegistryOptions
 
 NAME = "verify"
 
@@ -22,10 +23,9 @@ def command(
         list[Path] | None,
         typer.Option("--trust", help="Trust the certificates of this file too; may be repeated."),
     ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Tell of each document who issued it, when, over what, and whether it still holds; offline.
 
@@ -44,10 +44,10 @@ def command(
     from toolkit.lab.verification import verify_file
     from toolkit.trust.seal.x509 import with_files
 
-    trust = with_files(home_trust(home), trusted or [])
-    ledger = registry_ledger(partial(registry_if_any, calibrations, home))
+    trust = with_files(home_trust(place.home), trusted or [])
+    ledger = registry_ledger(partial(registry_if_any, place.calibrations, place.home))
     verdicts = [verify_file(path, trust, ledger=ledger) for path in files]
     rows = [json_value(verdict) for verdict in verdicts]
     payload = {**(rows[0] if len(rows) == 1 else {}), "files": rows}
-    answer(payload, "\n".join(verdict.line for verdict in verdicts), as_json=as_json, quiet=quiet)
+    output.answer(payload, "\n".join(verdict.line for verdict in verdicts))
     return max(verdict.code for verdict in verdicts)

@@ -11,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, answers, into_folder
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output, RegistryOptions, into_folder
 
 NAME = "watch"
 
@@ -56,10 +57,9 @@ def command(
     allow_missing: Annotated[
         bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
     ] = False,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Make a report as soon as the last file of a test has arrived and is whole.
 
@@ -91,18 +91,18 @@ def command(
     style = None if units is None else unit_choice(units)
     find_soffice()
     options = Options(
-        template=read_template(template or home_template("org.docx", home)),
-        resolve=partial(resolve_test, calibrations=calibrations, home=home),
+        template=read_template(template or home_template("org.docx", place.home)),
+        resolve=partial(resolve_test, calibrations=place.calibrations, home=place.home),
         units=style,
         allow_missing=allow_missing,
     )
     target = out or folder / "reports"
-    say = (lambda _text: None) if json or quiet else typer.echo
-    watched = WatchLog(keep=json)
+    say = (lambda _text: None) if output.silent else typer.echo
+    watched = WatchLog(keep=output.json)
     with alone(target), _stopping() as stop:
         watcher = watcher_of(
             folder, target, options, settle_s=settle, patience_s=patience, units=units,
-            calibrations=calibrations, home=home,
+            calibrations=place.calibrations, home=place.home,
         )  # fmt: skip
         while not stop:
             look = watcher.look()
@@ -111,7 +111,7 @@ def command(
                 break
             _sleep(interval, stop)
     payload = watched.payload()
-    answer(payload, "", as_json=json, quiet=quiet)
+    output.answer(payload, "")
     return 1 if payload["waiting"] or payload["set_aside"] or payload["attention"] else 0
 
 

@@ -8,7 +8,8 @@ from typing import Annotated, NotRequired, TypedDict
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, answers
+from toolkit.cli.console import answers
+from toolkit.cli.options import Output
 
 
 class OpenAnswer(TypedDict):
@@ -43,8 +44,8 @@ def command(
         Path | None, typer.Option("--certificate", metavar="FILE", help="Certificate of the host, PEM.")
     ] = None,
     key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="Its private key, PEM.")] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    output: Output,
 ) -> int:
     """Open the workbench: what needs a decision, sessions, records with their gates, decisions.
 
@@ -66,7 +67,7 @@ def command(
             address if person is None else f"{person} {address}" for person, address in addresses.items()
         ]
         text = "\n".join([f"workbench of {folder}", *lines, "end it with Ctrl-C"])
-        answer(payload, text, as_json=json, quiet=quiet)
+        output.answer(payload, text)
 
     serve(folder, open_registry(home=folder), listening, browser=not no_browser, say=say)
     return 0

@@ -26,11 +26,11 @@ import numpy as np
 
 from toolkit.channels import signs
 from toolkit.characteristics.catalogue import compared, of_scope
+from toolkit.characteristics.characterise import at_angles
 from toolkit.characteristics.characteristic import BOTH
 from toolkit.characteristics.groups import CHANNELS, Direction, DirectionFit, Group
 from toolkit.characteristics.model import Row
 from toolkit.characteristics.reading import Reader
-from toolkit.characteristics.rows import at_angles
 from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.errors import CellError, ColumnError, FitError, UnreadableError

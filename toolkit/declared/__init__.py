@@ -38,7 +38,7 @@ toolkit.errors.ConfigError: 2 entries cannot be used
               3 | surfaces = "flat"
             drum.speed: -72 km/h cannot be used; expected { value = NUMBER, unit = "km/h" } above 0 km/h
               4 | speed = { value = -72, unit = "km/h" }
-  expected: drum.surfaces: surface; drum.speed: { value = NUMBER, unit = "km/h" } above 0 km/h
+  expected: what stands with each of them
   next:     correct every entry that is named
 
 **Types.** ``bool``, ``int``, ``float`` (finite), ``str`` (not empty unless `Text` says so),
@@ -103,8 +103,7 @@ from toolkit.declared.marks import (
     Unit,
     UnitName,
 )
-from toolkit.declared.reading import attempt, build, read, read_text
-from toolkit.declared.writing import answer, json_value, plain, toml_text
+from toolkit.declared.text import answer, attempt, build, json_value, plain, read, read_text, toml_text
 
 __all__ = [
     "Above",

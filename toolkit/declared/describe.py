@@ -17,7 +17,7 @@ from toolkit.declared.kinds import Kind
 from toolkit.declared.lists import KeyedKind, ListKind
 from toolkit.declared.marks import Format
 from toolkit.declared.tables import Field, FormsKind, TableKind
-from toolkit.declared.writing import _table, key_of, value_text
+from toolkit.declared.text import key_of, table_lines, value_text
 
 _WIDTH = 100
 Notes = Mapping[str, str]
@@ -242,9 +242,9 @@ def _entries(
         inner = _inner_table(declared.kind)
         if isinstance(entry, list):
             for part in entry:
-                yield from (f"[[{header}]]", *_table(part, names))
+                yield from (f"[[{header}]]", *table_lines(part, names))
         elif isinstance(declared.kind, ListKind | KeyedKind) and entry is not None:
-            yield from (f"[{header}]", *_table(entry, names))
+            yield from (f"[{header}]", *table_lines(entry, names))
         elif inner is not None and (entry is not None or _is_needed(declared)):
             yield f"[{header}]"
             yield from _entries(inner, names, entry or {}, {})
@@ -260,7 +260,7 @@ def _chosen(
     if entry is not None:
         chosen = kind.tables.get(entry.get(kind.tag or ""))
         yield f"[{header}]"
-        yield from _table(entry, names) if chosen is None else _entries(chosen, names, entry, {})
+        yield from table_lines(entry, names) if chosen is None else _entries(chosen, names, entry, {})
         return
     yield f"#[{header}]" + ("   # FILL IN" if required else "")
     for at, (word, form) in enumerate(kind.tables.items()):

@@ -159,6 +159,11 @@ class _Step:
     most_effects: int = _set(4, "effects", "every further step has less evidence and more ways to be wrong")
     refined: int = _set(8, "candidates", "fitted jointly, of those that screening ranks first")
     judged: int = _set(3, "joint fits", "held out one after the other, the best first, until one stands")
+    rival: float = _set(
+        0.5,
+        "of the best fit's gain",
+        "what a rival has that may foretell better, where more than noise stays",
+    )
     far_behind: float = _set(0.25, "of the best gain", "a candidate below cannot win a joint fit")
     near: float = _set(
         40.0, "of twice the log-likelihood", "however large its share: so near to the best gain it may win"
@@ -211,6 +216,19 @@ class _Pairs:
         "of an output's held-out mean square",
         "false names on simulations a little wrong took up to 14 %",
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Unseen:
+    """What is named by its free simulation of unseen runs alone, where the rest is beyond all noise."""
+
+    runs: int = _set(3, "runs", "held out whole: two agree by chance")
+    fitted: int = _set(4, "candidates", "fitted jointly, of those that screening ranks first")
+    judged: int = _set(3, "candidates", "held out, of those that the joint fits leave the least of")
+    usual: float = _set(
+        0.9, "of the held-out mean square of the median run", "taken: what imitates another takes less"
+    )
+    every: float = _set(0.5, "of the held-out mean square of every run", "taken, or it is none of that run's")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -318,6 +336,11 @@ class _Verdict:
     taken: float = _set(
         2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"
     )
+    accuracy: float = _set(
+        0.01,
+        "of an output's spread",
+        "a simulation that nobody calibrated is off by as much without any effect",
+    )
     shown: float = _set(1.1, "times the noise's mean square", "an output with less shows no mismatch")
     telling: float = _set(
         20.0, "of the summed squares over the noise's", "an output moved by less is not told"
@@ -361,10 +384,11 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER = _Scatter()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
+UNSEEN = _Unseen()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, LATTICE, STRUCTURE, LAWS,
-    VERDICT,    LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN, LATTICE,
+    STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
 
 

@@ -148,7 +148,8 @@ def table(
 ) -> str:
     """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``.
 
-    With a ``width`` [characters] the longest texts lose their middle until a line fits; numbers stay whole.
+    With a ``width`` [characters] the longest texts lose their middle until a line fits; numbers stay whole,
+    and texts that differ still do: a line is longer where it must be.
     """
     if not rows:
         return ""
@@ -169,16 +170,37 @@ def table(
 def _shortened(
     header: Sequence[str], rows: Sequence[Sequence[str]], align: str, width: int
 ) -> list[Sequence[str]]:
+    columns = list(zip(*rows, strict=True))
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+    least = [
+        max(len(title), _told_apart(set(column))) if side == "<" else size
+        for title, column, side, size in zip(header, columns, align, widths, strict=True)
+    ]
     while sum(widths) + 2 * (len(widths) - 1) > width:
         room = [
-            size if side == "<" and size > len(title) else 0
-            for size, side, title in zip(widths, align, header, strict=True)
+            size if side == "<" and size > smallest else 0
+            for size, side, smallest in zip(widths, align, least, strict=True)
         ]
         if not any(room):
             break
         widths[room.index(max(room))] -= 1
     return [[_middle_out(cell, size) for cell, size in zip(row, widths, strict=True)] for row in rows]
+
+
+def _told_apart(texts: set[str]) -> int:
+    """Return how many characters texts need without their middles to stay as many different ones.
+
+    >>> _told_apart({"a/FM_run_1.xlsx", "a/FM_run_2.xlsx", "b/FM_run_1.xlsx"})
+    10
+    """
+    low, high = 1, max(map(len, texts), default=1)
+    while low < high:
+        size = (low + high) // 2
+        if len({_middle_out(text, size) for text in texts}) == len(texts):
+            high = size
+        else:
+            low = size + 1
+    return high
 
 
 def _middle_out(text: str, size: int) -> str:

@@ -42,6 +42,7 @@ Headline = TypedDict(
         "from": Annotated[str | None, "first month with a wrong file"],
         "to": Annotated[str | None, "last one"],
         "unjudged": Annotated[int, "files whose change cannot be computed"],
+        "without_values": NotRequired[Annotated[int, "files that hold no Fy and no Mz of their own"]],
         "unreadable": int,
         "impossible": Annotated[int, "files besides the wrong ones with an Fy or Mz that no tire has"],
     },

@@ -24,7 +24,8 @@ class Headline:
     ``wrong`` files change by the record in force on their day, ``FY_N`` and ``MZ_Nm`` at most; ``causes`` are
     the reasons with their files, the most frequent first; ``first`` and ``last`` the months of their tests.
     ``unjudged`` files are not right either, but no record says what they should hold. ``impossible`` files
-    are not among the wrong ones and hold an Fy or Mz that no tire has.
+    are not among the wrong ones and hold an Fy or Mz that no tire has. ``bare`` files hold neither of
+    their own: nothing in them is right or wrong.
     """
 
     files: int
@@ -37,6 +38,7 @@ class Headline:
     unjudged: int
     unreadable: int
     impossible: int = 0
+    bare: int = 0
 
     @property
     def sentence(self) -> str:
@@ -51,12 +53,21 @@ class Headline:
             verb = "holds" if self.impossible == 1 else "hold"
             further = " more" if self.wrong else ""
             parts.append(f"{_files(self.impossible)}{further} {verb} an Fy or Mz that no tire has")
-        if not (self.wrong or self.unjudged or self.impossible):
-            subject = "The file carries" if readable == 1 else f"All {readable} files carry"
+        with_values = readable - self.bare
+        if with_values and not (self.wrong or self.unjudged or self.impossible):
+            subject = "The file carries" if with_values == 1 else f"All {with_values} files carry"
             parts.append(f"{subject} the values of the record in force")
         if self.unjudged:
             further = " more" if self.wrong else ""
-            parts.append(f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known")
+            parts.append(
+                f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known or fits"
+            )
+        if self.bare:
+            further = " more" if with_values else ""
+            verb = (
+                "holds no Fy and no Mz of its own" if self.bare == 1 else "hold no Fy and no Mz of their own"
+            )
+            parts.append(f"{_files(self.bare)}{further} {verb}")
         if self.unreadable:
             parts.append(f"{_files(self.unreadable)} cannot be read")
         return "; ".join(parts)
@@ -94,6 +105,7 @@ class Headline:
             "unjudged": self.unjudged,
             "unreadable": self.unreadable,
             "impossible": self.impossible,
+            **({"without_values": self.bare} if self.bare else {}),
         }
 
 
@@ -104,7 +116,7 @@ def headline(audit: ArchiveAudit) -> Headline:
 
 def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     """Return the headline of the files of an audit, as its answer lists them."""
-    count = wrong = unjudged = unreadable = impossible = 0
+    count = wrong = unjudged = unreadable = impossible = bare = 0
     FY = MZ = 0.0
     causes: Counter[str] = Counter()
     months: set[str] = set()
@@ -119,6 +131,8 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
             continue
         elif repair is None:
             unjudged += 1
+        elif repair["FY_max_abs_N"] is None and repair["MZ_max_abs_Nm"] is None:
+            bare += 1
         else:
             wrong += 1
             FY = max(FY, repair["FY_max_abs_N"] or 0.0)
@@ -129,7 +143,7 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     return Headline(
         files=count, wrong=wrong, FY_N=FY, MZ_Nm=MZ, causes=tuple(causes.most_common()),
         first=min(months, default=None), last=max(months, default=None), unjudged=unjudged,
-        unreadable=unreadable, impossible=impossible,
+        unreadable=unreadable, impossible=impossible, bare=bare,
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from toolkit.audit.model import CLEAN, GRADES
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.inputs import RESULT_FILE, open_regular, unreadable
 from toolkit.lab.audit import LINES
-from toolkit.lab.curves_answer import row_chart
+from toolkit.lab.seen_test import row_chart
 
 if TYPE_CHECKING:
     from markupsafe import Markup

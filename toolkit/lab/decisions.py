@@ -1,4 +1,4 @@
-"""A decision about a session or its record, as data: typed, requested or signed, it is carried out alike."""
+"""Decisions about sessions and records: as data, carried out alike however made, and their answers."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
+from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
-from toolkit.lab.registry_answer import RecordRow
+from toolkit.lab.answers import finding_lines, table
+from toolkit.lab.registry_answer import RecordRow, record_row, void_day
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.approval import Decision
@@ -144,3 +146,78 @@ def carry_out(registry: Registry, order: Order) -> Candidate | Decision | Record
             reason=order.reason or "", by=order.by,
         )  # fmt: skip
     return discard(registry, order.record, reason=order.reason or "", by=order.by)
+
+
+def verified_answer(registry: Registry, head: str | None) -> tuple[VerifyRegistryAnswer, str]:
+    """Return what came of refitting every record, as JSON and text; ``head`` is an earlier ledger's hash."""
+    from toolkit.calibration.registry.verify import verify_registry
+
+    rows = [entry_of(VerifiedRecord, row) for row in verify_registry(registry, head)]
+    cells = [
+        [row["id"], "ok" if row["ok"] else "NOT OK", "yes" if row["verified"] else "no", row["reason"] or ""]
+        for row in rows
+    ]
+    text = table(["id", "result", "verified", "reason"], cells, align="<<<<")
+    return {"records": rows}, text or "no records"
+
+
+def import_answer(registry: Registry, file: Path, *, again: bool) -> tuple[ImportAnswer, str]:
+    """Enter a legacy record; return it as JSON and as text."""
+    from toolkit.calibration.registry.candidate import import_legacy
+
+    record, existing = import_legacy(file, registry, again=again)
+    entered: ImportedRecord = {
+        **record_row(record, registry.status(record.id), registry.signature(record.id)),
+        "existing": existing,
+        "path": str(registry.folder / record.instrument / f"{record.id}.json"),
+    }
+    text = (
+        f"{record.id}  unverified legacy import{'  (already entered)' if existing else ''}\n"
+        f"sha256 {record.sha256}\nsignature: {entered['signature']}\n"
+        f"next: toolkit calibration approve {record.id} --in-force-from DATE --checked-by NAME --reason TEXT"
+    )
+    return {"ok": True, "verified": False, "record": entered}, text
+
+
+def approval_answer(
+    registry: Registry, decision: Decision, in_force_from: dt.date
+) -> tuple[ApproveAnswer, str]:
+    """Return what became of an approval as JSON and as text."""
+    signature = registry.signature(decision.id)
+    payload = entry_of(
+        ApproveAnswer, decision,
+        approved=decision.done, in_force_from=in_force_from.isoformat(),
+        recall=registry.status(decision.id).recall, signature=signature, head=_head(registry, decision.id),
+    )  # fmt: skip
+    outcome = f"approved, in force from {in_force_from}" if decision.done else "NOT approved"
+    lines = [f"{decision.id}  {outcome}"]
+    lines += ["failed gates:", *finding_lines(decision.findings)] if decision.findings else []
+    lines += [f"note: {decision.note}"] if decision.note else []
+    lines += ["evidence:", *(f"  {text}" for text in decision.evidence)] if decision.evidence else []
+    if decision.unverifiable:
+        lines += ["terms that the check loads cannot verify:", *(f"  {t}" for t in decision.unverifiable)]
+    return payload, "\n".join([*lines, f"signature: {signature}"])
+
+
+def withdrawal_answer(registry: Registry, record_id: str, status: RecordStatus) -> tuple[WithdrawAnswer, str]:
+    """Return a withdrawn record as JSON and as text."""
+    void = void_day(status)
+    payload = entry_of(
+        WithdrawAnswer, status,
+        id=record_id, status=status.state, void_from=void, head=_head(registry, record_id),
+    )  # fmt: skip
+    return payload, f"{record_id}  withdrawn, void {'on every day' if status.void_always else f'from {void}'}"
+
+
+def discarded_answer(registry: Registry, record_id: str, status: RecordStatus) -> tuple[DiscardAnswer, str]:
+    """Return a discarded candidate as JSON and as text."""
+    payload = entry_of(
+        DiscardAnswer, status, id=record_id, status=status.state, head=_head(registry, record_id)
+    )
+    return payload, f"{record_id}  discarded: {status.reason}"
+
+
+def _head(registry: Registry, record_id: str) -> str:
+    from toolkit.calibration.registry.registry import instrument_of
+
+    return registry.head(instrument_of(record_id))

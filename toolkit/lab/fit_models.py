@@ -15,6 +15,7 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.lab.resolve import Resolved
+    from toolkit.machine.definition import Drum
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import GlobalModel, ModelFit
@@ -28,7 +29,8 @@ class Fitted:
 
     ``curves`` are the fits of single loads with their ``rotations``; ``globals`` those over all loads, of the
     rows in ``data``; ``radius_m`` the tire's free radius where it is known; ``use`` the calibration record
-    that computed the forces, None for a table; ``sweeps`` what a continuous test was split into.
+    that computed the forces, None for a table; ``sweeps`` what a continuous test was split into; ``road``
+    what the tire rolled on, None where only a table tells of the test.
     """
 
     data: Measured
@@ -40,6 +42,7 @@ class Fitted:
     radius_m: float | None
     use: CalibrationUse | None = None
     sweeps: Sweeps | None = None
+    road: Drum | None = None
 
 
 def fit_table_models(
@@ -202,7 +205,8 @@ def fit_resolved(
         data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius,
         seconds,
     )  # fmt: skip
-    return replace(fitted, use=resolved.result.reduced.calibration)
+    roads = [recording.machine.drum for _, recording in resolved.recordings]
+    return replace(fitted, use=resolved.result.reduced.calibration, road=roads[0] if roads else None)
 
 
 def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalModel, ...]]:
@@ -313,7 +317,7 @@ def fit_options(loss: str, weights: str, rated_load: float | None, radius: float
 
 def write_figures(fitted: Fitted, stage: Path) -> list[str]:
     """Write the figures of all fits into a staging folder; return their names."""
-    from toolkit.report.fit_figures import fit_figures
+    from toolkit.report.test.models import fit_figures
 
     word = fitted.use.word if fitted.use else None
     pictures = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)

@@ -153,4 +153,4 @@ def _hash(file: Path) -> str:
     from toolkit.inputs import DCC_FILE
     from toolkit.trust.seal.xml_proof import content_hash
 
-    return content_hash(read_input(file, DCC_FILE)) if file.suffix == ".xml" else sha256_file(file)
+    return str(content_hash(read_input(file, DCC_FILE))) if file.suffix == ".xml" else sha256_file(file)

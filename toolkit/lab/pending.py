@@ -284,7 +284,7 @@ def _check_stated(registry: Registry, order: Order, version: Version) -> None:
     if order.action == "enter":
         return
     ledger = registry.ledger(instrument_of(order.record))
-    able = able_people(registry, order.action, operators_of(ledger, order.record))
+    able = able_people(registry, order.action, operators_of(ledger, registry.people().history, order.record))
     for name in (order.by, order.approved_by):
         person = next((p for p in version.people.person if name and p.is_named(name)), None)
         if not name:

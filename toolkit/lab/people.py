@@ -21,9 +21,9 @@ from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
 from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import leaf_hash, root_of
-from toolkit.trust.people import MEANINGS, Action, Demand, Key, People, Person, Role
+from toolkit.trust.people import MEANINGS, RECOVERY, Action, Demand, Key, People, Person, Role
 from toolkit.trust.ssh import parse_public
-from toolkit.trust.witness import SUFFIX, countersign
+from toolkit.trust.witness import SUFFIX, countersign, place, remembered
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -79,7 +79,6 @@ class WitnessAnswer(TypedDict):
     checkpoint: str
 
 
-RECOVERY = "recovery"
 _HEAD = re.compile(r"\b[0-9a-f]{64}\b")
 
 
@@ -101,10 +100,10 @@ def enrol_person(
     since = registry.now()
     public = parse_public(_text(key), where=key)
     people = log.history.now.people.person if log.history.now is not None else ()
-    known = next((person for person in people if person.id == person_id), None)
+    enrolled = next((person for person in people if person.id == person_id), None)
     person = Person(
         id=person_id, name=name, roles=tuple(roles),
-        keys=(*(known.keys if known is not None else ()), Key(key=public.line, since=since)),
+        keys=(*(enrolled.keys if enrolled is not None else ()), Key(key=public.line, since=since)),
     )  # fmt: skip
     if log.history.now is not None:
         changed = log.history.now.people.with_person(person)
@@ -287,13 +286,15 @@ def check_against(registry: Registry, instrument: str | None, document: Path) ->
         checkpoint = anchor.checkpoint
     else:
         checkpoint = parse_checkpoint(data.decode(errors="replace"), where=document)
-    named = checkpoint.origin.removeprefix(ORIGIN)
-    if named != (instrument or named) or named not in ledgers_of(registry):
+    instrument_named = checkpoint.origin.removeprefix(ORIGIN)
+    if instrument_named != (instrument or instrument_named) or instrument_named not in ledgers_of(registry):
         raise _without(document, f"a proof of the ledger {checkpoint.origin}")
     if anchor is not None and not anchor.proved:
-        return named, Comparison("forked", "the document's own proof does not hold: it was changed")
+        return instrument_named, Comparison(
+            "forked", "the document's own proof does not hold: it was changed"
+        )
     # A ledger that is damaged is compared, too: where it broke is what was asked.
-    return named, compare(raw_lines(registry, named), checkpoint, anchor)
+    return instrument_named, compare(raw_lines(registry, instrument_named), checkpoint, anchor)
 
 
 def witness(
@@ -318,11 +319,25 @@ def witness(
     texts = lines_of(registry, instrument)
     copy = registry.folder.parent / "trust" / "witnessed" / f"{instrument}-{name}{SUFFIX}"
     check_file(copy)  # before the witness signs: it never forgets
+    _demand_memory(folder, f"{ORIGIN}{instrument}", copy)
     signed = countersign(
         folder, name, signer, checkpoint_of(registry, instrument), texts, time=int(time.time())
     )
     write_atomic(copy, signed.checkpoint.text)
     return signed.checkpoint, signed.before
+
+
+def _demand_memory(folder: Path, origin: str, copy: Path) -> None:
+    """Refuse a witness that knows less than it has signed here: it would sign a fork of what it forgot."""
+    signed, known = remembered(copy), remembered(place(folder, origin))
+    if signed is not None and (known is None or known.size < signed.size):
+        raise TrustError(
+            "the witness has forgotten what it signed", where=folder,
+            got="no checkpoint of this ledger" if known is None else f"a checkpoint of {known.size} entries",
+            expected=f"its checkpoint of {signed.size} entries, as in {copy}",
+            next_step="find out who changed the witness's folder, and put its file there again; a new place "
+            "is a witness by another --name; nothing was signed", rule="ledger-rollback",
+        )  # fmt: skip
 
 
 def _printed(texts: Sequence[str], document: Path) -> Comparison:
@@ -353,14 +368,14 @@ def _enter(
     deciding = people if now is None else now.people
     answered = [str(answer.body["by"]) for answer in registry.travel.answers]
     owners = [person.id for signer in registry.signers if (person := deciding.owner(signer.public))]
-    named = by or next(iter((*answered, *owners)), None)
-    if named is None and registry.travel.request is not None:
+    decider = by or next(iter((*answered, *owners)), None)
+    if decider is None and registry.travel.request is not None:
         raise TrustError(
             "a request says who decides", where="--by", got="nobody", expected="the id of who will sign",
             next_step="add --by ID; nothing was changed", rule="person",
         )  # fmt: skip
     return enrol(
-        registry.folder, people, signers, by=named or "nobody", reason=reason,
+        registry.folder, people, signers, by=decider or "nobody", reason=reason,
         lock_file=registry.lock_file, travel=registry.travel,
     )  # fmt: skip
 

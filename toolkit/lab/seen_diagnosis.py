@@ -18,8 +18,8 @@ from typing import Any
 
 from toolkit.errors import UnreadableError
 from toolkit.inputs import RESULT_FILE, TABLE_FILE, read_input, read_regular
-from toolkit.lab.curves_answer import SAMPLES
 from toolkit.lab.holdings import ANSWER
+from toolkit.lab.seen_test import SAMPLES
 
 PAGE, PREDICTIONS = "diagnosis.html", "predictions"
 _FIGURE = re.compile(r'<img alt="([^"]*)" src="(data:image/svg\+xml;base64,[A-Za-z0-9+/=]+)">')

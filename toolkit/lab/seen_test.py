@@ -1,17 +1,22 @@
-"""A test as a page shows it: its results with their curves, its recordings with what computed each."""
+"""A test as a page shows it: its results, its recordings with what computed each, and curves to be drawn."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.lab.curves_answer import curves_of_test, row_chart
+import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.resolve import Resolved
+    from toolkit.pipeline import TestResult
+
+    Rows = Sequence[float] | NDArray[np.float64]
 
 
 def results_answer(resolved: Resolved) -> dict[str, Any]:
@@ -74,3 +79,106 @@ def recordings_answer(folder: Path, registry: Registry) -> dict[str, Any]:
 def _condition(plain: Mapping[str, Any]) -> tuple[Any, ...]:
     steps = [block["SA_deg"] for block in plain["conditions"] if block["SA_deg"] is not None]
     return (plain["rotation"], steps[0] if steps else 0.0, plain["path"])
+
+
+K = 2.0
+"""Coverage factor of the U of one condition."""
+_POINTS = 121
+_UNITS = {"FY": "N", "MZ": "N·m"}
+SAMPLES = 3 * 2**10
+"""Rows that a chart draws at most: the others are left out, each by its place."""
+
+
+def curves_of_test(result: TestResult) -> dict[str, Any]:
+    """Return the charts of a test with the loads and directions that can be switched."""
+    from toolkit.characteristics.groups import directions_of
+    from toolkit.tires.evaluate import value_at
+
+    by_row = {(point.file, point.first_row): point for point in result.characteristics.points}
+    charts: dict[str, dict[str, Any]] = {
+        "FY": _chart("SA [deg]", "FY [N]"),
+        "MZ": _chart("SA [deg]", "MZ [N·m]"),
+        "gough": _chart("MZ [N·m]", "FY [N]"),
+    }
+    loads: list[float] = []
+    rotations: list[str] = []
+    for direction in directions_of(result.reduced, result.characteristics.fits):
+        group, rotation = direction.group, direction.group.rotation
+        if group.load_N not in loads:
+            loads.append(group.load_N)
+        if rotation not in rotations:
+            rotations.append(rotation)
+        belongs = {"load": loads.index(group.load_N), "rotation": rotation, "load_N": group.load_N}
+        points = [by_row[c.file, c.first_row] for c in group.conditions]
+        SA = [math.degrees(c.SA) for c in group.conditions]
+        FY, MZ = ([float(v) for v in group.values(channel)] for channel in ("FY", "MZ"))
+        U_FY, U_MZ = [K * p.u_FY for p in points], [K * p.u_MZ for p in points]
+        charts["FY"]["series"].append({**belongs, "x": SA, "y": FY, "U": U_FY})
+        charts["MZ"]["series"].append({**belongs, "x": SA, "y": MZ, "U": U_MZ})
+        charts["gough"]["series"].append({**belongs, "x": MZ, "y": FY, "U": U_FY, "U_x": U_MZ})
+        grid = np.linspace(group.SA[0], group.SA[-1], _POINTS)
+        lines = {}
+        for channel in ("FY", "MZ"):
+            fit = direction.fit.FY if channel == "FY" else direction.fit.MZ
+            if fit is not None:
+                lines[channel] = value_at(fit, grid).tolist()
+                line = {"x": np.degrees(grid).tolist(), "y": lines[channel], "line": True}
+                charts[channel]["series"].append({**belongs, **line})
+        if len(lines) == 2:
+            line = {"x": lines["MZ"], "y": lines["FY"], "line": True}
+            charts["gough"]["series"].append({**belongs, **line})
+    return {"charts": charts, "loads": loads, "rotations": rotations}
+
+
+def common_ranges(charts: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
+    """Return the ranges of both axes that hold every point of some charts with its U."""
+    ranges = {}
+    for axis, U in (("x", "U_x"), ("y", "U")):
+        ends = [
+            end
+            for chart in charts
+            for series in chart["series"]
+            for value, half in zip(series[axis], series.get(U) or [0.0] * len(series[axis]), strict=True)
+            for end in (value - half, value + half)
+        ]
+        if ends:
+            pad = 0.04 * (max(ends) - min(ends) or 1.0)
+            ranges[f"{axis}_range"] = [min(ends) - pad, max(ends) + pad]
+    return ranges
+
+
+def row_chart(load: str, old: Rows | None, new: Rows) -> dict[str, Any]:
+    """Return a load of one file over its rows: by the record in force, and as the file has it."""
+    thinned = max(1, -(-len(new) // SAMPLES))
+    rows = list(range(1, len(new) + 1, thinned))
+    chart = _chart("row", f"{load} [{_UNITS[load]}]")
+    if old is not None:
+        chart["series"].append({"label": "file", "x": rows, "y": _thin(old, thinned), "line": True})
+    chart["series"].append({"label": "record", "x": rows, "y": _thin(new, thinned), "line": True})
+    return chart
+
+
+def shown_conditions(
+    answer: Mapping[str, Any], curves: Mapping[str, Any], loads: Sequence[int], rotations: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return the conditions of `process --json` of some loads (by their place) and directions."""
+    wanted = [curves["loads"][place] for place in loads]
+    return [
+        condition
+        for condition in answer["conditions"]
+        if condition["used"]
+        and condition["rotation"] in rotations
+        and _nearest(curves["loads"], condition["FZ_common_N"]) in wanted
+    ]
+
+
+def _nearest(loads: Sequence[float], load: float) -> float:
+    return min(loads, key=lambda candidate: abs(candidate - load))
+
+
+def _thin(values: Rows, step: int) -> list[float]:
+    return [float(value) for value in values[::step]]
+
+
+def _chart(x_label: str, y_label: str) -> dict[str, Any]:
+    return {"x_label": x_label, "y_label": y_label, "series": []}

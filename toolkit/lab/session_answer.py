@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from toolkit.declared.answers import entry_of
 from toolkit.errors import SessionError, ToolkitError
 from toolkit.estimate import round_uncertainty
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import finding_lines, table
+from toolkit.lab.answers import finding_lines, refuse_unwritable, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.candidate import Candidate
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.findings import Finding
 
 
 class RefittedRecord(TypedDict):
@@ -149,6 +151,36 @@ def _write(fit: SessionFit, title: str, folder: Path) -> list[str]:
         for name, data in pictures.items():
             (stage / name).write_bytes(data)
     return sorted(pictures)
+
+
+def record_report(
+    registry: Registry, record_id: str, figures: Path | None
+) -> tuple[RecordReportAnswer, str, Sequence[Finding]]:
+    """Return a record's stored data, fitted again, as JSON and as text, with the findings.
+
+    Raises
+    ------
+    OutputError
+        the folder of the figures cannot be written
+    """
+    from toolkit.calibration.fit.findings import session_findings
+    from toolkit.calibration.fit.session_fit import fit_session
+    from toolkit.calibration.registry.stored import stored_session
+
+    record = registry.load(record_id)
+    fit = fit_session(stored_session(registry.folder, record))
+    refuse_unwritable(figures)
+    findings = session_findings(fit)
+    report = fit_report(fit, title=record.id, full=True, figures=figures)
+    text = f"{record.id}  {record.instrument}, session of {record.date}\nsha256 {record.sha256}{report.text}"
+    if findings:
+        text += "\n\nfindings:\n" + "\n".join(finding_lines(findings))
+    payload = entry_of(
+        RecordReportAnswer, report,
+        record=entry_of(RefittedRecord, record), findings=[finding.as_dict() for finding in findings],
+        **report.payload,
+    )  # fmt: skip
+    return payload, text, findings
 
 
 def candidate_payload(candidate: Candidate, status: str, signature: str) -> FittedSession:

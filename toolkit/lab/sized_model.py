@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from toolkit.errors import ConfigError
 from toolkit.estimate import plus_minus
 from toolkit.files import same_file
-from toolkit.lab.curves_answer import SAMPLES
 from toolkit.lab.holdings import CASE
+from toolkit.lab.seen_test import SAMPLES
 from toolkit.lab.uploads import claimed_folder
 from toolkit.publication import publication
 

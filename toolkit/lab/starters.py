@@ -19,8 +19,7 @@ from typing import Any
 from toolkit.channels import CHANNELS, channel_of
 from toolkit.declared import Source, refuse
 from toolkit.declared.describe import outline
-from toolkit.declared.reading import attempt
-from toolkit.declared.writing import value_text
+from toolkit.declared.text import attempt, value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
 from toolkit.headers import is_unit, split_header
 from toolkit.inputs import RECORDING_FILE, read_input

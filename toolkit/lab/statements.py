@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.declared import toml_text
 from toolkit.declared.declaration import fields_of
+from toolkit.declared.faults import lines_of
 from toolkit.declared.kinds import BoolKind, ChoiceKind, DateKind, FileKind, NumberKind, TextKind
-from toolkit.declared.lines import lines_of
 from toolkit.declared.lists import KeyedKind, ListKind
 from toolkit.declared.tables import Field, FormsKind, TableKind
-from toolkit.declared.writing import key_of, value_text
+from toolkit.declared.text import key_of, value_text
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:

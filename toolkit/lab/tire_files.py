@@ -12,6 +12,7 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.machine.definition import Drum
     from toolkit.reduction.model import ReducedTest
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import ModelFit
@@ -56,8 +57,9 @@ def write_fit(
     side: str,
     radius_m: float | None,
     use: CalibrationUse | None = None,
+    road: Drum | None = None,
 ) -> tuple[Finding, ...]:
-    """Write the tire file and return what should be known about it.
+    """Write the tire file and return what should be known about it; ``road`` is what the tire rolled on.
 
     Raises
     ------
@@ -85,6 +87,7 @@ def write_fit(
             f"{model.title} fitted to {source.name}", f"{len(data)} rows, {len(data.loads)} loads",
             *([f"calibration {use.id} {use.sha256}"] if use else []),
             *([use.mark] if use and use.mark else []),
+            *([f"as measured on the road of the test: {road.text}"] if road and road.curvature_per_m else []),
         ],
     )  # fmt: skip
     notes = []
@@ -104,9 +107,29 @@ def write_fit(
             f"{' and '.join(fixed)} did not vary: the coefficients that say what they change are zero in the "
             "tire file, which means not known, not without effect",
         ))  # fmt: skip
+    if road is not None and road.curvature_per_m:
+        notes.append(("tir-road", _road_note(road, radius_m)))
     if side == "UNKNOWN":
         notes.append(("tir-side", "TYRESIDE is UNKNOWN: say --side LEFT, RIGHT or SYMMETRIC as tested"))
     return tuple(Finding(rule=rule, where=str(tir), message=message, level="note") for rule, message in notes)
+
+
+def _road_note(road: Drum, radius_m: float | None) -> str:
+    """Say what a drum's curvature does to slopes at small angles, and how much of it a flat road may undo.
+
+    At one deflection the contact patch has k times the length that it has on a flat road. Bristles alone make
+    the cornering stiffness go with its square and the aligning stiffness with its cube; at one load the tire
+    deflects a little more, and a soft carcass answers less: both are bounds (Pacejka, 3rd ed. 2012, ch. 3).
+    """
+    note = f"the file holds what the tire did on {road.text}; nothing is corrected for a flat road"
+    if radius_m is None or 1 + road.curvature_per_m * radius_m <= 0:
+        return note
+    k = road.contact_length_factor(radius_m)
+    return (
+        f"{note}: its contact patch is {k:.3f} of a flat road's at one deflection, so that there cornering "
+        f"stiffness lies between 1 and {k**-2:.2f} times that of the file, aligning stiffness between 1 and "
+        f"{k**-3:.2f} times; peaks do not depend on it"
+    )
 
 
 def write_test_tir(path: Path, reduced: ReducedTest, *, comments: Sequence[str]) -> ModelFit:

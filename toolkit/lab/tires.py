@@ -94,7 +94,7 @@ class TireFit(Face):
         fit = next(fit for fit in self.result.globals if fit.model == surfaces)
         write_fit(
             Path(path), fit, self.result.data, source=Path(self.source), side=side.upper(),
-            radius_m=self.result.radius_m, use=self.result.use,
+            radius_m=self.result.radius_m, use=self.result.use, road=self.result.road,
         )  # fmt: skip
         return Path(path)
 
@@ -111,7 +111,7 @@ class TireFit(Face):
     def _plots(self) -> Mapping[str, Plot]:
         from dataclasses import replace
 
-        from toolkit.report.fit_figures import fit_plots
+        from toolkit.report.test.models import fit_plots
 
         fitted = self.result
         word = fitted.use.word if fitted.use else None

@@ -274,11 +274,9 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
         if check.signature == "unsigned":
             continue
         verdict = _verdict(path, "manifest", check, proof, proof.document, ledger)
-        if all(
-            proof.files.get(companion) == digest for companion, digest in hashes.items() if companion != name
-        ):
+        if proof.files == {file: digest for file, digest in hashes.items() if file != name}:
             return replace(verdict, why=f"{len(hashes)} files as listed, proved by {name}: {verdict.why}")
-        why = f"{name} does not list the other files"
+        why = f"{name} was issued with other files than it lists"
         return Verdict(file=str(path), kind="manifest", signature="unsigned", why=why)
     check = SealCheck(signature="unsigned", why=f"{len(hashes)} files as listed; no sealed PDF proves it")
     content = {"ledger": document.get("ledger"), "records": document.get("calibrations", [])}

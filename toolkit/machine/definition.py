@@ -111,6 +111,14 @@ class Drum:
         """Curvature of the road [1/m]: positive on a drum, negative inside one, 0 where it is flat."""
         return (-1 if self.road == "concave" else 1) / self.radius_m
 
+    @property
+    def text(self) -> str:
+        """The road in words, for messages and files."""
+        if self.road == "flat":
+            return "a flat road"
+        side = "inside" if self.road == "concave" else "outside"
+        return f"the {side} of a drum of radius {self.radius_m:.3f} m"
+
     def contact_length_factor(self, tire_radius_m: float) -> float:
         """Return the length of the contact patch over that on a flat road, at one deflection of the tire.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.declared import plain, toml_text
-from toolkit.declared.lines import lines_of
+from toolkit.declared.faults import lines_of
 from toolkit.errors import ConfigError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import SETTINGS_FILE, read_input

@@ -2,9 +2,9 @@
 
 Nothing of the budget is computed here. From the earlier test come the curves, the scatter of conditions
 about them, that of the rows within a block, and what all rows share: record, tare, machine. A design's
-conditions are put on those curves, and `characteristics.rows` reads them as it reads measured ones. Where the
-design's own residuals will have to tell the scatter, `scatter_of` says what they tell on average, degrees of
-freedom too.
+conditions are put on those curves, and `characteristics.characterise` reads them as it reads measured ones.
+Where the design's own residuals will have to tell the scatter, `scatter_of` says what they tell on average,
+degrees of freedom too.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.channels import ROTATIONS, Rotation, seen_by_cells, signs
+from toolkit.characteristics.characterise import rows_of
 from toolkit.characteristics.characteristic import Characteristic
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction, DirectionFit, Group, directions_of
 from toolkit.characteristics.model import Row
-from toolkit.characteristics.rows import rows_of
 from toolkit.characteristics.scatter import Scatter, scatter_of
 from toolkit.characteristics.shared_errors import SharedErrors, shared_errors_of
 from toolkit.errors import ConfigError

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 # Effective rolling radius over free radius of a radial passenger tire: 0.96 to 0.98.
 ROLLING_RATIO = 0.97
 
+_WHOLE = 0.02  # of a turn
+_ROWS_EACH = 8  # rows that each signal takes at least
+_NO_SIGNAL = 1e-9
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
@@ -88,24 +92,22 @@ def revolutions(
     The tire rolls on the drum: what the drum's surface travels, the tire's does too. A turn of the other
     shaft is known by the ratio of the circumferences, for which the tire's size must be known.
     """
+    protocol = machine.protocol
     tire = None if rolling_radius_m is None else 2 * np.pi * rolling_radius_m
     drum = machine.drum.circumference_m
-    source = tire if machine.protocol.revolutions_of == "tire" else drum
+    source = tire if protocol.revolutions_of == "tire" else drum
     shafts = (("TIRE_ANGLE", tire, "tire"), ("DRUM_ANGLE", drum, "drum"))
-    for symbol, around, shaft in sorted(
-        shafts, key=lambda shaft: shaft[2] != machine.protocol.revolutions_of
-    ):
+    for symbol, around, shaft in sorted(shafts, key=lambda shaft: shaft[2] != protocol.revolutions_of):
         if not recording.has(symbol):
             continue
         angle = np.unwrap(recording[symbol].si_of(block.rows))
         turns = np.asarray(np.abs(angle - angle[0]) / (2 * np.pi))
-        if shaft == machine.protocol.revolutions_of:
+        if shaft == protocol.revolutions_of:
             return turns
         if around is not None and source is not None:
             return np.asarray(turns * around / source)
     if source is None:
         return None
-    protocol = machine.protocol
     per_second = (protocol.speed_m_s or machine.drum.speed_m_s) / source
     if recording.has("t"):
         time = recording["t"].si_of(block.rows)
@@ -170,8 +172,3 @@ def _unexplained(
     basis, size, _ = np.linalg.svd(centred.T, full_matrices=False)
     basis = basis[:, size > _NO_SIGNAL * max(float(size[0]), 1e-300)]
     return residual - (residual @ basis) @ basis.T, basis.shape[1]
-
-
-_WHOLE = 0.02  # of a turn
-_ROWS_EACH = 8  # rows that each signal takes at least
-_NO_SIGNAL = 1e-9

@@ -15,23 +15,25 @@ cell moves all loads together, by its sign.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.apply import coefficient_jacobian
+from toolkit.calibration.apply import apply_record, coefficient_jacobian
 from toolkit.channels import hub_signs, signs
-from toolkit.errors import RecordError
+from toolkit.errors import ColumnError, RecordError
 from toolkit.findings import Finding
+from toolkit.recording.model import Recording, Series
 from toolkit.reduction.averaging import means
 from toolkit.reduction.corrections import zero_shifts
 from toolkit.reduction.model import HubLoad
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -113,6 +115,48 @@ def hub_means(
             variances.append((machine.hub.u_arm_m * float(np.mean(block.loads[source[0]]))) ** 2)
         hub_loads.append(HubLoad(load=load, value=mean.value, u=math.sqrt(sum(variances))))
     return tuple(hub_loads)
+
+
+def with_load(
+    recording: Recording,
+    *,
+    machine: Machine,
+    record: CalibrationRecord | None,
+    tare: Mapping[str, float] | None = None,
+) -> Recording:
+    """Return a recording whose load is the hub's FZ by the record, where it has no column of the load.
+
+    Raises
+    ------
+    ColumnError
+        ``missing-column``: there is no record to compute it by
+    """
+    if recording.has("FZ") or machine.hub is None or "FZ" not in machine.hub.loads:
+        return recording
+    if record is None:
+        raise ColumnError(
+            "the load is that of the hub's cells, and no record computes it", where=recording.path,
+            got="no column FZ, and no calibration record in force",
+            expected="a record of the hub, or a column of the load",
+            next_step="name the laboratory's home with --home, or approve a record",
+            rule="missing-column",
+        )  # fmt: skip
+    indications = {name: recording[name].values for name in record.indications}
+    units = {name: recording[name].unit for name in record.indications}
+    values = apply_record(record, indications, units=units, tare=tare, only=("FZ",))["FZ"]
+    load = Series(symbol="FZ", header="FZ by the record", unit="N", role="load", values=values)
+    return dataclasses.replace(recording, series=(*recording.series, load))
+
+
+def load_findings(recordings: Sequence[Recording], record: CalibrationRecord) -> list[Finding]:
+    """Say that the load is the hub's, where no file has a column of it."""
+    if any(recording.has("FZ") for recording in recordings):
+        return []
+    message = (
+        f"no file has a column of the load: it is the hub's FZ by {record.id}; what [type_b] states of FZ "
+        "enters uncertainties, U of the hub's FZ stands beside it"
+    )
+    return [Finding(rule="hub-load", where=recordings[0].machine.name, message=message, level="note")]
 
 
 def hub_findings(machine: Machine) -> list[Finding]:

@@ -17,7 +17,7 @@ from toolkit.reduction.averaging import Window, means, turning
 from toolkit.reduction.cells import physics_findings
 from toolkit.reduction.common_load import at_one_angle, carry, slopes
 from toolkit.reduction.corrections import choose_tares, correction_findings, zero_shifts
-from toolkit.reduction.hub import HubBlock, hub_findings, hub_means
+from toolkit.reduction.hub import HubBlock, hub_findings, hub_means, load_findings, with_load
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
 from toolkit.reduction.remarks import drift_findings
@@ -62,18 +62,23 @@ def reduce_test(
         the record does not take the machine's indications in their units, or lacks FY or MZ
     """
     check_record(record, machine)
-    blocks = [split_rests(recording, machine, info) for _, recording, _ in recordings]
+    own_load = all(recording.has("FZ") for _, recording, _ in recordings)
+    loaded = _loaded(recordings, [tare] * len(recordings), machine=machine, record=record)
+    blocks = [split_rests(recording, machine, info) for _, recording, _ in loaded]
     tares = choose_tares(
-        [(recording, empty) for (_, recording, _), (_, empty) in zip(recordings, blocks, strict=True)],
+        [(recording, empty) for (_, recording, _), (_, empty) in zip(loaded, blocks, strict=True)],
         declared=tare,
         machine=machine,
         record=record,
     )
+    if not own_load:  # by the hub's cells, whose zeros are known now
+        loaded = _loaded(recordings, tares, machine=machine, record=record)
+        blocks = [split_rests(recording, machine, info) for _, recording, _ in loaded]
     files = [
         open_file(
             name, recording, rotation, blocks=loads, tare=tare, info=info, machine=machine, record=record
         )
-        for (name, recording, rotation), (loads, _), tare in zip(recordings, blocks, tares, strict=True)
+        for (name, recording, rotation), (loads, _), tare in zip(loaded, blocks, tares, strict=True)
     ]
     measured, placed, later = _conditions(files, machine=machine, record=record, reversal=info.reversal)
     conditions = _ordered(_at_common_load(_own_loads(measured)), machine)
@@ -89,6 +94,7 @@ def reduce_test(
         *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
         *drift_findings(conditions, protocol),
         *correction_findings(machine),
+        *load_findings([recording for _, recording, _ in recordings], record),
         *hub_findings(machine),
         *remarks.machine_findings(info, machine),
         *remarks.pressure_findings(info, machine),
@@ -112,6 +118,21 @@ def reduce_test(
         machine_title=machine.title,
         stated=_stated(machine, info, files[0].tare),
     )
+
+
+def _loaded(
+    recordings: Sequence[tuple[str, Recording, Rotation]],
+    tares: Sequence[Tare | None],
+    *,
+    machine: Machine,
+    record: CalibrationRecord,
+) -> list[tuple[str, Recording, Rotation]]:
+    """Return the recordings, each with a load: its own column, or the hub's by the record and its tare."""
+    offsets = [None if tare is None or tare.source == "none" else dict(tare.values) for tare in tares]
+    return [
+        (name, with_load(recording, machine=machine, record=record, tare=offset), rotation)
+        for (name, recording, rotation), offset in zip(recordings, offsets, strict=True)
+    ]
 
 
 def _stated(machine: Machine, info: TestInfo, tare: Tare) -> tuple[TypeB, ...]:

@@ -20,13 +20,12 @@ from toolkit.publication import publication
 from toolkit.recording.marks import refuse_original
 from toolkit.report.content import Plot, ReportContent
 from toolkit.report.handover import MANIFEST, content_hash, manifest_json
-from toolkit.report.word.contents_pages import Printed, print_copies
 from toolkit.report.word.fill import fill, needed_figures
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
 from toolkit.report.word.package import Template
-from toolkit.report.word.verify import verify_docx, verify_pdf
-from toolkit.report.word.verify_text import Check
+from toolkit.report.word.toc_pages import Printed, print_copies
+from toolkit.report.word.verify import Check, verify_docx, verify_pdf
 
 if TYPE_CHECKING:
     from toolkit.report.drawer import Drawer

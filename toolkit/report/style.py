@@ -11,8 +11,7 @@ from typing import Annotated, ClassVar
 
 from toolkit.declared import AtLeast, AtMost, Entry, Format, Keyed, Size, Text, UnitName, read
 from toolkit.units import si_scale
-from toolkit.words.catalogue import SOURCE, decimal_sign, languages
-from toolkit.words.phrasebook import phrasebook
+from toolkit.words.phrasebook import SOURCE, decimal_sign, languages, phrasebook
 
 _DEFAULT_REQUIRED = ("tk:calibration.hash",)
 

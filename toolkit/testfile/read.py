@@ -11,9 +11,9 @@ from typing import Any, cast, get_type_hints
 from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
 from toolkit.channels import Rotation
 from toolkit.characteristics.catalogue import by_name
+from toolkit.characteristics.characterise import lacking_row
 from toolkit.characteristics.groups import Direction, DirectionFit, group
 from toolkit.characteristics.model import Characteristics, Point, Row, in_order
-from toolkit.characteristics.rows import lacking_row
 from toolkit.errors import RecordingError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level

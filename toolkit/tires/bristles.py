@@ -162,7 +162,7 @@ def _plain(tread: Tread, sx: Array) -> bool:
 
 
 def _forces(tread: Tread, sx: Array, sy: Array, slopes: Array, lines: int) -> Array:
-    return across(tread, sy, slopes) if _plain(tread, sx) else both(tread, sx, sy, slopes, lines)
+    return across(tread, sy, slopes) if _plain(tread, sx) else oblique(tread, sx, sy, slopes, lines)
 
 
 def _slopes(tread: Tread, sums: Array) -> Array:
@@ -223,7 +223,7 @@ def across(tread: Tread, sy: Array, slopes: Array) -> Array:
     return np.stack([np.zeros_like(sy), total + edge, moment - edge]) * step
 
 
-def both(tread: Tread, sx: Array, sy: Array, slopes: Array, lines: int) -> Array:
+def oblique(tread: Tread, sx: Array, sy: Array, slopes: Array, lines: int) -> Array:
     """Return the sums (3, cases) of bristles that move along and across, in ``lines`` over the width."""
     u = middles(len(tread.limit))
     step, between, weight, lever = _quadrature(u)

@@ -39,18 +39,18 @@ def slope_estimate_at(fit: CurveFit, SA: float) -> Estimate:
     return _estimate(fit, float(slope_at(fit, SA)), gradient, f"{CHANNEL_UNIT[fit.channel]}/rad")
 
 
-def zero_crossing(fit: CurveFit, near: float = 0.0) -> Estimate | None:
-    """Return the slip angle [rad] nearest ``near`` at which the fitted curve is zero.
+def zero_crossing(fit: CurveFit) -> Estimate | None:
+    """Return the slip angle [rad] nearest 0 at which the fitted curve is zero.
 
-    None where the curve has no zero within 20 deg of ``near``. The uncertainty is that of the value there
+    None where the curve has no zero within 20 deg. The uncertainty is that of the value there
     over the slope there.
     """
-    grid = near + np.linspace(-_REACH, _REACH, 801)
+    grid = np.linspace(-_REACH, _REACH, 801)
     y = value_at(fit, grid)
     brackets = np.flatnonzero(np.sign(y[:-1]) * np.sign(y[1:]) <= 0)
     if not len(brackets):
         return None
-    at = brackets[np.argmin(np.abs(0.5 * (grid[brackets] + grid[brackets + 1]) - near))]
+    at = brackets[np.argmin(np.abs(0.5 * (grid[brackets] + grid[brackets + 1])))]
     low, high = float(grid[at]), float(grid[at + 1])
     SA = 0.5 * (low + high)
     rising = float(y[at + 1]) > float(y[at])

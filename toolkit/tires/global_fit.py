@@ -27,7 +27,7 @@ from toolkit.tires.global_model import (
     pooled_percent,
 )
 from toolkit.tires.global_seeds import LACKS, seeds_of, why_not_global
-from toolkit.tires.global_stage import Found, Task, refit, run
+from toolkit.tires.global_stage import StageFit, Task, refit, run
 from toolkit.tires.model import LOSSES, Loss, Parameter
 from toolkit.tires.quality import scatter_floor_percent
 
@@ -56,7 +56,7 @@ class Report:
     loss: str
     weights: str
 
-    def fit(self, channel: str, channels: tuple[str, ...], stage: Found) -> GlobalFit:
+    def fit(self, channel: str, channels: tuple[str, ...], stage: StageFit) -> GlobalFit:
         """Return what a channel's stage found."""
         y, parameters = self.given[channel], self.model.parameters
         residual = self.curves[channel] - y
@@ -69,15 +69,15 @@ class Report:
             if (parameter.stage == channel or (joint and parameter.stage in channels))
             and not (no_slip and _SLIP & set(parameter.needs))
         ]
-        errors = dict(zip(stage.left, np.sqrt(np.maximum(np.diag(stage.covariance), 0.0)), strict=True))
+        errors = dict(zip(stage.free, np.sqrt(np.maximum(np.diag(stage.covariance), 0.0)), strict=True))
         fixed = dict(stage.fixed)
         unknown = {*fixed, *stage.undetermined}
         loads = self._loads(channel, residual, stage)
         converged = stage.agreeing >= 2
         away = self.predicted.get(channel)
         floor = scatter_floor_percent(self.given.rows.SA, y, cell(self.given))
-        free = [place for place in stage.left if place in own]
-        index = [stage.left.index(place) for place in free]
+        free = [place for place in stage.free if place in own]
+        index = [stage.free.index(place) for place in free]
         at_bound = tuple(parameters[p].name for p in stage.bound if p in own)
         return GlobalFit(
             model=self.model.name,
@@ -85,7 +85,7 @@ class Report:
             axes=self.given.axes,
             parameter_axes=self.model.axes,
             n=len(y),
-            dof=len(y) * len(channels) - len(stage.left),
+            dof=len(y) * len(channels) - len(stage.free),
             parameters=tuple(
                 Parameter(
                     name=parameters[place].name,
@@ -113,7 +113,7 @@ class Report:
             message=self._message(channel, joint, stage, own, converged, at_bound),
         )
 
-    def _loads(self, channel: str, residual: Array, stage: Found) -> tuple[LoadShare, ...]:
+    def _loads(self, channel: str, residual: Array, stage: StageFit) -> tuple[LoadShare, ...]:
         y, away, errors = self.given[channel], self.predicted.get(channel), []
         for block in np.unique(self.data.block):
             own = self.data.block == block
@@ -131,7 +131,7 @@ class Report:
             )
         return tuple(errors)
 
-    def _slope(self, channel: str, load: float, stage: Found) -> Estimate | None:
+    def _slope(self, channel: str, load: float, stage: StageFit) -> Estimate | None:
         # The slope at SA = 0, upright, free rolling, at nominal pressure and speed; delta method.
         if channel == "FX" or np.abs(self.data.rows.SA).min() > _NEAR:
             return None
@@ -140,7 +140,7 @@ class Report:
             [-_H, _H], load, FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL,
             UNLOADED_RADIUS=r.UNLOADED_RADIUS,
         )  # fmt: skip
-        free = [*stage.left, *stage.held]
+        free = [*stage.free, *stage.held]
         size = np.array([self.model.parameters[place].size for place in free])
         step = 1e-4 * size
         copies: list[object] = []
@@ -167,7 +167,7 @@ class Report:
         self,
         channel: str,
         joint: bool,
-        stage: Found,
+        stage: StageFit,
         own: list[int],
         converged: bool,
         at_bound: tuple[str, ...],
@@ -304,7 +304,7 @@ class _Fitter:
         return [(name,) for name in have]
 
     def result(self, *, predict: bool) -> ModelFit:
-        founds: dict[tuple[str, ...], Found] = {}
+        stages: dict[tuple[str, ...], StageFit] = {}
         for channels in self.stages():
             free, fixed = self._free(channels)
             stage = self._run(channels, free, self.data)
@@ -313,13 +313,13 @@ class _Fitter:
                 stage = self._run(channels, free, self.data, (stage.values,))
             stage = replace(stage, fixed=(*fixed, *stage.fixed))
             self.values = stage.values
-            founds[channels] = stage
+            stages[channels] = stage
         curves = self._curves(self.values, self.data)
         report = Report(
             model=self.model, given=self.given, data=self.data, values=self.values, curves=curves,
-            predicted=self._predict(founds) if predict else {}, loss=self.loss, weights=self.weights,
+            predicted=self._predict(stages) if predict else {}, loss=self.loss, weights=self.weights,
         )  # fmt: skip
-        fits = [report.fit(name, channels, stage) for channels, stage in founds.items() for name in channels]
+        fits = [report.fit(name, channels, stage) for channels, stage in stages.items() for name in channels]
         return ModelFit(
             model=self.model.name, values=self.values, fits=tuple(fits), curves=tuple(curves.items())
         )
@@ -352,7 +352,7 @@ class _Fitter:
         free: tuple[int, ...],
         data: Measured,
         more: tuple[Array, ...] = (),
-    ) -> Found:
+    ) -> StageFit:
         robust = self.loss == "robust"
         coarse, count, width = self._bins(data)
         task = Task(
@@ -392,21 +392,21 @@ class _Fitter:
             responses = self.model.forces(values, rows)
         return {name: responses[name] for name in self.model.channels if getattr(responses, name) is not None}
 
-    def _predict(self, founds: dict[tuple[str, ...], Found]) -> dict[str, Array]:
+    def _predict(self, stages: dict[tuple[str, ...], StageFit]) -> dict[str, Array]:
         # Every block predicted by a fit that never saw it, from where the whole fit ended.
         blocks = np.unique(self.data.block)
         if len(blocks) < _PREDICT_FROM:
             return {}
-        predicted = {name: np.zeros(len(self.data)) for channels in founds for name in channels}
+        predicted = {name: np.zeros(len(self.data)) for channels in stages for name in channels}
         kept_values, kept_starts, kept_sigma = self.values.copy(), self.starts, dict(self.sigma)
         for block in blocks:
             in_block = self.data.block == block
             remaining = self.data.take(~in_block)
             self.values = kept_values.copy()
             self.sigma = {name: values[~in_block] for name, values in kept_sigma.items()}
-            for channels, stage in founds.items():
+            for channels, stage in stages.items():
                 self.starts = self.values[None]
-                self.values = self._refit(channels, stage.left, remaining)
+                self.values = self._refit(channels, stage.free, remaining)
             curves = self._curves(self.values, self.data.take(in_block))
             for name, column in predicted.items():
                 column[in_block] = curves[name]

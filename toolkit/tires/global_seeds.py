@@ -24,14 +24,14 @@ _NEAR = np.radians(2.5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Found:
+class SeedFits:
     """Seeds with the fits they come from (upright, free rolling rows; in the data's axes)."""
 
     seeds: Seeds
     fits: tuple[CurveFit, ...]
 
 
-def seeds_of(data: Measured) -> Found:
+def seeds_of(data: Measured) -> SeedFits:
     """Return seeds of rows that have FY, MZ or both; loads at which no curve can be fitted give a line."""
     base = data.turned("ISO-W")
     r = base.rows
@@ -72,7 +72,7 @@ def seeds_of(data: Measured) -> Found:
         load=np.array(loads), stiffness=np.array(stiffness), peak=np.array(peak), peak_angle=np.array(angle),
         trail=np.array(trail), FNOMIN=data.rows.FNOMIN, reach=reach,
     )  # fmt: skip
-    return Found(seeds=seeds, fits=tuple(fits))
+    return SeedFits(seeds=seeds, fits=tuple(fits))
 
 
 def _curve(means: Measured, in_block: NDArray[np.bool_], channel: Literal["FY", "MZ"], load: float) -> Curve:

@@ -52,18 +52,18 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Found:
-    """What a stage found: ``values`` of all parameters, ``covariance`` of those that are ``left`` free.
+class StageFit:
+    """What a stage found: ``values`` of all parameters, ``covariance`` of those that stayed ``free``.
 
-    ``held`` were set to their defaults, and ``spread`` that of ``left`` and ``held`` with the held
-    ones free within their bounds: what follows from the curve, a stiffness, is uncertain by theirs too.
+    ``held`` were set to their defaults, and ``spread`` that of ``free`` and ``held`` with the held
+    ones moving within their bounds: what follows from the curve, a stiffness, is uncertain by theirs too.
     ``fixed`` (place, reason); ``bound`` places at a bound; ``undetermined`` places without a standard error;
     ``time`` autocorrelation time of the residuals; ``dof`` degrees of freedom;
     ``bin_width`` [rad] of the means that were fitted, zero where the rows were.
     """
 
     values: Array
-    left: tuple[int, ...]
+    free: tuple[int, ...]
     covariance: Array
     held: tuple[int, ...]
     spread: Array
@@ -124,7 +124,7 @@ class Misfit:
         self.free.remove(place)
 
 
-def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
+def run(task: Task, coarse: Measured, count: Array, width: float) -> StageFit:
     """Return what a stage finds; ``coarse`` are the means of bins of ``width`` [rad], ``count`` rows each."""
     scale = {name: float(np.sqrt(np.mean(task.data[name] ** 2))) or 1.0 for name in task.channels}
     weight = np.ones(len(task.data)) if task.sigma is None else 1.0 / task.sigma
@@ -164,12 +164,12 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
     undetermined = [p for p, at, too in zip(misfit.free, bound, wide, strict=True) if at or too]
     values = misfit.base.copy()
     values[misfit.free] = x[0]
-    left, held = tuple(misfit.free), tuple(place for place, _ in fixed)
-    bounded = tuple(p for p, at in zip(left, bound, strict=True) if at)
+    free, held = tuple(misfit.free), tuple(place for place, _ in fixed)
+    bounded = tuple(p for p, at in zip(free, bound, strict=True) if at)
     spread, _ = _covariance(misfit, misfit.release(held, x), variance) if held else (covariance, None)
-    return Found(
+    return StageFit(
         values=values,
-        left=left,
+        free=free,
         covariance=covariance,
         held=held,
         spread=spread,

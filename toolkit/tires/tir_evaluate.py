@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
-from toolkit.tires.mf_combined import Forces
+from toolkit.tires.mf import Forces
 from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import ANGLES, Angles, state
 from toolkit.tires.tir import TirFile, factors, scale, si_number

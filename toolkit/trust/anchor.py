@@ -114,14 +114,13 @@ def parse_compact(text: str, *, where: object = None) -> Anchor:
         head, leaf_text, path_text, checkpoint = text.split("\n", 3)
         kind, number = head.split(" ")
         leaf, way = (base64.b64decode(part, validate=True) for part in (leaf_text, path_text))
+        index = int(number) if number.isascii() and number.isdigit() else -1
     except (ValueError, binascii.Error) as error:
         raise _unreadable(text, where) from error
-    if kind != COMPACT or not number.isdecimal() or len(leaf) != HASH_BYTES or len(way) % HASH_BYTES:
+    if kind != COMPACT or index < 0 or len(leaf) != HASH_BYTES or len(way) % HASH_BYTES:
         raise _unreadable(text, where)
     path = tuple(way[at : at + HASH_BYTES] for at in range(0, len(way), HASH_BYTES))
-    return Anchor(
-        leaf=leaf, index=int(number), path=path, checkpoint=parse_checkpoint(checkpoint, where=where)
-    )
+    return Anchor(leaf=leaf, index=index, path=path, checkpoint=parse_checkpoint(checkpoint, where=where))
 
 
 def _text(data: bytes) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from toolkit.trust.keys import Signer
-from toolkit.trust.people import MEANINGS, NAMESPACE, STATED, Action, History, Version, objections
+from toolkit.trust.people import MEANINGS, NAMESPACE, STATED, Action, History, Version, moment, objections
 from toolkit.trust.ssh import BadSignatureError, PublicKey, check
 
 ACTIONS: Mapping[str, Action] = {
@@ -92,6 +92,8 @@ def violations(line: SignedLine, history: History) -> list[str]:
     rows = body.get("signatures")
     if not isinstance(rows, list) or not rows:
         return ["it is not signed"]
+    if moment(time) is None:
+        return ["its time is not UTC to the second: in another spelling it would not compare"]
     version = history.at(time, body.get("people"))
     said = statement(body, line.subject, line.root, version)
     reasons = [f"its {name!r} is not what it should be" for name in said if body.get(name) != said[name]]

@@ -22,6 +22,9 @@ from toolkit.trust.ssh import PublicKey, parse_public
 FILE = "people.toml"
 NAMESPACE = "toolkit-ledger@v1"
 
+RECOVERY = "recovery"
+"""Id of a head's key that is kept apart: a second key, and no second person who could approve."""
+
 ROOT_HEADS = 2  # people, one of which may be a printed recovery key: a lost key must not end a laboratory
 
 Role = Literal["operator", "checker", "head", "auditor"]

@@ -10,7 +10,7 @@ from typing import Any
 from toolkit.errors import TrustError
 from toolkit.trust.decisions import stated
 from toolkit.trust.keys import Signer
-from toolkit.trust.people import Action, History, objections
+from toolkit.trust.people import RECOVERY, Action, History, objections
 from toolkit.trust.requests import Request
 from toolkit.trust.ssh import PublicKey
 
@@ -69,9 +69,13 @@ class Signing:
             ``not-allowed``: it takes other people, or more
         """
         time = event["time"]
+        version = self.history.at(time)
         reasons = objections(
-            self.history.at(time), action, time, signatures, stated=stated(event, action), operators=operators
+            version, action, time, signatures, stated=stated(event, action), operators=operators
         )
+        owners = [None if version is None else version.people.owner(public) for public in signatures]
+        if action == "approve" and any(owner is not None and owner.id == RECOVERY for owner in owners):
+            reasons.append("the recovery key approves nothing: whoever keeps it may have entered the record")
         if reasons:
             raise TrustError(
                 f"these keys cannot {action}", where=event["id"], got="; ".join(reasons),

@@ -1,9 +1,10 @@
-"""The workbench as an application: the addresses that its pages declare, and how each is answered."""
+"""The workbench as an application: its pages' addresses, scripts and styles, and how each is answered."""
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +15,7 @@ from starlette.responses import Response
 from starlette.routing import Mount, Route
 
 from toolkit.errors import ToolkitError
-from toolkit.workbench import assets
+from toolkit.report.pages.kit import KIT
 from toolkit.workbench.bench import Bench
 from toolkit.workbench.page import is_part, page, refusal
 
@@ -27,10 +28,40 @@ if TYPE_CHECKING:
     from toolkit.workbench.page import Page, Routes
 
 
+STATIC = Path(__file__).with_name("static")
+_SCRIPT, _STYLE = "text/javascript; charset=utf-8", "text/css; charset=utf-8"
+_SERVED: dict[str, tuple[str, tuple[Path, ...]]] = {
+    "htmx.js": (_SCRIPT, (STATIC / "htmx.min.js",)),
+    "uPlot.js": (_SCRIPT, (STATIC / "uPlot.iife.min.js",)),
+    "session.js": (_SCRIPT, (STATIC / "session.js",)),
+    "workbench.js": (_SCRIPT, (STATIC / "workbench.js",)),
+    "curves.js": (_SCRIPT, (STATIC / "curves.js",)),
+    "workbench.css": (
+        _STYLE,
+        (KIT / "page.css", STATIC / "uPlot.min.css", STATIC / "workbench.css", STATIC / "work.css"),
+    ),
+}
+
+
+def static(request: Request) -> Response:
+    """Return a script or style of the table; nothing else has an address."""
+    name = request.path_params["name"]
+    if name not in _SERVED:
+        raise HTTPException(404)
+    media_type, content = _content(name)
+    return Response(content, media_type=media_type, headers={"cache-control": "private, max-age=3600"})
+
+
+@cache
+def _content(name: str) -> tuple[str, bytes]:
+    media_type, parts = _SERVED[name]
+    return media_type, b"\n".join(part.read_bytes() for part in parts)
+
+
 def application(home: Path, registry: Registry, keys: Keys, *, person: Person | None = None) -> Starlette:
     """Return the pages of a home below the place of its keys; `guard.Guard` stands before them."""
     routes = [
-        Route("/static/{name}", assets.static, name="static"),
+        Route("/static/{name}", static, name="static"),
         *_routes(),
     ]
     app = Starlette(

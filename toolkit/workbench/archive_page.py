@@ -53,7 +53,7 @@ def part(request: Request) -> Response:
     """Return what the audit found: the first line, the grades, the timeline."""
     if request.path_params["part"] != "answer":
         raise HTTPException(404)
-    bench, audited = _asked(request)
+    bench, audited = _requested(request)
     timelines = bench.remembered(
         f"timelines of {request.path_params['audit']}", None,
         lambda: list(audited.timelines(bench.registry)), rests_on=stamp(audited.lines.parent),
@@ -67,53 +67,53 @@ def part(request: Request) -> Response:
 
 def windows(request: Request) -> Response:
     """Return the files that are asked for, as windows that are filled when they come into sight."""
-    _, audited = _asked(request)
-    query, found = _found(request, audited)
+    _, audited = _requested(request)
+    query, places = _matching(request, audited)
     return page(
-        request, "part_audit_files", total=len(found), query=query, window=WINDOW,
-        starts=range(0, len(found), WINDOW), audit_id=request.path_params["audit"],
+        request, "part_audit_files", total=len(places), query=query, window=WINDOW,
+        starts=range(0, len(places), WINDOW), audit_id=request.path_params["audit"],
     )  # fmt: skip
 
 
 def window(request: Request) -> Response:
     """Return the rows of one window."""
-    _, audited = _asked(request)
+    _, audited = _requested(request)
     start = request.path_params["start"]
-    _, found = _found(request, audited)
-    rows = [(place, audited.files[place]) for place in found[start : start + WINDOW]]
+    _, places = _matching(request, audited)
+    rows = [(place, audited.files[place]) for place in places[start : start + WINDOW]]
     return page(request, "part_audit_rows", rows=rows, audit_id=request.path_params["audit"])
 
 
 def file(request: Request) -> Response:
     """Return one file: its answer, and its loads row by row beside those of the record in force."""
-    bench, audited = _asked(request)
+    bench, audited = _requested(request)
     number = request.path_params["number"]
     if number >= len(audited.files):
         raise HTTPException(404)
     line = audited.line(number)
     charts: dict[str, Any] = {}
-    trouble, same = None, True
+    trouble, is_same = None, True
     if line["in_force"] is not None:
         try:
-            charts, same = audited.charts(number, bench.registry)
+            charts, is_same = audited.charts(number, bench.registry)
         except ToolkitError as error:
             trouble = error.as_dict()
     return page(
-        request, "audit_file", line=line, charts=charts, same=same, trouble=trouble,
+        request, "audit_file", line=line, charts=charts, same=is_same, trouble=trouble,
         audit_id=request.path_params["audit"],
     )  # fmt: skip
 
 
-def _found(request: Request, audited: Audited) -> tuple[str, list[int]]:
-    asked = request.query_params
-    text = asked.get("q", "")[:_MOST_QUERY]
-    grades = [grade for grade in asked.getlist("grade") if grade in GRADES]
-    order: Order = next((order for order in ORDERS if order == asked.get("order")), "change")
+def _matching(request: Request, audited: Audited) -> tuple[str, list[int]]:
+    words = request.query_params
+    text = words.get("q", "")[:_MOST_QUERY]
+    grades = [grade for grade in words.getlist("grade") if grade in GRADES]
+    order: Order = next((order for order in ORDERS if order == words.get("order")), "change")
     query = urlencode([("q", text), ("order", order), *(("grade", grade) for grade in grades)])
     return query, audited.found(text, grades, order)
 
 
-def _asked(request: Request) -> tuple[Bench, Audited]:
+def _requested(request: Request) -> tuple[Bench, Audited]:
     bench: Bench = request.app.state.bench
     audited = bench.audited(request.path_params["audit"])
     if audited is None:

@@ -6,9 +6,11 @@ import datetime as dt
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from toolkit.calibration.registry.clock import today
+from toolkit.errors import ToolkitError
+from toolkit.lab.pending import agent_people, pending_request
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from toolkit.lab.holdings import Holdings, Kind
     from toolkit.trust.people import Person
     from toolkit.workbench.guard import Keys
+
 
 Answer = TypeVar("Answer")
 _MOST_ANSWERS = 64
@@ -58,8 +61,8 @@ class Bench:
 
     def path_of(self, kind: Kind, holding_id: str) -> Path | None:
         """Return the folder of a holding by its id; the home is looked through where it is not known."""
-        known = self.holdings().path(kind, holding_id)
-        return known or self.holdings(again=True).path(kind, holding_id)
+        path = self.holdings().path(kind, holding_id)
+        return path or self.holdings(again=True).path(kind, holding_id)
 
     def reported(self) -> frozenset[str]:
         """Return the hashes that the reports of the home rest on, read once for each look through it."""
@@ -106,3 +109,22 @@ class Bench:
                 self._answers[key] = answer
                 return answer
             return self._answers[key]  # type: ignore[return-value]
+
+
+def waiting(bench: Bench, name: str) -> dict[str, Any]:
+    """Return what waits under a name as its form shows it: in words, and who can sign it here."""
+    from toolkit.trust.requests import words
+
+    try:
+        pending = pending_request(bench.home, bench.registry, name)
+    except ToolkitError as error:
+        return {"pending": None, "unreadable": error.as_dict()}
+    if pending is None:
+        return {"pending": None, "unreadable": None}
+    able = agent_people(bench.registry, pending) if bench.is_own and pending.obstacle is None else ()
+    names = {person.id: person.name for person in pending.request.version.people.person}
+    return {
+        "pending": pending, "unreadable": None, "words": words(pending.request),
+        "agent": [(person, names[person]) for person in able],
+        "signers": [names.get(person, person) for person in pending.signers],
+    }  # fmt: skip

@@ -34,12 +34,14 @@ def begin(request: Request) -> Response:
     bench: Bench = request.app.state.bench
     if not bench.is_own:
         raise HTTPException(404)
-    recordings, own = (
+    recordings, own_files = (
         [(upload.name, upload.data) for upload in request.state.files.get(field, ())]
         for field in ("recordings", "own")
     )
     try:
-        place_of = built_case.begin_case(bench.home, request.state.form.get("kind", ""), recordings, own)
+        place_of = built_case.begin_case(
+            bench.home, request.state.form.get("kind", ""), recordings, own_files
+        )
     except ToolkitError as error:
         return diagnoses_page(request, status=400, refused=error)
     bench.holdings(again=True)
@@ -52,7 +54,7 @@ def case(request: Request) -> Response:
 
 
 def _case(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
-    bench, case_id, folder = _asked(request)
+    bench, case_id, folder = _requested(request)
     return page(
         request, "case", status=status, case_id=case_id, built=built_case.open_case(folder),
         place_of=bench.holdings().places["case"][case_id],
@@ -62,7 +64,7 @@ def _case(request: Request, *, status: int = 200, refused: ToolkitError | None =
 
 def state(request: Request) -> Response:
     """Keep a statement as its field has it, and say nothing but that it is kept."""
-    _, _, folder = _asked(request)
+    _, _, folder = _requested(request)
     form = request.state.form
     is_other = built_case.state_entry(folder, form.get("key", ""), form.get("value", ""))
     return Response("", headers={"hx-refresh": "true"} if is_other else {"hx-trigger": "stated"})
@@ -70,7 +72,7 @@ def state(request: Request) -> Response:
 
 def change(request: Request) -> Response:
     """Add a channel, a run or a parameter, leave one out, or put files beside the case."""
-    bench, case_id, folder = _asked(request)
+    bench, case_id, folder = _requested(request)
     form = request.state.form
     try:
         match request.path_params["step"]:
@@ -90,13 +92,13 @@ def change(request: Request) -> Response:
 
 def trial(request: Request) -> Response:
     """Return what the simulation says as it is declared, beside the recordings."""
-    bench, _, folder = _asked(request)
+    bench, _, folder = _requested(request)
     with _ANSWERING:
         answer = built_case.trial_of(folder, bench.home)
     return page(request, "part_trial", answer=answer)
 
 
-def _asked(request: Request) -> tuple[Bench, str, Path]:
+def _requested(request: Request) -> tuple[Bench, str, Path]:
     bench: Bench = request.app.state.bench
     case_id = request.path_params["case"]
     folder = bench.path_of("case", case_id)

@@ -1,10 +1,12 @@
-"""What a simulation lacks: the answers that the home keeps, and the diagnosis of a case of the home.
+"""What a simulation lacks: diagnoses of the home's cases, and an answer's model, sized by hand.
 
 A case executes its code: from here it runs in the isolated worker alone, without network and without writing.
 """
 
 from __future__ import annotations
 
+import re
+import threading
 from typing import TYPE_CHECKING
 
 from starlette.exceptions import HTTPException
@@ -12,21 +14,29 @@ from starlette.responses import RedirectResponse
 
 from toolkit.errors import ToolkitError
 from toolkit.lab.built_case import is_open, kinds
-from toolkit.lab.holdings import CASE, holding_id
+from toolkit.lab.holdings import ANSWER, CASE, holding_id
 from toolkit.lab.jobs import start_job
 from toolkit.lab.seen_diagnosis import read_diagnosis
+from toolkit.lab.sized_model import MODELS, keep_model, sizable_model, sized_from, trial_answer
 from toolkit.lab.uploads import hand_in_case
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from starlette.requests import Request
     from starlette.responses import Response
 
+    from toolkit.lab.sized_model import SizableModel
     from toolkit.workbench.bench import Bench
     from toolkit.workbench.page import Routes
 
+
 DIAGNOSES = "diagnoses"
 """Folder of the home into which jobs write."""
+
+_KEPT = re.compile(r"model-[1-9][0-9]{0,8}/model\.toml")
+_ANSWERING = threading.Lock()  # one simulation at a time: a hand on a size asks again and again
 
 
 def diagnoses(request: Request) -> Response:
@@ -100,10 +110,53 @@ def start(request: Request) -> Response:
     return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)
 
 
+def model(request: Request) -> Response:
+    """Return the page: the effects with their sizes, and a place for what the simulation says."""
+    bench, folder, sizable = _requested(request)
+    kept = request.query_params.get("kept", "")
+    is_kept = _KEPT.fullmatch(kept) and (bench.home / MODELS / kept).is_file()
+    return page(
+        request, "model", diagnosis_id=request.path_params["diagnosis"], effects=sizable.effects,
+        answer=read_diagnosis(folder).answer, kept=f"{MODELS}/{kept}" if is_kept else None,
+    )  # fmt: skip
+
+
+def attempt(request: Request) -> Response:
+    """Return what the simulation says with the effects as they are set."""
+    bench, _, sizable = _requested(request)
+    sized = sized_from(sizable.model, request.state.form)
+    with _ANSWERING:
+        answer = trial_answer(sizable, sized, bench.home)
+    return page(request, "part_trial", answer=answer)
+
+
+def keep(request: Request) -> Response:
+    """Keep the effects as they are set as a model file of the home."""
+    bench, _, sizable = _requested(request)
+    place_of = keep_model(bench.home, sizable.model, sized_from(sizable.model, request.state.form))
+    name = place_of.removeprefix(f"{MODELS}/")
+    address = f"{bench.keys.place}/diagnosis/{request.path_params['diagnosis']}/model"
+    return RedirectResponse(f"{address}?kept={name}", 303)
+
+
+def _requested(request: Request) -> tuple[Bench, Path, SizableModel]:
+    bench: Bench = request.app.state.bench
+    folder = bench.path_of("diagnosis", request.path_params["diagnosis"])
+    if folder is None or not (folder / ANSWER).is_file():
+        raise HTTPException(404)
+    sizable = sizable_model(folder, bench.holdings())
+    if sizable is None:
+        raise HTTPException(404)
+    return bench, folder, sizable
+
+
 ROUTES: Routes = (
     ("GET", "/diagnoses", diagnoses),
     ("POST", "/diagnoses", take),
     ("GET", "/diagnoses/list", diagnosis_list),
     ("GET", "/diagnosis/{diagnosis}", diagnosis),
     ("POST", "/case/{case}/diagnose", start),
+    ("GET", "/diagnosis/{diagnosis}/model", model),
+    ("POST", "/diagnosis/{diagnosis}/model/try", attempt),
+    ("POST", "/diagnosis/{diagnosis}/model/keep", keep),
 )

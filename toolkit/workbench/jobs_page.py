@@ -29,27 +29,27 @@ AUDITS, REPAIRED = "audits", "repaired"
 def jobs(request: Request) -> Response:
     """Return the jobs of the home, the newest first, and what can be started."""
     bench: Bench = request.app.state.bench
-    seen = [one for _, one in zip(range(MOST_JOBS), jobs_of(bench.home), strict=False)]
-    return page(request, "jobs", jobs=seen, archives=archives_of(bench.home))
+    works = [job for _, job in zip(range(MOST_JOBS), jobs_of(bench.home), strict=False)]
+    return page(request, "jobs", jobs=works, archives=archives_of(bench.home))
 
 
 def job(request: Request) -> Response:
     """Return a job's page."""
-    bench, seen = _asked(request)
-    return page(request, "job", seen=seen, result=_result(bench, seen), log=log_of(bench.home, seen.id))
+    bench, work = _requested(request)
+    return page(request, "job", seen=work, result=_result(bench, work), log=log_of(bench.home, work.id))
 
 
 def state(request: Request) -> Response:
     """Return a job as it stands now: its page asks for this while it runs."""
-    bench, seen = _asked(request)
-    return page(request, "part_job", seen=seen, result=_result(bench, seen), log=log_of(bench.home, seen.id))
+    bench, work = _requested(request)
+    return page(request, "part_job", seen=work, result=_result(bench, work), log=log_of(bench.home, work.id))
 
 
 def cancel(request: Request) -> Response:
     """Ask for the end of a job."""
-    bench, seen = _asked(request)
-    cancel_job(bench.home, seen.id)
-    return _to_job(bench, seen.id)
+    bench, work = _requested(request)
+    cancel_job(bench.home, work.id)
+    return _to_job(bench, work.id)
 
 
 def start_audit(request: Request) -> Response:
@@ -95,32 +95,32 @@ def _to_job(bench: Bench, job_id: str) -> Response:
     return RedirectResponse(f"{bench.keys.place}/job/{job_id}", 303)
 
 
-def _result(bench: Bench, seen: SeenJob) -> str | None:
+def _result(bench: Bench, work: SeenJob) -> str | None:
     """Return the address of what a job wrote, below the place; None where there is none yet."""
-    words = seen.job.words
-    if seen.state == "running":
+    words = work.job.words
+    if work.state == "running":
         return None
-    if seen.job.kind in ("audit", "repair") and "--out" in words[:-1]:
-        found = holding_id(os.path.normpath(words[words.index("--out") + 1]))
-        return f"/audit/{found}" if bench.path_of("audit", found) is not None else None
-    if seen.job.kind in ("preview", "report"):
-        found = holding_id(seen.job.title)
-        return f"/test/{found}/report" if bench.path_of("test", found) is not None else None
-    if seen.job.kind == "diagnosis" and "--out" in words[:-1]:
-        found = holding_id(os.path.normpath(words[words.index("--out") + 1]))
-        return f"/diagnosis/{found}" if bench.path_of("diagnosis", found) is not None else None
-    if seen.job.kind == "plan" and "--out" in words[:-1]:
-        found = holding_id(os.path.normpath(words[words.index("--out") + 1]))
-        return f"/plan/{found}" if bench.path_of("plan", found) is not None else None
+    if work.job.kind in ("audit", "repair") and "--out" in words[:-1]:
+        holding = holding_id(os.path.normpath(words[words.index("--out") + 1]))
+        return f"/audit/{holding}" if bench.path_of("audit", holding) is not None else None
+    if work.job.kind in ("preview", "report"):
+        holding = holding_id(work.job.title)
+        return f"/test/{holding}/report" if bench.path_of("test", holding) is not None else None
+    if work.job.kind == "diagnosis" and "--out" in words[:-1]:
+        holding = holding_id(os.path.normpath(words[words.index("--out") + 1]))
+        return f"/diagnosis/{holding}" if bench.path_of("diagnosis", holding) is not None else None
+    if work.job.kind == "plan" and "--out" in words[:-1]:
+        holding = holding_id(os.path.normpath(words[words.index("--out") + 1]))
+        return f"/plan/{holding}" if bench.path_of("plan", holding) is not None else None
     return None
 
 
-def _asked(request: Request) -> tuple[Bench, SeenJob]:
+def _requested(request: Request) -> tuple[Bench, SeenJob]:
     bench: Bench = request.app.state.bench
-    seen = job_of(bench.home, request.path_params["job"])
-    if seen is None:
+    work = job_of(bench.home, request.path_params["job"])
+    if work is None:
         raise HTTPException(404)
-    return bench, seen
+    return bench, work
 
 
 ROUTES: Routes = (

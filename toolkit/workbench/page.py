@@ -1,4 +1,7 @@
-"""How a page is drawn: templates of this folder and of the page kit, in the language of who asks."""
+"""How a page is drawn: templates of this folder and of the page kit, in the language of who asks.
+
+English stands in the templates, other languages in ``messages/`` (gettext).
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import json
 import math
 from collections.abc import Mapping
 from functools import cache
+from gettext import NullTranslations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +22,8 @@ from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import one_line
 from toolkit.lab.holdings import holding_id
 from toolkit.report.pages.kit import data, drawn, environment
-from toolkit.words.phrasebook import phrasebook
-from toolkit.workbench.words import decimal_sign, preferred, translations
+from toolkit.words import phrasebook as words
+from toolkit.words.phrasebook import SOURCE, decimal_sign, phrasebook
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,6 +36,44 @@ if TYPE_CHECKING:
     Page = Callable[[Request], Response]
     Routes = tuple[tuple[str, str, Page], ...]
     """Method, path and handler of each address of a page."""
+
+
+MESSAGES = Path(__file__).with_name("messages")
+TERMS = (
+    "candidate", "approved", "withdrawn", "discarded", "entered", "enter", "approve", "withdraw", "discard",
+)  # fmt: skip
+"""Words of the ledger that pages translate: no template spells them."""
+
+
+def languages() -> tuple[str, ...]:
+    """Return the languages of the pages, the templates' own first."""
+    return words.languages(MESSAGES)
+
+
+def translations(language: str) -> NullTranslations:
+    """Return the catalogue of a language; that of the templates' own is empty."""
+    return words.translations(language, MESSAGES)
+
+
+def preferred(accepted: str) -> str:
+    """Return the language of a page, by what a browser says that its person reads.
+
+    >>> preferred("de-AT,de;q=0.9,en;q=0.8"), preferred("it"), preferred("")
+    ('de', 'en', 'en')
+    """
+    from babel.core import negotiate_locale
+
+    ranked: list[tuple[float, str]] = []
+    for part in accepted.split(","):
+        name, _, parameter = part.strip().partition(";")
+        try:
+            weight = float(parameter.strip().removeprefix("q=")) if parameter else 1.0
+        except ValueError:
+            continue
+        ranked.append((-weight, name.strip()))
+    names = [name for _, name in sorted(ranked, key=lambda entry: entry[0])]
+    return negotiate_locale(names, languages(), sep="-") or SOURCE
+
 
 TEMPLATES = Path(__file__).with_name("templates")
 

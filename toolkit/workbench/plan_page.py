@@ -49,25 +49,26 @@ def plan_list(request: Request) -> Response:
 
 def plan(request: Request) -> Response:
     """Return a plan's page."""
-    _, plan_id, folder = _asked(request)
-    kept = read_plan(folder)
+    _, plan_id, folder = _requested(request)
+    planned = read_plan(folder)
     return page(
-        request, "plan", kept=kept, answer=kept.answer, plan_id=plan_id,
-        chart=_risk_chart(kept.answer) if kept.kind == "interval" else None, characteristics=titles_of(kept),
+        request, "plan", kept=planned, answer=planned.answer, plan_id=plan_id,
+        chart=_risk_chart(planned.answer) if planned.kind == "interval" else None,
+        characteristics=titles_of(planned),
         place_of=request.app.state.bench.holdings().places["plan"][plan_id],
     )  # fmt: skip
 
 
 def file(request: Request) -> Response:
     """Return a file of a plan, one of those that a plan writes."""
-    _, _, folder = _asked(request)
-    kept, name = read_plan(folder), request.path_params["name"]
-    if name not in (*kept.files, *kept.pictures):
+    _, _, folder = _requested(request)
+    planned, name = read_plan(folder), request.path_params["name"]
+    if name not in (*planned.files, *planned.pictures):
         raise HTTPException(404)
-    shown = "inline" if name in kept.pictures else "attachment"
+    disposition = "inline" if name in planned.pictures else "attachment"
     return Response(
         read_regular(folder / name, RESULT_FILE), media_type=_TYPES[name.rpartition(".")[2]],
-        headers={"content-disposition": f'{shown}; filename="{name}"'},
+        headers={"content-disposition": f'{disposition}; filename="{name}"'},
     )  # fmt: skip
 
 
@@ -87,17 +88,17 @@ def start(request: Request) -> Response:
 
 def _subject(bench: Bench, kind: PlanKind, form: Mapping[str, str]) -> str | None:
     """Return what a plan is for: an instrument, or the place of a holding by its id; nothing else has one."""
-    chosen = form.get("subject", "")
-    if not chosen:
+    subject = form.get("subject", "")
+    if not subject:
         return None
     if kind in ("session", "interval"):
-        found = chosen if chosen in bench.registry.instruments() else None
+        basis = subject if subject in bench.registry.instruments() else None
     else:
         bench.holdings(again=True)
-        found = bench.holdings().places["test" if kind == "test" else "diagnosis"].get(chosen)
-    if found is None:
+        basis = bench.holdings().places["test" if kind == "test" else "diagnosis"].get(subject)
+    if basis is None:
         raise HTTPException(404)
-    return found
+    return basis
 
 
 def _risk_chart(answer: Mapping[str, Any]) -> dict[str, Any]:
@@ -112,7 +113,7 @@ def _risk_chart(answer: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _asked(request: Request) -> tuple[Bench, str, Path]:
+def _requested(request: Request) -> tuple[Bench, str, Path]:
     bench: Bench = request.app.state.bench
     plan_id = request.path_params["plan"]
     folder = bench.path_of("plan", plan_id)

@@ -6,6 +6,7 @@ Every part is the answer of a command: `calibration show`, `history`, `report`, 
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from starlette.exceptions import HTTPException
@@ -16,9 +17,8 @@ from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab.decisions import Order
 from toolkit.lab.pending import decide as settle_decision
 from toolkit.trust.requested import Requested
+from toolkit.workbench.bench import waiting
 from toolkit.workbench.page import page
-from toolkit.workbench.record_charts import budget_chart, residual_chart
-from toolkit.workbench.waiting import waiting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from toolkit.workbench.bench import Bench
     from toolkit.workbench.page import Routes
+
 
 DECISIONS = ("approve", "withdraw", "discard")
 
@@ -50,7 +51,7 @@ def _newest_first(status: Any) -> int:
 
 def record(request: Request) -> Response:
     """Return a record's page: its state and coefficients, and a place for each part."""
-    _, record_id = _asked(request)
+    _, record_id = _requested(request)
     return record_page(request, record_id)
 
 
@@ -82,7 +83,7 @@ def record_page(
 
 def part(request: Request) -> Response:
     """Return one part of a record's page."""
-    bench, record_id = _asked(request)
+    bench, record_id = _requested(request)
     name = request.path_params["part"]
     if name not in PARTS:
         raise HTTPException(404)
@@ -150,7 +151,7 @@ def decide(request: Request) -> Response:
 
     Where people are enrolled the decision is requested: it is signed by their keys, which never come here.
     """
-    bench, record_id = _asked(request)
+    bench, record_id = _requested(request)
     decision = request.path_params["decision"]
     if decision not in DECISIONS:
         raise HTTPException(404)
@@ -191,7 +192,7 @@ def _day(form: Mapping[str, str], name: str) -> dt.date:
         ) from error  # fmt: skip
 
 
-def _asked(request: Request) -> tuple[Bench, str]:
+def _requested(request: Request) -> tuple[Bench, str]:
     """Return the bench and the record of an address: an id that a ledger knows; nothing else has one."""
     bench: Bench = request.app.state.bench
     record_id = request.path_params["record"]
@@ -211,3 +212,35 @@ ROUTES: Routes = (
     ("GET", "/record/{record}/part/{part}", part),
     ("POST", "/record/{record}/decide/{decision}", decide),
 )
+
+
+def residual_chart(rows: Mapping[str, Any], unit: str) -> dict[str, Any]:
+    """Return residuals over the reference load, by direction where the session states it.
+
+    >>> rows = {"reference": [2.0, 1.0], "residual": [0.1, -0.1], "direction": ["up", "down"]}
+    >>> residual_chart(rows, "N")["data"]
+    [[1.0, 2.0], [None, 0.1], [-0.1, None]]
+    """
+    senses = rows["direction"] or [""] * len(rows["reference"])
+    names = list(dict.fromkeys(sorted(senses, reverse=True)))
+    order = sorted(range(len(senses)), key=lambda at: float(rows["reference"][at]))
+    return {
+        "x_label": f"reference [{unit}]",
+        "y_label": f"residual [{unit}]",
+        "series": [{"label": f"residual {name}".strip()} for name in names],
+        "data": [
+            [rows["reference"][at] for at in order],
+            *([rows["residual"][at] if senses[at] == name else None for at in order] for name in names),
+        ],
+    }
+
+
+def budget_chart(load: str, budget: Mapping[str, Any]) -> dict[str, Any]:
+    """Return U over the range of a load."""
+    unit = budget["unit"]
+    return {
+        "x_label": f"{load} [{unit}]",
+        "y_label": f"U [{unit}]",
+        "series": [{"label": "U", "line": True}],
+        "data": [[point["value"] for point in budget["range"]], [point["U"] for point in budget["range"]]],
+    }

@@ -18,9 +18,10 @@ from toolkit.lab.previews import (
     read_preview,
     report_words,
     template_findings,
+    template_pages,
+    template_print,
     templates_of,
 )
-from toolkit.lab.template_pages import template_pages, template_print
 from toolkit.lab.uploads import hand_in_template
 from toolkit.workbench.page import page
 
@@ -38,7 +39,7 @@ _DRAWING = threading.Lock()  # a browser asks for all pages at once
 
 def report(request: Request) -> Response:
     """Return the page: the templates to choose from, and a place for the preview."""
-    bench, test_id, place_of = _asked(request)
+    bench, test_id, place_of = _requested(request)
     return page(
         request, "report", test_id=test_id, place_of=place_of, choices=templates_of(bench.home),
         people=bench.registry.people().history.now is not None,
@@ -47,7 +48,7 @@ def report(request: Request) -> Response:
 
 def part(request: Request) -> Response:
     """Return the preview that was made last, page by page, and the form that issues it."""
-    bench, test_id, place_of = _asked(request)
+    bench, test_id, place_of = _requested(request)
     preview = read_preview(bench.home, test_id)
     names = {name: chosen for chosen, name in templates_of(bench.home).items()}
     used = None if preview is None else preview.manifest["template"]["name"]
@@ -61,7 +62,7 @@ def picture(request: Request) -> Response:
     """Return a page of the preview as a picture."""
     from toolkit.report.word.preview import page_picture
 
-    bench, test_id, _ = _asked(request)
+    bench, test_id, _ = _requested(request)
     pdf = preview_pdf(bench.home, test_id)
     number = request.path_params["number"]
     if pdf is None or number < 1:
@@ -72,7 +73,7 @@ def picture(request: Request) -> Response:
 
 def start(request: Request) -> Response:
     """Start the job that makes the preview, or that issues the report."""
-    bench, test_id, place_of = _asked(request)
+    bench, test_id, place_of = _requested(request)
     step, form = request.path_params["step"], request.state.form
     template = templates_of(bench.home).get(form.get("template", ""))
     if step not in STEPS or template is None:
@@ -153,7 +154,7 @@ def _template(request: Request) -> tuple[Bench, Path]:
     return bench, bench.home / TEMPLATES / name
 
 
-def _asked(request: Request) -> tuple[Bench, str, str]:
+def _requested(request: Request) -> tuple[Bench, str, str]:
     bench: Bench = request.app.state.bench
     test_id = request.path_params["test"]
     if bench.path_of("test", test_id) is None:

@@ -19,10 +19,9 @@ from toolkit.lab.decisions import Order
 from toolkit.lab.pending import decide
 from toolkit.lab.statements import statement_groups, with_statement
 from toolkit.trust.requested import Requested
-from toolkit.workbench.bench import Bench
+from toolkit.workbench.bench import Bench, waiting
 from toolkit.workbench.page import fragment, page
 from toolkit.workbench.record_page import PARTS
-from toolkit.workbench.waiting import waiting
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -89,7 +88,7 @@ def _begun(bench: Bench, files: Mapping[str, Any], form: Mapping[str, str]) -> t
 
 def session(request: Request) -> Response:
     """Return a draft: its statements, its tables, and a place for what a dry run says."""
-    _, draft_id = _asked(request)
+    _, draft_id = _requested(request)
     return session_page(request, draft_id)
 
 
@@ -108,14 +107,14 @@ def session_page(
 
 def save(request: Request) -> Response:
     """Save what was typed, and say nothing."""
-    bench, draft_id = _asked(request)
+    bench, draft_id = _requested(request)
     _save(bench, draft_id, request.state.form)
     return Response(status_code=204)
 
 
 def state(request: Request) -> Response:
     """Save what was typed with one statement as its field has it; return the text of the statements."""
-    bench, draft_id = _asked(request)
+    bench, draft_id = _requested(request)
     form = dict(request.state.form)
     if waiting(bench, draft_id)["pending"] is None:
         form["session"] = with_statement(
@@ -139,7 +138,7 @@ def rehearse(request: Request) -> Response:
     from toolkit.lab.sealing import standards_of
     from toolkit.lab.session_answer import NOT_ENTERED, candidate_payload
 
-    bench, draft_id = _asked(request)
+    bench, draft_id = _requested(request)
     if request.headers.get("hx-request") != "true":
         _save(bench, draft_id, request.state.form)
         return _to(bench, f"session/{draft_id}")
@@ -183,7 +182,7 @@ def _part(request: Request, bench: Bench, name: str, record_id: str) -> str:
 
 def add_files(request: Request) -> Response:
     """Put files beside the session, or in its place."""
-    bench, draft_id = _asked(request)
+    bench, draft_id = _requested(request)
     uploads = [(upload.name, upload.data) for upload in request.state.files.get("files", ())]
     try:
         drafts.add_files(bench.home, draft_id, uploads)
@@ -194,7 +193,7 @@ def add_files(request: Request) -> Response:
 
 def enter(request: Request) -> Response:
     """Enter the session as `calibrate` does; where people are enrolled request it."""
-    bench, draft_id = _asked(request)
+    bench, draft_id = _requested(request)
     try:
         _save(bench, draft_id, request.state.form)
         order = Order(action="enter", session=drafts.session_file(bench.home, draft_id))
@@ -209,7 +208,7 @@ def enter(request: Request) -> Response:
 
 def discard(request: Request) -> Response:
     """Remove a draft that nobody entered."""
-    bench, draft_id = _asked(request)
+    bench, draft_id = _requested(request)
     if waiting(bench, draft_id)["pending"] is not None:
         error = ConfigError(
             "its entry waits for signatures", where=draft_id, got="a draft that was requested",
@@ -229,7 +228,7 @@ def _save(bench: Bench, draft_id: str, form: Mapping[str, str]) -> None:
         drafts.save_draft(bench.home, draft_id, form["session"], grids)
 
 
-def _asked(request: Request) -> tuple[Bench, str]:
+def _requested(request: Request) -> tuple[Bench, str]:
     bench: Bench = request.app.state.bench
     draft_id = request.path_params["draft"]
     if draft_id not in drafts.draft_ids(bench.home):

@@ -11,9 +11,8 @@ from urllib.parse import urlencode
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
-from toolkit.lab.curves_answer import common_ranges, shown_conditions
 from toolkit.lab.holdings import rows_of_tests
-from toolkit.lab.seen_test import recordings_answer, results_answer
+from toolkit.lab.seen_test import common_ranges, recordings_answer, results_answer, shown_conditions
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -68,7 +67,7 @@ def query_of(request: Request) -> str:
 
 def test(request: Request) -> Response:
     """Return a test's page: what its folder says, and a place for each part."""
-    bench, test_id, _ = _asked(request)
+    bench, test_id, _ = _requested(request)
     (row,) = rows_of_tests(bench.holdings(), (test_id,), bench.reported())
     records = _records(bench, row["machine"])
     return page(request, "test", row=row, records=records, record=_record(request, records))
@@ -78,7 +77,7 @@ def part(request: Request) -> Response:
     """Return one part of a test's page."""
     name = request.path_params["part"]
     if name == "recordings":
-        bench, test_id, folder = _asked(request)
+        bench, test_id, folder = _requested(request)
         content = bench.remembered(
             f"recordings of {test_id}",
             None,
@@ -127,13 +126,14 @@ def _pairs(
         if row["SA_rad"] is not None:
             continue
         near = [
-            other
-            for other in right
-            if (other["name"], other["rotation"], other["SA_rad"]) == (row["name"], row["rotation"], None)
-            and abs(other["load_N"] - row["load_N"]) <= _SAME_LOAD * row["load_N"]
+            candidate
+            for candidate in right
+            if (candidate["name"], candidate["rotation"], candidate["SA_rad"])
+            == (row["name"], row["rotation"], None)
+            and abs(candidate["load_N"] - row["load_N"]) <= _SAME_LOAD * row["load_N"]
         ]
         if near:
-            yield row, min(near, key=lambda other: abs(other["load_N"] - row["load_N"]))
+            yield row, min(near, key=lambda candidate: abs(candidate["load_N"] - row["load_N"]))
 
 
 def _side(request: Request, side: str) -> tuple[Bench, dict[str, Any], Path, str | None]:
@@ -149,20 +149,20 @@ def _side(request: Request, side: str) -> tuple[Bench, dict[str, Any], Path, str
 
 def download(request: Request) -> Response:
     """Return what is seen as a table, or the whole reduced test as `process --out` writes it."""
-    bench, test_id, folder = _asked(request)
-    what = request.path_params["what"]
-    if what == "test.xlsx":
+    bench, test_id, folder = _requested(request)
+    table_name = request.path_params["what"]
+    if table_name == "test.xlsx":
         return _reduced(_resolve(bench, folder, _named(request, bench)))
-    if what not in ("conditions.csv", "characteristics.csv"):
+    if table_name not in ("conditions.csv", "characteristics.csv"):
         raise HTTPException(404)
     results = _results_of(request)
     answer, curves = results["answer"], results["curves"]
-    if what == "conditions.csv":
-        chosen = request.query_params.getlist
-        places = [int(text) for text in chosen("load") if text.isdecimal()]
+    if table_name == "conditions.csv":
+        selected = request.query_params.getlist
+        places = [int(text) for text in selected("load") if text.isdecimal()]
         asked = [place for place in places if place < len(curves["loads"])]
         loads = asked or list(range(len(curves["loads"])))
-        rows = shown_conditions(answer, curves, loads, chosen("rotation") or curves["rotations"])
+        rows = shown_conditions(answer, curves, loads, selected("rotation") or curves["rotations"])
         rows = [
             {
                 **row,
@@ -176,27 +176,27 @@ def download(request: Request) -> Response:
             del row["rows"]
     else:
         rows = results["characteristics"]
-    return _table(rows, f"{test_id}-{what}")
+    return _table(rows, f"{test_id}-{table_name}")
 
 
 def _results_of(request: Request) -> dict[str, Any]:
-    bench, test_id, folder = _asked(request)
+    bench, test_id, folder = _requested(request)
     return _remembered_results(bench, test_id, folder, _named(request, bench))
 
 
-def _remembered_results(bench: Bench, test_id: str, folder: Path, named: str | None) -> dict[str, Any]:
+def _remembered_results(bench: Bench, test_id: str, folder: Path, record: str | None) -> dict[str, Any]:
     return bench.remembered(
-        f"results of {test_id} by {named}", None, lambda: results_answer(_resolve(bench, folder, named)),
+        f"results of {test_id} by {record}", None, lambda: results_answer(_resolve(bench, folder, record)),
         rests_on=_content(folder),
     )  # fmt: skip
 
 
-def _resolve(bench: Bench, folder: Path, named: str | None) -> Resolved:
+def _resolve(bench: Bench, folder: Path, record: str | None) -> Resolved:
     from toolkit.lab.resolve import resolve_test
 
     # A record that somebody chose to look at may not be in force: the result then says that it is a draft.
     return resolve_test(
-        folder, calibrations=bench.registry.folder, calibration=named, draft=named is not None
+        folder, calibrations=bench.registry.folder, calibration=record, draft=record is not None
     )
 
 
@@ -245,26 +245,26 @@ def _records(bench: Bench, machine: str | None) -> tuple[str, ...]:
 
 
 def _record(request: Request, records: tuple[str, ...], key: str = "record") -> str | None:
-    named = request.query_params.get(key) or None
-    if named is not None and named not in records:
+    record_id = request.query_params.get(key) or None
+    if record_id is not None and record_id not in records:
         raise HTTPException(404)
-    return named
+    return record_id
 
 
 def _named(request: Request, bench: Bench) -> str | None:
     """Return the record that an address names: one that a ledger knows."""
     from toolkit.calibration.registry.registry import ID
 
-    named = request.query_params.get("record") or None
-    match = None if named is None else ID.match(named)
-    if named is None:
+    record_id = request.query_params.get("record") or None
+    match = None if record_id is None else ID.match(record_id)
+    if record_id is None:
         return None
-    if match is None or named not in _records(bench, match["instrument"]):
+    if match is None or record_id not in _records(bench, match["instrument"]):
         raise HTTPException(404)
-    return named
+    return record_id
 
 
-def _asked(request: Request) -> tuple[Bench, str, Path]:
+def _requested(request: Request) -> tuple[Bench, str, Path]:
     """Return the bench, the id of an address and its folder: nothing else has one."""
     bench: Bench = request.app.state.bench
     test_id = request.path_params["test"]

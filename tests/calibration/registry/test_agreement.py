@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.calibration.registry.test_legacy import GOOD, enter
+from tests.calibration.registry.test_candidate_legacy import GOOD, enter
 from tests.calibration.registry.test_refit_mutations import forge
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.candidate import calibrate

@@ -12,10 +12,9 @@ import pytest
 import typer
 
 from tests.calibration.calibration_factory import hub_data
-from tests.calibration.registry.test_legacy import GOOD
-from toolkit.calibration.registry.candidate import calibrate
+from tests.calibration.registry.test_candidate_legacy import GOOD
+from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.difference import differences
-from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli import calibration
 from toolkit.errors import ToolkitError

@@ -15,15 +15,14 @@ import pytest
 import typer
 
 from tests.calibration.calibration_factory import hub_data
-from tests.calibration.registry.test_legacy import GOOD
+from tests.calibration.registry.test_candidate_legacy import GOOD
 from toolkit.calibration.control import calibrate as control
 from toolkit.calibration.control.chart import control_chart
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.approval import approve, discard, withdraw
-from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.history import approved_ids
-from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.cli import calibrate as calibrate_command

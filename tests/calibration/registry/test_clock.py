@@ -12,13 +12,13 @@ from types import SimpleNamespace
 import pytest
 
 from tests.calibration.control_factory import enter, write_session
-from tests.calibration.registry.test_legacy import GOOD
+from tests.calibration.registry.test_candidate_legacy import GOOD
 from tests.trust.forgeries.laboratory import KEYS, event_of, laboratory
 from toolkit.calibration.registry import approval, candidate, clock, ledger
 from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.candidate import import_legacy
 from toolkit.calibration.registry.clock import clock_state
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
-from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.store import Change
 from toolkit.calibration.registry.verify import verify_registry

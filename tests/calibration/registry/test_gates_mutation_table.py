@@ -22,9 +22,8 @@ import pytest
 from tests.calibration.calibration_factory import hub_data
 from tests.calibration.registry.test_refit_mutations import forge
 from toolkit.calibration.records.record import CalibrationRecord, content_of, sealed, to_bytes
-from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.ledger import head_bytes, next_line
-from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.refit import polarity
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry

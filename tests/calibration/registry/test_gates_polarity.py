@@ -19,12 +19,11 @@ from tests.calibration.calibration_factory import (
     hub_data,
     polarity_text,
 )
-from tests.calibration.registry.test_legacy import GOOD
+from tests.calibration.registry.test_candidate_legacy import GOOD
 from tests.calibration.virtual_factory import PACKAGED, Change, columns, failed, judged, rules, write_virtual
 from toolkit.calibration.registry.approval import Decision, approve, withdraw
-from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.judgement import judge, machine_of
-from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError, UnitError
 from toolkit.machine import load_machine

@@ -11,6 +11,7 @@ import pytest
 from tests.calibration.control_factory import enter, put_in_force, write_session
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.control.chart import control_chart
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry import registry as registry_module
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.candidate import Candidate
@@ -179,13 +180,13 @@ def test_a_chart_reads_each_record_and_the_ledger_once(
     for i in range(5):
         put_in_force(registry, enter(registry, tmp_path / f"s{i}", FIRST + dt.timedelta(days=30 * i)))
     started: list[str] = []
-    start = registry_module.start
+    load = registry_module.load_checked
 
-    def counted(folder: Path, name: str, ledger: Ledger) -> registry_module.Started:
+    def counted(folder: Path, name: str, ledger: Ledger) -> CalibrationRecord:
         started.append(name)
-        return start(folder, name, ledger)
+        return load(folder, name, ledger)
 
-    monkeypatch.setattr(registry_module, "start", counted)
+    monkeypatch.setattr(registry_module, "load_checked", counted)
     ledgers: list[str] = []
     ledger = Registry.ledger
     monkeypatch.setattr(Registry, "ledger", lambda self, name: (ledgers.append(name), ledger(self, name))[1])

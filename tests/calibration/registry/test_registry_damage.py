@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 
 from tests.calibration.calibration_factory import hub_data
-from tests.calibration.registry.test_legacy import GOOD
+from tests.calibration.registry.test_candidate_legacy import GOOD
 from toolkit import files
 from toolkit.calibration.registry import store
 from toolkit.calibration.registry import verify as module
 from toolkit.calibration.registry.approval import approve, withdraw
-from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.legacy import import_legacy
+from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import OutputError, RegistryError

@@ -9,12 +9,11 @@ from pathlib import Path
 import pytest
 
 from tests.calibration.calibration_factory import hub_data
-from tests.calibration.registry.test_legacy import GOOD
+from tests.calibration.registry.test_candidate_legacy import GOOD
 from toolkit.audit.inspection import choose
 from toolkit.calibration.registry import candidate, settled
-from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.ledger import Ledger
-from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry, load_checked
 from toolkit.lab.registry_answer import listed
 
@@ -74,13 +73,10 @@ def test_an_import_loads_no_record_of_other_inputs(
     assert loaded == ["hub-r2"]
 
 
-def test_all_records_are_judged_part_by_part_alike(
-    registry: Registry, make_session: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bad_record_leaves_the_others_usable(registry: Registry, make_session: Callable[..., Path]) -> None:
     for seed in (11, 12):
         calibrate(make_session(hub_data(40, seed), name=f"s{seed}"), registry)
     (registry.folder / "hub" / "hub-r2.loads.csv").write_text("")
-    together = registry.usable("hub")
-    monkeypatch.setattr("toolkit.calibration.registry.registry._AT_ONCE", 1)
-    assert registry.usable("hub") == together
-    assert [record.id for record in together[0]] == ["hub-r1", "hub-r3"]
+    good, bad = registry.usable("hub")
+    assert [record.id for record in good] == ["hub-r1", "hub-r3"]
+    assert [(refused.id, refused.rule) for refused in bad] == [("hub-r2", "data")]

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tests.calibration.calibration_factory import hub_data
-from tests.calibration.registry.test_legacy import GOOD
+from tests.calibration.registry.test_candidate_legacy import GOOD
 from tests.faults import KILL, Outcome, Runner
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.candidate import calibrate

@@ -38,8 +38,7 @@ from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import simulate
 from toolkit.simulation.write import write_test
 from toolkit.units import si_scale
-from toolkit.words.catalogue import languages
-from toolkit.words.phrasebook import phrasebook
+from toolkit.words.phrasebook import languages, phrasebook
 
 EACH = pytest.mark.parametrize("declared", characteristics(), ids=lambda one: one.name)
 TEXTS = (

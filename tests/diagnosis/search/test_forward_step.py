@@ -9,10 +9,13 @@ from tests.diagnosis.tire_case import python_tire
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.folds import HeldOut, folds_of, hold_out
 from toolkit.diagnosis.fit.problem import problem_of
-from toolkit.diagnosis.policy import STEP
+from toolkit.diagnosis.policy import STEP, VERDICT
+from toolkit.diagnosis.search import forward_step
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.forward_step import step_groups
+from toolkit.diagnosis.search.forward_step import best_step, joint_fits, step_groups
+from toolkit.diagnosis.search.screen import best_of
 from toolkit.diagnosis.search.screen_step import look
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
@@ -97,3 +100,30 @@ def test_what_few_rows_of_coloured_noise_hint_at_has_to_explain_most_of_unseen_r
         (view.hinted[: STEP.refined], STEP.shown)
     ]
     assert step_groups((), (), frozenset(), STEP.first) == []
+
+
+@pytest.mark.parametrize(("noise_alone", "place"), [(True, 0), (False, 1)])
+def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_before_the_better_fit(
+    tmp_path, monkeypatch, noise_alone, place
+):
+    problem = problem_of(case := coasts(tmp_path, force=0.12), model_of(case, None, None))
+    base = fit(problem)
+    view = look(problem, base, candidates(problem), turn=0, seed=1)
+    two = joint_fits(problem, base, best_of(view.scored)[:4])[:2]
+    assert two[0].score - base.log_posterior < 2 * (two[1].score - base.log_posterior)
+    totals = {two[0].fit: 100.0, two[1].fit: 110.0}
+
+    def foretold(problem, folds, active, start):
+        return HeldOut(scores=(totals[start],), simulated=dict(problem.observed), fits=())
+
+    monkeypatch.setattr(forward_step, "hold_out", foretold)
+    monkeypatch.setattr(forward_step, "_leaves_more_than_noise", lambda *_: not noise_alone)
+    before = hold_out(problem, folds_of(problem, base), (), base)
+    nothing = HeldOut(scores=(0.0,), simulated=before.simulated, fits=())
+    outcome = best_step(problem, folds_of(problem, base), base, nothing, two, view.p_of, STEP.first, before)
+    assert outcome is not None
+    step = outcome[2]
+    assert step.active == two[place].fit.active[-1]
+    # the better fit stays in the class, whichever goes first
+    assert {rival.active for rival in step.rivals} == {two[1 - place].fit.active[-1]}
+    assert (step.rivals[0].difference > -VERDICT.close) or place == 0

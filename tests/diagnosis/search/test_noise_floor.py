@@ -13,7 +13,7 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.folds import folds_of
 from toolkit.diagnosis.fit.problem import problem_of
-from toolkit.diagnosis.search.noise_floor import LARGE, hidden_in_noise
+from toolkit.diagnosis.search.noise_floor import LARGE, LONG, hidden_in_noise
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 N = 600
@@ -77,3 +77,39 @@ def test_of_a_constant_the_spread_is_its_noise(tmp_path):
     table = pd.DataFrame({"t": np.arange(N) * 0.1, "L": np.full(N, 9.0), "F": 9 + coloured(0.5, 0.02, rng)})
     case = read_case(write_case(tmp_path, text, simulator=CELL, r0__csv=table, r1__csv=None))
     assert hidden(case) == ()
+
+
+CONSTANT = """schema = 1
+title = "A filter"
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.level]
+value = 2.0
+unit = "1"
+sd = 0.01
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+y = { unit = "1", role = "output" }
+[[recording.run]]
+file = "r0.csv"
+"""
+STILL = """
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"y": [p["level"]] * len(inputs)})
+"""
+
+
+@pytest.mark.parametrize(("phi", "verdict"), [(0.0, "nothing"), (0.95, "unknown")])
+def test_a_rest_that_wanders_as_long_as_the_recording_is_not_known_to_be_noise(tmp_path, phi, verdict):
+    # noise behind two lags in a row, fifty readings of it
+    wander = lfilter([1], [1, -phi], coloured(phi, 1.0, np.random.default_rng(1)))[-50:]
+    y = 2.0 + 0.0005 * (wander - wander.mean()) / wander.std()
+    frame = pd.DataFrame({"t": 0.1 * np.arange(50), "y": y})
+    case = read_case(write_case(tmp_path, CONSTANT, simulator=STILL, r0__csv=frame, r1__csv=None))
+    assert ((LONG,) in {each.variables for each in hidden(case)}) is (verdict == "unknown")
+    answer = diagnose(case, None).diagnosis
+    assert (answer.verdict, answer.effects) == (verdict, ())

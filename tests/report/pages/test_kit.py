@@ -15,7 +15,7 @@ import pytest
 
 import proof
 import toolkit
-from toolkit.report.pages.drawing import Drawing
+from toolkit.report.audit.svg import Drawing
 from toolkit.report.pages.kit import Column, Figure, Table, environment, facts, page_parts, quantity, table
 
 TOOLKIT = Path(toolkit.__file__).parent

@@ -23,8 +23,7 @@ from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
 from toolkit.report.word.fill import Filled, fill
 from toolkit.report.word.package import read_template
-from toolkit.report.word.verify import verify_docx
-from toolkit.report.word.verify_text import text_checks
+from toolkit.report.word.verify import text_checks, verify_docx
 from toolkit.report.word.xml import NS
 
 DAY = dt.date(2026, 11, 21)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from toolkit.tires.mf_combined import equivalent
+from toolkit.tires.mf import equivalent
 from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import state
 

@@ -7,6 +7,7 @@ import functools
 import hashlib
 import struct
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from cryptography.hazmat.primitives import hashes
@@ -20,6 +21,7 @@ from tests.trust.forgeries.laboratory import (
     RIG,
     believed,
     decide,
+    key_of,
     laboratory,
     lines_of,
     new_signer,
@@ -31,7 +33,7 @@ from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
 from toolkit.trust.decisions import unsigned
-from toolkit.trust.people import NAMESPACE, Key, People, Person
+from toolkit.trust.people import NAMESPACE, RECOVERY, Key, People, Person
 from toolkit.trust.ssh import MAGIC, PublicKey, parse_public
 
 _WITH = {"stranger": "mallory", "expired": "expired", "not yet valid": "later", "another role": "emil"}
@@ -65,6 +67,23 @@ def forgeries() -> Iterator[Forgery]:
             kind="self-approval", what=f"operator {text} in the session, entered by carl, approved by dora",
             accepted=functools.partial(_self_approved, "carl", "dora", operator=text),
         )  # fmt: skip
+    yield Forgery(
+        kind="self-approval", what="entered by anna, approved by the recovery key that she keeps",
+        accepted=_by_recovery,
+    )  # fmt: skip
+    yield Forgery(
+        kind="self-approval", what="operator dora in the session, then renamed, approved by dora",
+        accepted=_renamed,
+    )  # fmt: skip
+    for time in (
+        "2025-12-31T23:59:59-12:00",
+        "2025-12-31T23:59:59",
+        "2025-12-31 23:59:59Z",
+        "20251231T235959Z",
+    ):
+        yield Forgery(
+            kind="expired", what=f"at {time}", accepted=functools.partial(_in_another_spelling, time)
+        )
     yield Forgery(kind="one person twice", what="two keys of one head", accepted=_two_keys)
     for until in ("2026-02-28T00:00:00Z", "2026-03-01T12:00:00Z"):
         yield Forgery(
@@ -111,6 +130,49 @@ def _self_approved(entered: str, name: str, operator: str = "somebody else") -> 
         except ToolkitError:
             return False
     return True
+
+
+def _by_recovery() -> bool:
+    approval = {**DECISIONS[1][0], "id": "rig-r9", "by": RECOVERY}
+    with laboratory() as home:
+        registry = Registry(home / "calibrations")
+        version = registry.people().history.now
+        assert version is not None
+        kept = Person(id=RECOVERY, name="Recovery key", roles=("head",), keys=(key_of("thief"),))
+        people = version.people.with_person(kept)
+        enrol(registry.folder, people, [KEYS["anna"]], by="anna", reason="kept apart")
+        decide(home, {**DECISIONS[0][0], "id": "rig-r9", "by": "somebody"}, "anna")
+        try:
+            decide(home, approval, "thief")
+        except ToolkitError:
+            return False
+    return True
+
+
+def _renamed() -> bool:
+    with laboratory() as home:
+        decide(home, {**DECISIONS[0][0], "id": "rig-r9", "by": "Dora Example"}, "carl")
+        registry = Registry(home / "calibrations")
+        version = registry.people().history.now
+        assert version is not None
+        dora = version.people.of("dora")
+        assert dora is not None
+        people = version.people.with_person(replace(dora, name="Dora Sample"))
+        enrol(registry.folder, people, [KEYS["anna"]], by="anna", reason="another name")
+        try:
+            decide(home, {**DECISIONS[1][0], "id": "rig-r9"}, "dora")
+        except ToolkitError:
+            return False
+    return True
+
+
+def _in_another_spelling(time: str) -> bool:
+    """Tell whether a key that ended with 2025 decides at a time of 2026 that is spelled as one of before."""
+    with laboratory() as home:
+        lines = lines_of(home)[:2]
+        lines = [{**line, "time": time} for line in lines]
+        signed_again(home, lines, {0: [KEYS["carl"]], 1: [KEYS["expired"]]})
+        return believed(home)
 
 
 def _two_keys() -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import pytest
 from lxml import etree
 
 from tests.calibration.dcc.dcc_factory import plain_dcc
@@ -36,6 +37,27 @@ def test_every_other_change_is_one_of_the_content() -> None:
     for old, new in ((b"K-2025-17", b"K-2025-18"), (b"</dcc:comment>", b"</dcc:comment><dcc:comment/>")):
         assert old in proved
         assert content_hash(proved.replace(old, new, 1)) != digest
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("</toolkit-proof>", "</toolkit-proof><note>U = 0.1 N</note>"),
+        ("</toolkit-proof>", "<note>U = 0.1 N</note></toolkit-proof>"),
+        ("</toolkit-proof>", "</toolkit-proof>U = 0.1 N"),
+        ("<toolkit-proof>", "U = 0.1 N<toolkit-proof>"),
+        ("<toolkit-proof>", '<toolkit-proof note="U = 0.1 N">'),
+        ("<toolkit-proof>", "<?note U = 0.1 N?><toolkit-proof>"),
+        ("<dcc:comment>", '<dcc:comment note="U = 0.1 N">'),
+        ("</dcc:comment>", "</dcc:comment>U = 0.1 N"),
+        ("</dcc:comment>", "</dcc:comment><dcc:comment><toolkit-proof/>U = 0.1 N</dcc:comment>"),
+        ("<dcc:comment>", "<dcc:comment><toolkit-proof/>U = 0.1 N</dcc:comment><dcc:comment>"),
+    ],
+)
+def test_what_is_left_out_of_the_hash_is_the_proof_and_nothing_beside_it(old: str, new: str) -> None:
+    proved = with_proof(plain_dcc(), PROOF)
+    assert proved.count(old.encode()) == 1
+    assert content_hash(proved.replace(old.encode(), new.encode())) is None
 
 
 def test_a_certificate_with_a_proof_keeps_the_form_of_the_schema(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.fit.regression import TermFit, fit_terms
-from toolkit.calibration.terms import INTERCEPT, model_terms, parse_term, term_matrix
+from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix, term_slopes
 from toolkit.errors import SessionError
 
 if TYPE_CHECKING:
@@ -58,9 +58,11 @@ class BalanceForm:
 
     def slopes(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return dR/dF (rows, responses, loads) at loads (rows, loads)."""
-        by_term = np.stack([_derivatives(name, self.loads, loads) for name in self.terms], axis=1)
-        slopes: NDArray[np.float64] = np.einsum("jt,rtl->rjl", self.coefficients, by_term)
-        return slopes
+        columns, zero = dict(zip(self.loads, loads.T, strict=True)), np.zeros(len(loads))
+        slopes = [term_slopes([name], [1.0], columns, zero).values() for name in self.terms]
+        by_term = np.stack([np.stack(list(by_load), axis=1) for by_load in slopes], axis=1)
+        responses: NDArray[np.float64] = np.einsum("jt,rtl->rjl", self.coefficients, by_term)
+        return responses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,12 +121,10 @@ def fit_balance(
     )
 
 
-def loads_by_iteration(
-    form: BalanceForm, responses: NDArray[np.float64], *, tolerance: float = TOLERANCE, steps: int = MAX_STEPS
-) -> Solved:
+def loads_by_iteration(form: BalanceForm, responses: NDArray[np.float64]) -> Solved:
     """Return the loads of responses (rows, responses) by the load iteration of R-091.
 
-    It ends where no load changes by more than ``tolerance`` of its full scale. With more responses than
+    It ends where no load changes by more than `TOLERANCE` of its full scale. With more responses than
     loads, C1^-1 is the least-squares inverse.
 
     Raises
@@ -134,7 +134,7 @@ def loads_by_iteration(
     """
     inverse = np.linalg.pinv(form.linear)
     loads = start = (responses - form.coefficients[:, -1]) @ inverse.T
-    for step in range(1, steps + 1):
+    for step in range(1, MAX_STEPS + 1):
         # predict = a + C1 F + C2 G(F), so that F - C1^-1 (predict - R) is the iteration.
         with np.errstate(over="ignore", invalid="ignore"):
             new = loads - (form.predict(loads) - responses) @ inverse.T
@@ -142,38 +142,36 @@ def loads_by_iteration(
         loads = new
         if not np.isfinite(loads).all() or (np.abs(loads) > 10 * (form.full_scale + np.abs(start))).any():
             break
-        if float(change.max()) <= tolerance:
+        if float(change.max()) <= TOLERANCE:
             return Solved(loads=loads, steps=step)
     row, load = np.unravel_index(int(np.argmax(np.nan_to_num(change, nan=np.inf))), change.shape)
     raise _failed(
         "the load iteration of the balance form does not converge",
         f"row {row + 1}, {form.loads[load]}: still changing by {100 * float(change[row, load]):.3g} % of "
-        f"full scale in step {step}", f"changes under {tolerance:g} of full scale within {steps} steps",
+        f"full scale in step {step}", f"changes under {TOLERANCE:g} of full scale within {MAX_STEPS} steps",
         "check the indications of that row; a form whose higher terms outweigh the linear ones is no balance",
         rule="not-converged",
     )  # fmt: skip
 
 
-def loads_by_newton(
-    form: BalanceForm, responses: NDArray[np.float64], *, tolerance: float = TOLERANCE, steps: int = MAX_STEPS
-) -> Solved:
+def loads_by_newton(form: BalanceForm, responses: NDArray[np.float64]) -> Solved:
     """Return the same loads by Newton's method (Gauss-Newton with more responses than loads).
 
-    The two agree to ``tolerance`` where there are as many responses as loads. Raises as the iteration does.
+    The two agree to `TOLERANCE` where there are as many responses as loads. Raises as the iteration does.
     """
     loads = (responses - form.coefficients[:, -1]) @ np.linalg.pinv(form.linear).T
     size = np.full(len(form.loads), np.inf)
-    for step in range(1, steps + 1):
+    for step in range(1, MAX_STEPS + 1):
         slope = form.slopes(loads)
         move = np.einsum("rlj,rj->rl", np.linalg.pinv(slope), responses - form.predict(loads))
         loads = loads + move
         size = np.abs(move).max(axis=0) / form.full_scale
-        if float(size.max()) <= tolerance:
+        if float(size.max()) <= TOLERANCE:
             return Solved(loads=loads, steps=step)
     raise _failed(
         "Newton's method does not find the loads of the balance form",
         f"still changing by {100 * float(size.max()):.3g} % of full scale",
-        f"changes under {tolerance:g} of full scale within {steps} steps",
+        f"changes under {TOLERANCE:g} of full scale within {MAX_STEPS} steps",
         "check the indications", rule="not-converged",
     )  # fmt: skip
 
@@ -199,22 +197,6 @@ def _excited(
             orthogonal.append(name)
             basis.append(remainder / size)
     return tuple(orthogonal)
-
-
-def _derivatives(name: str, loads: Sequence[str], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the term's slope to each load (rows, loads)."""
-    term = parse_term(name)
-    columns = dict(zip(loads, at.T, strict=True))
-    slopes = np.zeros_like(at)
-    factors = [(n, columns[n] ** k, k * columns[n] ** (k - 1)) for n, k in term.powers]
-    factors += [(n, np.abs(columns[n]), np.sign(columns[n])) for n in term.absolutes]
-    for i, (n, _, slope) in enumerate(factors):
-        product = slope.copy()
-        for k, (_, value, _) in enumerate(factors):
-            if k != i:
-                product = product * value
-        slopes[:, loads.index(n)] += product
-    return slopes
 
 
 def _failed(

@@ -5,22 +5,27 @@ None of them changes the fit. Recommendations of another model are notes.
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
 from toolkit.calibration.fit.balance_report import balance_findings
+from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, replicate_groups
+from toolkit.calibration.fit.forward_search import contradicting, deviating
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
-from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
-from toolkit.calibration.fit.session_fit import session_statements, within_runs
-from toolkit.calibration.fit.session_rows import groups_of
+from toolkit.calibration.fit.session_fit import fit_session, session_statements
+from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
+from toolkit.errors import SessionError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from toolkit.calibration.fit.readings import SessionReadings, ShuntCheck
@@ -33,21 +38,65 @@ REPEATED = 0.1
 COARSE_REFERENCE = 0.05
 MOST_NAMED = 10
 _RISK = 0.01
+_MOST_ROWS = 20
 
 
 def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
     """Return the findings of a session's data and fit."""
     session = fit.session
-    findings = [*_data_findings(session), *_model_findings(fit), *balance_findings(fit)]
+    wrong = {load.setting.name: contradicting_rows(session, load) for load in fit.loads}
+    sound = _without(fit, {row for rows in wrong.values() for row in rows})
+    findings = [*_data_findings(session), *_model_findings(sound), *balance_findings(fit)]
     if fit.condition_number > COLLINEAR_FINDING:
         message = (
             f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
         )
         findings.append(Finding(rule="collinear", where=session.path.name, message=message))
-    for load in fit.loads:
-        findings += _load_findings(session, load)
-    findings += _robust_findings(fit)
+    for load, judged in zip(fit.loads, sound.loads, strict=True):
+        findings += _load_findings(load, wrong[load.setting.name])
+        findings += _method_findings(session, judged)
+        findings += _scatter_findings(judged)
+    findings += _robust_findings(fit, wrong)
     return tuple(findings)
+
+
+def contradicting_rows(session: Session, load: LoadResult) -> tuple[int, ...]:
+    """Return the rows (from 1) of a load that contradict the others.
+
+    They do so as they are, and within their runs: runs that differ make no wrong rows, nor do sound rows of a
+    run whose zero wrong ones have moved. And they contradict the mean of the others (`session_rows`): what a
+    curve misses smoothly and what loading and unloading do apart are no wrong rows.
+    """
+    if np.sqrt(np.mean(load.fit.residuals**2)) <= 1e-9 * load.setting.tolerance:
+        return ()  # rounding
+    reference = session.table.column(load.setting.name)
+    design = build_basis(load.fit.terms, session.table.columns(session.indications)).design
+    if load.fit.weights is not None:
+        root = np.sqrt(load.fit.weights)
+        return contradicting(design * root[:, None], reference * root)
+    within = reference - load.of_runs
+    wrong = contradicting(design, reference)
+    if wrong and load.of_runs.any():
+        apart = contradicting(design, within)
+        wrong = tuple(row for row in wrong if row in apart)
+    if not wrong:
+        return ()
+    fitted = reference - load.fit.residuals
+    mean = mean_of(design, fitted / float(np.abs(fitted).max()), session.table.up).columns
+    return deviating(mean, within, wrong)
+
+
+def _without(fit: SessionFit, rows: set[int]) -> SessionFit:
+    """Return a session's fit without rows that contradict the others: advice follows sound rows alone."""
+    if not rows:
+        return fit
+    table = fit.session.table
+    kept = np.ones(table.rows, dtype=np.bool_)
+    kept[[row - 1 for row in rows]] = False
+    try:
+        return fit_session(dataclasses.replace(fit.session, table=table.only(kept)))
+    except SessionError:
+        return fit  # the others alone determine no equation
 
 
 def _repeated(rows: NDArray[np.float64], where: str) -> list[Finding]:
@@ -149,10 +198,10 @@ def _data_findings(session: Session) -> list[Finding]:
     return findings
 
 
-def _load_findings(session: Session, load: LoadResult) -> list[Finding]:
+def _load_findings(load: LoadResult, wrong: tuple[int, ...]) -> list[Finding]:
     findings: list[Finding] = []
     name, unit = load.setting.name, load.setting.unit
-    for row in load.diagnostics.outliers:
+    for row in _named(load, wrong):
         message = (
             f"residual {load.fit.residuals[row - 1]:+.4g} {unit}, "
             f"{abs(load.diagnostics.external[row - 1]):.1f} standard deviations from the other rows"
@@ -163,11 +212,37 @@ def _load_findings(session: Session, load: LoadResult) -> list[Finding]:
             off, tolerance = load.check_residuals[row], load.setting.tolerance
             message = f"off by {off:+.4g} {unit}, tolerance {tolerance:.4g} {unit}"
             findings.append(Finding(rule="check-load", where=f"{name}, check row {row + 1}", message=message))
-    spread = load.diagnostics.heteroscedasticity
-    if spread is not None and spread < _RISK / len(session.loads) and session.method == "ols":
-        message = 'the scatter grows or shrinks with the load; consider method = "wls" with u_ columns'
-        findings.append(Finding(rule="method", where=name, message=message, level="note"))
     return findings
+
+
+def _named(load: LoadResult, wrong: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the outliers by their own residuals, but for sound rows beside which others are wrong."""
+    return tuple(row for row in load.diagnostics.outliers if not wrong or row in wrong)
+
+
+def _method_findings(session: Session, load: LoadResult) -> list[Finding]:
+    spread = load.diagnostics.heteroscedasticity
+    if spread is None or spread >= _RISK / len(session.loads) or session.method != "ols":
+        return []
+    message = 'the scatter grows or shrinks with the load; consider method = "wls" with u_ columns'
+    return [Finding(rule="method", where=load.setting.name, message=message, level="note")]
+
+
+def _scatter_findings(load: LoadResult) -> list[Finding]:
+    """Return that the rows lie further from their own equation than a check load may lie from it."""
+    unit, tolerance = load.setting.unit, load.setting.tolerance
+    if load.fit.residual_sd <= tolerance:
+        return []
+    message = (
+        f"the rows lie {load.fit.residual_sd:.4g} {unit} from their own equation (residual standard "
+        f"deviation), and a check load may lie {tolerance:.4g} {unit} from it"
+    )
+    if load.scatter is not None:
+        message += (
+            f"; within a {load.scatter.factor} {load.scatter.within:.3g}, between {load.scatter.factor}s "
+            f"zero {load.scatter.zero:.3g} and gain {load.scatter.gain:.3g} {unit} at full scale"
+        )
+    return [Finding(rule="scatter", where=load.setting.name, message=message)]
 
 
 def _model_findings(fit: SessionFit) -> list[Finding]:
@@ -225,31 +300,43 @@ def _misfits(fit: SessionFit) -> list[Finding]:
     return findings
 
 
-def _robust_findings(fit: SessionFit) -> list[Finding]:
-    """Point at rows that hide each other; those already named as outliers are not named twice."""
-    columns = fit.session.table.columns(fit.session.indications)
+def _robust_findings(fit: SessionFit, wrong: Mapping[str, tuple[int, ...]]) -> list[Finding]:
+    """Name rows that hide each other; those already named as outliers are not named twice."""
     findings = []
-    for load_result in fit.loads:
-        load = fit.session.table.column(load_result.setting.name) - load_result.of_runs
-        within = within_runs(load_result.fit, load_result.of_runs)
-        weights = robust_weights(within, columns=columns, load=load)
-        hidden = hidden_outliers(within, weights, columns=columns)
-        rows = [row for row in hidden if row not in load_result.diagnostics.outliers]
+    for load in fit.loads:
+        name = load.setting.name
+        outliers = _named(load, wrong[name])
+        rows = [row for row in wrong[name] if row not in outliers]
         if rows:
             message = (
-                f"row{'s' if len(rows) > 1 else ''} {_some(rows)}: almost no weight in a robust fit "
-                "(Huber, then Tukey's biweight); rows that are wrong together hide from the ordinary "
-                "residuals. The fit is unchanged: look at these loadings"
+                f"row{'s' if len(rows) > 1 else ''} {_some(rows)}{_of_runs(fit.session, rows)}: "
+                f"contradict{'' if len(rows) > 1 else 's'} the other rows; rows that are wrong together hide "
+                "from the ordinary residuals. The fit is unchanged: look at these loadings"
             )
-            findings.append(
-                Finding(rule="robust", where=load_result.setting.name, message=message, level="note")
-            )
+            findings.append(Finding(rule="robust", where=name, message=message))
     return findings
 
 
-def _some(rows: list[int], most: int = 20) -> str:
-    text = ", ".join(str(row) for row in rows[:most])
-    return text if len(rows) <= most else f"{text} and {len(rows) - most} more"
+def _of_runs(session: Session, rows: list[int]) -> str:
+    """Return of which runs more than half stand among rows, in words; empty where of none."""
+    factor, group = groups_of(session.table)
+    count = np.bincount(group)
+    among = np.bincount(group[np.array(rows) - 1], minlength=len(count))
+    if len(count) == 1:
+        return ""
+    number = session.table.rotation if factor == "mounting" else session.table.run
+    named = [] if number is None else np.unique(number).tolist()
+    texts = [
+        f"{some} of the {every} rows of {factor} {name:g}"
+        for name, some, every in zip(named, among.tolist(), count.tolist(), strict=True)
+        if some > every / 2
+    ]
+    return f" ({', '.join(texts)})" if texts else ""
+
+
+def _some(rows: list[int]) -> str:
+    text = ", ".join(str(row) for row in rows[:_MOST_ROWS])
+    return text if len(rows) <= _MOST_ROWS else f"{text} and {len(rows) - _MOST_ROWS} more"
 
 
 def _inline(lines: str) -> str:

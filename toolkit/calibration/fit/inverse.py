@@ -1,10 +1,10 @@
-"""A straight calibration line y = a + b x in use: x from an observed y, and y from a known x.
+"""A straight calibration line y = a + b x read backwards: x from an observed y.
 
-Both carry the uncertainty of the line, with the covariance of its coefficients, and that of the value put in,
-to first order: the line's own values and the value put in are taken as independent. x from y needs a slope
-that is known well, u(b) small beside |b|.
+It carries the uncertainty of the line, with the covariance of its coefficients, and that of the value put in,
+to first order: the line's own values and the value put in are taken as independent. It needs a slope that is
+known well, u(b) small beside |b|.
 
-Reference: ISO/TS 28037:2010, use of the calibration function (prediction and forward evaluation); GUM 5.2.2.
+Reference: ISO/TS 28037:2010, use of the calibration function (prediction); GUM 5.2.2.
 """
 
 from __future__ import annotations
@@ -74,35 +74,14 @@ def x_from_y(line: StraightLine, y0: float, *, u_y0: float) -> Evaluated:
     if line.b == 0:
         raise ValueError("the slope is 0: no x belongs to a y")
     x0 = (y0 - line.a) / line.b
-    u = _combined(line, x0, u_y0) / abs(line.b)
+    # The quadratic form as a sum of squares, so that a strong correlation cannot leave a negative variance:
+    # (u_a + r x0 u_b)^2 + (1 - r^2) x0^2 u_b^2, with r the correlation of a and b.
+    spread, tilt = line.u_a * line.u_b, x0 * line.u_b
+    r = max(-1.0, min(1.0, line.cov_ab / spread)) if spread else 0.0
+    u = math.hypot(u_y0, line.u_a + r * tilt, math.sqrt((1 - r) * (1 + r)) * tilt) / abs(line.b)
     if not math.isfinite(x0) or not math.isfinite(u):
         raise ValueError(f"the slope {line.b!r} is too small to find x at y = {y0!r}")
     return Evaluated(value=x0, u=u)
-
-
-def y_from_x(line: StraightLine, x0: float, *, u_x0: float = 0.0) -> Evaluated:
-    """Return y0 = a + b x0 for a known x0 with standard uncertainty u_x0, in the unit of y.
-
-    u^2(y0) = u^2(a) + x0^2 u^2(b) + 2 x0 cov(a, b) + b^2 u^2(x0): that of the line's value, without the
-    scatter of a further observation.
-
-    Raises
-    ------
-    ValueError
-        x0 or u_x0 is no finite number, or u_x0 is negative
-    """
-    _finite(x0=x0, u_x0=u_x0)
-    _not_negative(u_x0=u_x0)
-    return Evaluated(value=line.a + line.b * x0, u=_combined(line, x0, line.b * u_x0))
-
-
-def _combined(line: StraightLine, x0: float, u: float) -> float:
-    # The quadratic form as a sum of squares, so that a strong correlation cannot leave a negative variance:
-    # (u_a + r x0 u_b)^2 + (1 - r^2) x0^2 u_b^2, with r the correlation of a and b.
-    spread = line.u_a * line.u_b
-    r = max(-1.0, min(1.0, line.cov_ab / spread)) if spread else 0.0
-    tilt = x0 * line.u_b
-    return math.hypot(u, line.u_a + r * tilt, math.sqrt((1 - r) * (1 + r)) * tilt)
 
 
 def _finite(**values: float) -> None:

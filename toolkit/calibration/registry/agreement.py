@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.registry.legacy_file import read_legacy
+from toolkit.calibration.registry.legacy import read_legacy
 from toolkit.calibration.session.settings import (
     Settings,
     dcc_name,

@@ -1,66 +1,174 @@
-"""A calibration of before the toolkit: coefficients that a source names, without the data behind them.
+"""The file of a legacy import: read into a record without a number, and checked for what cannot be.
 
-The file is kept beside the record and the record is compared with it on every load. It stays *unverified*:
-nothing shows that the coefficients follow from any data.
+Reading and checking are apart: a stored record is read again on every load and compared with its file, and
+a stricter check of a later version must not refuse what an earlier one entered.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
 
-from toolkit.calibration.records.record import CalibrationRecord, DataFile, sealed
-from toolkit.calibration.registry.agreement import check_transcribed
-from toolkit.calibration.registry.candidate import entering, next_id, recorded
-from toolkit.calibration.registry.clock import check_begun
-from toolkit.calibration.registry.ledger import Ledger
-from toolkit.calibration.registry.legacy_file import check_possible, read_legacy
-from toolkit.calibration.registry.registry import Registry
-from toolkit.calibration.registry.store import Change
+from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, canonical
+from toolkit.calibration.registry.refit import polarity
+from toolkit.calibration.session.settings import INSTRUMENT, wrong
+from toolkit.calibration.session.statement_checks import check_load_unit
+from toolkit.calibration.terms import INTERCEPT, NAME, parse_term
+from toolkit.declared import Day, Entry, Fault, Format, Keyed, Size, Text, UnitName, plain, read_text
+from toolkit.errors import ConfigError, ToolkitError, UnitError
 from toolkit.files import sha256_bytes
-from toolkit.inputs import SETTINGS_FILE, read_input
+from toolkit.units import si_scale, unit
 
 
-def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tuple[CalibrationRecord, bool]:
-    """Enter a legacy record; return it, and whether it was there already.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacySource:
+    """Where the coefficients come from."""
 
-    A file whose record was discarded is refused, unless it is to be entered ``again``, under a new id.
+    title: Annotated[str, Entry("of the document", example="Calibration sheet 17")]
+    place: Annotated[str | None, Text(empty=True, numbers="any"), Entry("section, page, table")] = None
+    text: Annotated[
+        str, Entry("the equations as printed, or how they were found", example="FY = 0.997 D51 + 0.647")
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacyIndication:
+    """An indication that the coefficients take."""
+
+    name: Annotated[str, Entry("as the coefficients name it", example="D51")]
+    unit: Annotated[str, UnitName(), Entry("in which the coefficients take it", example="lbf")]
+    serial: Annotated[str | None, Text(empty=True, numbers="any"), Entry("of the cell")] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacyLoad:
+    """The equation of one load."""
+
+    load: Annotated[str, Entry("its name", example="FY")]
+    unit: Annotated[str, UnitName(), Entry("of the load", example="lbf")]
+    coefficients: Annotated[
+        tuple[tuple[str, float], ...], Keyed(), Size(1),
+        Entry("by term; 0 where an indication has none, the intercept last", example={"D51": 0.99719}),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegacyFile:
+    """Coefficients that a source names, without the data behind them."""
+
+    FORMAT: ClassVar[Format] = Format(
+        title="legacy import", schema=1, wrong="legacy", missing="legacy",
+        next_step="correct {key}; nothing was written",
+    )  # fmt: skip
+
+    instrument: Annotated[
+        str, Text(pattern=INSTRUMENT.pattern),
+        Entry("what was calibrated", example="rig", expected="letters, digits, '-', '_' and '.'"),
+    ]  # fmt: skip
+    date: Annotated[str, Day(), Entry("of the source", example="2021-12-31")]
+    entered_by: Annotated[str, Text(strip=True), Entry("who enters it", example="first person")]
+    zero: Annotated[
+        Literal["included", "tared"], Entry("whether the indications hold the zero", example="included")
+    ]
+    source: Annotated[LegacySource, Entry("where the coefficients come from")]
+    indications: Annotated[tuple[LegacyIndication, ...], Size(1), Entry("of the load cells")]
+    loads: Annotated[tuple[LegacyLoad, ...], Size(1), Entry("an equation each")]
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield terms that cannot be read or take no indication, and an intercept that is not last."""
+        cells = [cell.name for cell in self.indications]
+        for number, load in enumerate(self.loads):
+            terms = [term for term, _ in load.coefficients]
+            for term in terms:
+                key = ("loads", number, "coefficients", term)
+                try:
+                    parsed = parse_term(term)
+                except ToolkitError as error:
+                    yield Fault(
+                        key=key, got=term, expected=str(error.expected), what="the term cannot be read"
+                    )
+                    continue
+                if not set(parsed.indications) <= set(cells):
+                    expected = ", ".join((*sorted(cells), INTERCEPT))
+                    yield Fault(key=key, got=term, expected=expected, what="the term takes no indication")
+            if INTERCEPT in terms[:-1]:
+                place = ("loads", number, "coefficients")
+                yield Fault(key=place, got=", ".join(terms), expected="the intercept last")
+
+
+def read_legacy(data: bytes, *, where: object) -> CalibrationRecord:
+    """Read a legacy file into a record that has no id yet.
 
     Raises
     ------
-    ConfigError, SessionError, UnitError
-        the file: unknown key, missing value, unknown unit, a term that cannot be read, or what no
-        calibration can have given (`check_possible`)
-    RegistryError
-        the ledger is damaged, the source is dated in the future, or ``discarded``
+    ConfigError
+        ``not-toml``, ``unknown-key``, ``unknown-unit``; ``legacy``: a value that is missing or cannot be used
     """
-    import datetime as dt
-
-    from toolkit.version import __version__
-
-    source = read_input(path, SETTINGS_FILE)
-    unnumbered = read_legacy(source, where=path)
-    check_possible(unnumbered, where=path)
-    check_begun(dt.date.fromisoformat(unnumbered.date), "the source's date", f"{path}: date")
-    unnumbered = dataclasses.replace(unnumbered, software=(("toolkit", __version__),))
-    folder = registry.folder / unnumbered.instrument
-    records: list[CalibrationRecord] = []
-
-    def build(ledger: Ledger) -> Change | None:
-        twin = recorded(folder, ledger, unnumbered.inputs_sha256, what="the file", where=path, again=again)
-        if twin is not None:
-            records.append(twin)
-            return None
-        record = _numbered(unnumbered, next_id(folder, unnumbered.instrument, ledger), source)
-        check_transcribed(record, source)
-        records.append(record)
-        change = entering(record, {record.data[0].file: source}, by=record.entered_by)
-        return dataclasses.replace(change, action="import")
-
-    written = registry.commit(folder.name, build)
-    return records[0], not written
+    file = read_text(LegacyFile, data, where=where)
+    return CalibrationRecord(
+        id="",
+        instrument=file.instrument,
+        kind="legacy",
+        date=file.date,
+        entered_by=file.entered_by,
+        zero=file.zero,
+        cells=tuple(Indication(name=c.name, unit=c.unit, serial=c.serial) for c in file.indications),
+        loads=tuple(map(_fit, file.loads)),
+        golden=Golden(),
+        data=(),
+        settings=canonical({"source": plain(file.source)}),
+        inputs_sha256=sha256_bytes(data),
+    )
 
 
-def _numbered(record: CalibrationRecord, record_id: str, source: bytes) -> CalibrationRecord:
-    data = (DataFile(role="source", file=f"{record_id}.source.toml", sha256=sha256_bytes(source)),)
-    return sealed(dataclasses.replace(record, id=record_id, data=data))
+def _fit(load: LegacyLoad) -> LoadFit:
+    values = tuple(value for _, value in load.coefficients)
+    return LoadFit(
+        load=load.load, unit=load.unit, terms=tuple(term for term, _ in load.coefficients),
+        coefficients=values, issued=values, polarity=polarity(values), method="legacy",
+    )  # fmt: skip
+
+
+def check_possible(record: CalibrationRecord, *, where: object) -> None:
+    """Refuse a legacy record that no calibration can have given.
+
+    Raises
+    ------
+    ConfigError
+        ``legacy``: a name that stands twice, an indication that a load does not state; a coefficient of
+        zero is stated too
+    UnitError
+        ``unit-dimension``: a force or moment in another unit, an indication without a dimension
+    """
+    names = [cell.name for cell in record.cells]
+    loads = [load.load for load in record.loads]
+    for key, entries in (("indications", names), ("loads", loads)):
+        if any(not NAME.match(name) or name in (INTERCEPT, "abs") for name in entries):
+            raise _wrong(where, key, ", ".join(entries), "names such as FY, MZ, D51")
+        if twice := [name for name in dict.fromkeys(entries) if entries.count(name) > 1]:
+            raise _wrong(where, key, f"{', '.join(twice)} more than once", f"each of the {key} once")
+    if shared := set(names) & set(loads):
+        raise _wrong(where, "loads", ", ".join(sorted(shared)), "names that are no indications")
+    for cell in record.cells:
+        place = f"{where}: indications, {cell.name}"
+        si_scale(cell.unit, where=place)
+        if unit(cell.unit).dimension in ("ratio", "angle"):
+            raise UnitError(
+                f"the unit of {cell.name} has no dimension",
+                where=place, got=cell.unit, expected="what a load cell gives: lbf, N, mV/V, V, counts",
+                next_step="state the unit in which the coefficients take it; nothing was written",
+                rule="unit-dimension",
+            )  # fmt: skip
+    for load in record.loads:
+        check_load_unit(load.load, load.unit, where=f"{where}: {load.load}.unit")
+        missing = [name for name in names if name not in load.terms]
+        if missing:
+            raise _wrong(
+                where, f"{load.load}.coefficients", f"no {', '.join(missing)} among {', '.join(load.terms)}",
+                f"a coefficient of every indication ({', '.join(names)}); write 0 where it has none",
+            )  # fmt: skip
+
+
+def _wrong(where: object, key: str, actual: object, expected: str) -> ConfigError:
+    return wrong(where, key, actual, expected, "legacy")

@@ -19,20 +19,17 @@ from toolkit.calibration.registry.clock import day_of, now, today
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, decisions
 from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, instruments_of, read_people
 from toolkit.calibration.registry.refit import check_reproduces
-from toolkit.calibration.registry.refit_many import reproducing
 from toolkit.calibration.registry.signatures import revoked, signature_line, unproved
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.registry.stored import bad_record as _bad
 from toolkit.calibration.registry.stored import parse_loads, reason_of
-from toolkit.calibration.session.table import Table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
 from toolkit.trust.keys import Signer
 from toolkit.trust.signing import HERE, Signing, Travel
 
-_AT_ONCE = 200
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
 
 
@@ -217,13 +214,11 @@ class Registry:
         ledger = self.ledger(instrument)
         folder = self.folder / instrument
         ids = record_ids(folder, ledger)
-        # In parts: the reference loads of all records need not fit into the memory at once.
-        for at in range(0, len(ids), _AT_ONCE):
-            for record_id, loaded in load_many(folder, ids[at : at + _AT_ONCE], ledger).items():
-                if isinstance(loaded, CalibrationRecord):
-                    good.append(loaded)
-                    continue
-                bad.append(Refused(id=record_id, rule=loaded.rule or "unreadable", reason=reason_of(loaded)))
+        for record_id, loaded in load_many(folder, ids, ledger).items():
+            if isinstance(loaded, CalibrationRecord):
+                good.append(loaded)
+                continue
+            bad.append(Refused(id=record_id, rule=loaded.rule or "unreadable", reason=reason_of(loaded)))
         return tuple(good), tuple(bad)
 
     def status(self, record_id: str, *, known_at: date | None = None) -> RecordStatus:
@@ -326,46 +321,6 @@ def record_ids(folder: Path, ledger: Ledger) -> tuple[str, ...]:
 
 def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRecord:
     """Read one record and run every load-time gate, in the order of the rules in `Registry.load`."""
-    return finish(start(folder, record_id, ledger))
-
-
-def load_many(
-    folder: Path, ids: Sequence[str], ledger: Ledger
-) -> dict[str, CalibrationRecord | ToolkitError]:
-    """Return records by id as `load_checked` does, or its error; those of one shape are refitted together."""
-    started: dict[str, Started | ToolkitError] = {}
-    for record_id in ids:
-        try:
-            started[record_id] = start(folder, record_id, ledger)
-        except ToolkitError as error:
-            started[record_id] = error
-    pairs = [
-        (start.record, start.table)
-        for start in started.values()
-        if isinstance(start, Started) and start.table is not None
-    ]
-    sound = {record.id for (record, _), good in zip(pairs, reproducing(pairs), strict=True) if good}
-    loaded: dict[str, CalibrationRecord | ToolkitError] = {}
-    for record_id, begun in started.items():
-        try:
-            loaded[record_id] = (
-                begun if isinstance(begun, ToolkitError) else finish(begun, reproduces=record_id in sound)
-            )
-        except ToolkitError as error:
-            loaded[record_id] = error
-    return loaded
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Started:
-    """A record that passed the gates before its refit. ``table``: its reference loads, None without any."""
-
-    record: CalibrationRecord
-    table: Table | None
-
-
-def start(folder: Path, record_id: str, ledger: Ledger) -> Started:
-    """Read a record and run the gates before the refit: bytes, hashes, ledger, data files, session."""
     path = folder / f"{record_id}.json"
     entered = ledger.entered().get(record_id)
     try:
@@ -396,22 +351,27 @@ def start(folder: Path, record_id: str, ledger: Ledger) -> Started:
     try:
         if record.kind == "legacy":
             check_transcribed(record, contents["source"])
-            return Started(record=record, table=None)
+            return record
         table = parse_loads(record, contents["loads"], folder)
         check_agrees(record, contents["session"], table, contents.get("dcc"))
     except KeyError as error:
         raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
-    return Started(record=record, table=table)
-
-
-def finish(started: Started, *, reproduces: bool = False) -> CalibrationRecord:
-    """Run the refit and the gates after it; ``reproduces`` where `refit_many` has found the refit to hold."""
-    record, table = started.record, started.table
-    if table is not None:
-        if not reproduces:
-            check_reproduces(record, table)
-        check_inputs(record)
+    check_reproduces(record, table)
+    check_inputs(record)
     return record
+
+
+def load_many(
+    folder: Path, ids: Sequence[str], ledger: Ledger
+) -> dict[str, CalibrationRecord | ToolkitError]:
+    """Return records by id as `load_checked` does, or its error."""
+    loaded: dict[str, CalibrationRecord | ToolkitError] = {}
+    for record_id in ids:
+        try:
+            loaded[record_id] = load_checked(folder, record_id, ledger)
+        except ToolkitError as error:
+            loaded[record_id] = error
+    return loaded
 
 
 def _data_file(record_id: str, path: Path, expected: str) -> bytes:

@@ -75,7 +75,7 @@ def signed_event(
     root = Growing(map(leaf_hash, ledger.lines)).root()
     stated = {**event, **statement(event, _subject(ledger, event), root, version)}
     message = canonical({"seq": len(ledger.entries) + 1, "prev": ledger.head, **stated})
-    operators = operators_of(ledger, event["id"])
+    operators = operators_of(ledger, signing.history, event["id"])
     path = signing.travel.request
     request = Request(message=message, people=version.text, file=file, operators=operators, path=path)
     if path is not None:
@@ -132,7 +132,7 @@ def unproved(
                 body=body,
                 message=canonical(unsigned(body)).encode(),
                 subject=_subject(ledger, body),
-                operators=operators_of(ledger, entry.id),
+                operators=operators_of(ledger, history, entry.id),
                 root=tree.root(),
             )
             judges = history.before(entry.seq) if of_people else _enrolled_at(history, places, entry.seq)
@@ -209,10 +209,18 @@ def _subject(ledger: Ledger, event: Mapping[str, Any]) -> str | None:
     return None if entered is None else entered.record
 
 
-def operators_of(ledger: Ledger, record_id: str) -> tuple[str, ...]:
-    """Return who entered a record: those who signed its entry, and the operator whom it names."""
+def operators_of(ledger: Ledger, history: History, record_id: str) -> tuple[str, ...]:
+    """Return who entered a record: those who signed its entry, and the operator whom it names.
+
+    By id too, as the people were called then: a person who is renamed approves no reading of before.
+    """
     entered = ledger.entered().get(record_id)
-    return () if entered is None else (*signers_of(entered), entered.by)
+    if entered is None:
+        return ()
+    version = history.at(entered.time, entered.people)
+    people = () if version is None else version.people.person
+    ids = (person.id for person in people if person.is_named(entered.by))
+    return tuple(dict.fromkeys((*signers_of(entered), entered.by, *ids)))
 
 
 def nobody(where: object) -> TrustError:

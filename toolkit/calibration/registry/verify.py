@@ -1,7 +1,6 @@
 """`verify`: every record on disk or in a ledger, and every file that belongs to none.
 
-Many records are shared out among processes, and those of one shape are refitted together (`refit_many`). Each
-passes the same gates, by its own numbers, and the rows are the same and in the same order.
+Many records are shared out among processes; the rows are the same and in the same order.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ from toolkit.calibration.registry.settled import is_passing
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
 from toolkit.system import can_fork, processors
+from toolkit.trust.people import FILE
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -57,6 +57,7 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
             for path in sorted(registry.folder.iterdir())
             if not path.is_dir() and path.name not in _FOLDER_KEEPERS
         ]
+    rows += _people(registry)
     ledgers: dict[str, Ledger] = {}
     for instrument in registry.instruments():
         try:
@@ -74,6 +75,22 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
     for instrument, ledger in ledgers.items():
         rows += _instrument(registry.folder / instrument, ledger)
     return tuple(rows)
+
+
+def _people(registry: Registry) -> list[VerifyRow]:
+    """Return a row where the people's file of the home is not what the log of people says."""
+    try:
+        version = registry.people().history.now
+        text = version and read_regular(registry.folder.parent / FILE).decode()
+    except (ToolkitError, OSError, UnicodeDecodeError) as error:
+        reason = f"people: {getattr(error, 'got', None) or error}"
+    else:
+        if version is None or text == version.text:
+            return []
+        reason = (
+            "people: it is not the newest version of the log of people; what is typed into it decides nothing"
+        )
+    return [VerifyRow(id=FILE, ok=False, verified=False, reason=reason)]
 
 
 def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:

@@ -76,10 +76,7 @@ def read_cells(data: bytes, known: Callable[[str], bool], *, where: object) -> C
 
 
 def _plain(data: bytes, where: object) -> Cells | None:
-    """Return the columns that `csv` reads, without it.
-
-    None where there are quotes, blank rows, rows of another length, or bytes that are no text.
-    """
+    """Return the columns without `csv`; None for quotes, blank rows, unequal rows and what is no text."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -111,6 +111,23 @@ class Table:
         )
         return dataclasses.replace(self, units=told, values=values)
 
+    def only(self, rows: NDArray[np.bool_]) -> Table:
+        """Return the table of some of its rows (rows,)."""
+
+        def chosen(column: NDArray[Any] | None) -> NDArray[Any] | None:
+            return None if column is None else column[rows]
+
+        at = np.flatnonzero(rows).tolist()
+        return dataclasses.replace(
+            self,
+            values=self.values[rows],
+            run=chosen(self.run),
+            up=chosen(self.up),
+            rotation=chosen(self.rotation),
+            labels=tuple((name, tuple(texts[row] for row in at)) for name, texts in self.labels),
+            lines=[self.lines[row] for row in at] if len(self.lines) else (),
+        )
+
     def matrix(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Return columns side by side (rows, names)."""
         # Column by column in memory, as every computation reads it.

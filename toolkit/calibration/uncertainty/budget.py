@@ -52,7 +52,6 @@ def calibration_budget(
     at: float | None = None,
     *,
     temperature: Temperature | None = None,
-    probability: float = PROBABILITY,
     scatter: Scatter | None = None,
 ) -> Budget:
     """Return the budget of a load at a load value.
@@ -83,7 +82,7 @@ def calibration_budget(
             "ask within the range, or calibrate over a larger one",
         )  # fmt: skip
     point = typical_indications(record, loads, load, value)
-    return _budget(record, loads, check, fitted, value, point, temperature, probability, scatter)
+    return _budget(record, loads, check, fitted, value, point, temperature, PROBABILITY, scatter)
 
 
 def predict(
@@ -129,8 +128,6 @@ def budgets_of_rows(
     check: Table | None,
     load: str,
     indications: NDArray[np.float64],
-    *,
-    probability: float = PROBABILITY,
 ) -> tuple[Budget | None, ...]:
     """Return the budget of a load at every row of indications (rows, indications) [the record's units].
 
@@ -149,7 +146,7 @@ def budgets_of_rows(
     values = terms @ np.asarray(one.coefficients)
     scatter = scatter_of(record, loads, one)
     return tuple(
-        _budget(record, loads, check, one, float(value), point, None, probability, scatter)
+        _budget(record, loads, check, one, float(value), point, None, PROBABILITY, scatter)
         if math.isfinite(value)
         else None
         for value, point in zip(values.tolist(), indications, strict=True)

@@ -30,7 +30,7 @@ from toolkit.diagnosis.answer.next_measurements import (
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.answer.refit_findings import refit_findings
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.fit.sensor_noise import noise_parts
+from toolkit.diagnosis.fit.sensor_noise import noise_parts, spread
 from toolkit.diagnosis.fit.structure import RUNS, groups
 from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
@@ -101,6 +101,8 @@ def mostly_unknown(search: Search) -> bool:
     shown = _taken(search)
     if search.steps and not shown and _is_smooth(search):
         return True
+    if search.steps and _is_within_accuracy(search):
+        return True
     if not search.structure:
         return False
     if outsized(search):
@@ -135,6 +137,34 @@ def _is_smooth(search: Search) -> bool:
         if structure.columns and not structure.rest
     )
     return max(nameless, default=-math.inf) > named + VERDICT.close
+
+
+def _is_within_accuracy(search: Search) -> bool:
+    """Tell whether effects move every output by less than a simulation is off without any.
+
+    Another integrator or a tire's formula misses its plant by as much, and some effect takes a share of that.
+    One that takes most of what is above the noise is what was left out, however small.
+    """
+    if all(step.active.effect.from_digits for step in search.steps):
+        return False
+    problem = search.problem
+    for name, kept in problem.kept.items():
+        # about every run's own mean: zeros that move are no effect's to take
+        before, after, floor = (
+            _within_runs(problem, error, kept)
+            for error in (
+                problem.observed[name] - search.held_refitted.simulated[name],
+                problem.observed[name] - search.held_augmented.simulated[name],
+                search.augmented.residual[name],
+            )
+        )
+        shown = before > VERDICT.shown * floor
+        if shown and before - after > VERDICT.taken * (before - floor):
+            return False
+        moved = (search.held_augmented.simulated[name] - search.held_refitted.simulated[name])[kept]
+        if len(moved) and math.sqrt(float(np.mean(moved**2))) > VERDICT.accuracy * spread(problem, name):
+            return False
+    return True
 
 
 def _taken(search: Search) -> list[tuple[float, float]]:

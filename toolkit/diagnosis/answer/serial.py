@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
 
 from toolkit.declared.answers import entry_of
-from toolkit.declared.writing import json_value
+from toolkit.declared.text import json_value
 from toolkit.findings import FindingEntry
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
@@ -107,7 +108,7 @@ def best_step(
     least: float,
     refitted: HeldOut,
 ) -> tuple[Fit, HeldOut, Step] | None:
-    """Return the first of some joint fits that stands on what it has not seen, None where none does.
+    """Return the joint fit that stands on what it has not seen, None where none does: the first, or a better.
 
     Parameters
     ----------
@@ -117,8 +118,13 @@ def best_step(
     refitted : the held-out rows without any effect
     """
     form = max((applied.effect.form_error for applied in base.active), default=0.0)
+    standing: list[tuple[Joint, HeldOut]] = []
     for trial in joint[: STEP.judged]:
         made = trial.fit
+        if standing and made.log_posterior - base.log_posterior < STEP.rival * (
+            standing[0][0].fit.log_posterior - base.log_posterior
+        ):
+            continue
         try:
             scores = hold_out(problem, folds, made.active, made)
         except FitError:
@@ -133,15 +139,29 @@ def best_step(
             continue
         if made.active[-1].effect.needs_signal and not _shows(problem, scores, made.active[-1]):
             continue
-        step = Step(
-            active=made.active[-1],
-            p_value=p_of[id(trial.scored)],
-            held_out_gain=gain,
-            gain=made.log_posterior - base.log_posterior,
-            rivals=rivals(problem, trial, joint),
-        )
-        return made, scores, step
-    return None
+        standing.append((trial, scores))
+        if not _leaves_more_than_noise(problem, made):
+            break
+    if not standing:
+        return None
+    # The first fits best. Where more than noise is left, that is also what the fit made of the rest, and one
+    # that foretells unseen rows better goes before it; the better fit then stays in its class.
+    best = max(standing, key=lambda entry: entry[1].total)
+    trial, scores = best if best[1].total > standing[0][1].total + STEP.least_gain else standing[0]
+    step = Step(
+        active=trial.fit.active[-1],
+        p_value=p_of[id(trial.scored)],
+        held_out_gain=scores.total - held_base.total,
+        gain=trial.fit.log_posterior - base.log_posterior,
+        rivals=rivals(problem, trial, joint),
+    )
+    return trial.fit, scores, step
+
+
+def _leaves_more_than_noise(problem: Problem, made: Fit) -> bool:
+    """Tell whether an output's rest has more in it than what its quickest changes show as the sensor's."""
+    parts = [noise_parts(problem, made, name) for name in problem.names if problem.kept[name].any()]
+    return any(each.process_sd > each.sensor_sd for each in parts)
 
 
 def _shows(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> bool:
@@ -175,7 +195,9 @@ def _weight(problem: Problem) -> float:
     return 0.5 * math.log(sum(int(rows.sum()) for rows in problem.kept.values()))
 
 
-def joint_fit(problem: Problem, base: Fit, added: Sequence[AppliedEffect]) -> Fit | None:
+def joint_fit(
+    problem: Problem, base: Fit, added: Sequence[AppliedEffect], *, plain: bool | None = None
+) -> Fit | None:
     """Return the joint fit with effects more, None where the simulation runs with no part of them.
 
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
@@ -186,17 +208,17 @@ def joint_fit(problem: Problem, base: Fit, added: Sequence[AppliedEffect]) -> Fi
     moved = float(np.abs(problem.off_priors(base.p)).max(initial=0.0))
     if moved > PRIORS.moved and any(effect.effect.misleads for effect in added):
         starts.append(tuple(parameter.value for parameter in problem.free))
-    fits = [_fitted(problem, base, added, start) for start in starts]
+    fits = [_fitted(problem, base, added, start, plain) for start in starts]
     return max((fitted for fitted in fits if fitted), key=lambda fitted: fitted.log_posterior, default=None)
 
 
 def _fitted(
-    problem: Problem, base: Fit, added: Sequence[AppliedEffect], start: tuple[float, ...]
+    problem: Problem, base: Fit, added: Sequence[AppliedEffect], start: tuple[float, ...], plain: bool | None
 ) -> Fit | None:
     for share in (1.0, 0.5, 0.25, 0.125) if any(effect.searched for effect in added) else (1.0,):
         try:
             active = (*base.active, *(_shared(effect, share) for effect in added))
-            return fit(problem, active, start=start)
+            return fit(problem, active, start=start, plain=plain)
         except FitError:
             continue
     return None

@@ -16,7 +16,7 @@ import numpy as np
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, predictor
 from toolkit.diagnosis.fit.sensor_noise import NoiseParts, noise_parts, spread
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
-from toolkit.diagnosis.policy import NOISE, STRUCTURE
+from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE
 from toolkit.diagnosis.search.unexplained import StructureFound
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 LARGE = "a floor above a tenth of the output's spread"
+LONG = "a floor that wanders as long as the recording"
 
 
 def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -47,7 +48,20 @@ def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tup
             own = [group for group in listed if group.output == name and group.variables != RUNS]
             follows = _followed(problem, folds, base, name, own, seed + at)
             found += [] if follows is None else [follows]
+            # Of so few independent values nothing can be told apart from anything, noise least of all.
+            few = problem.layout(name).n <= ROWS.fewest * base.noise[name].correlation_rows
+            if few and parts.total_sd > NOISE.largest * spread(problem, name):
+                found.append(StructureFound(output=name, variables=(LONG,), gain=0.0, p_value=1.0, rest=True))
     return tuple(found)
+
+
+def is_beyond_noise(problem: Problem, base: Fit) -> bool:
+    """Tell whether some output's rest is so large that no colour makes it noise."""
+    for name in problem.names:
+        parts = noise_parts(problem, base, name)
+        if problem.kept[name].any() and not parts.is_sensor and _is_large(problem, base, name, parts):
+            return True
+    return False
 
 
 def _is_large(problem: Problem, base: Fit, name: str, parts: NoiseParts) -> bool:

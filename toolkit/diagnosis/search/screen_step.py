@@ -150,7 +150,7 @@ def from_declared(problem: Problem, base: Fit, view: Look) -> Look:
     ]
     if not reshaping or np.abs(problem.off_priors(base.p)).max(initial=0.0) < PRIORS.moved:
         return view
-    screen = _about_declared(problem, base)
+    screen = about_declared(problem, base)
     if screen is None:
         return view
     trials = screen.sharpened(
@@ -167,7 +167,7 @@ def from_declared(problem: Problem, base: Fit, view: Look) -> Look:
     return replace(view, significant=tuple(together), p_of=p_of)
 
 
-def _about_declared(problem: Problem, base: Fit) -> LinearisedFit | None:
+def about_declared(problem: Problem, base: Fit) -> LinearisedFit | None:
     """Return the screen about the declared parameters; None where the effects so far cannot be run there."""
     declared = tuple(parameter.value for parameter in problem.free)
     try:

@@ -24,6 +24,7 @@ from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
+from toolkit.diagnosis.search.unseen_runs import shown_on_unseen_runs
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -171,11 +172,13 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 before = structure
             if turn == STEP.most_effects:
                 break
-            outcome = None
+            budget.check(f"step {turn + 1}: unseen runs")
+            outcome = shown_on_unseen_runs(problem, folds, base, held_base, view)
             hidden = masked(problem, base, view.candidates) if view.significant else frozenset()
             hinted = view.hinted if folds.by_run and len(problem.runs) >= STEP.runs else ()
             share = STEP.later if turn else STEP.first
-            for promising, least in step_groups(view.significant, hinted, hidden, share):
+            groups = step_groups(view.significant, hinted, hidden, share) if outcome is None else []
+            for promising, least in groups:
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in promising))
                 budget.check(f"step {turn + 1}: joint fits of {names}")
                 joint = joint_fits(problem, base, promising)

@@ -103,8 +103,8 @@ def _where(source: Told, style: Style) -> str | None:
             text = f"{mismatch.channel}: the residual is more than noise, and no variable alone explains it"
         for at in mismatch.where[:1]:
             ends = at.ends(lambda value: _n(value, style, 4))
-            much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
-            text += f", {much} {ends} {_unit(at.unit)}".rstrip()
+            extent = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
+            text += f", {extent} {ends} {_unit(at.unit)}".rstrip()
         sentences.append(f"{text} ({chance(mismatch.p_value, decimal_comma=style.decimal_comma)}).")
     return " ".join(sentences) or None
 

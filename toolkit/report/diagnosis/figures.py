@@ -40,7 +40,7 @@ _WIDE = 200.0  # errors over noise from which a chart goes by powers of ten
 
 def error_bars(diagnosis: Diagnosis) -> bytes:
     """Return the chart of the first ten seconds: held-out error over noise, a bar for each simulation."""
-    names = [one.channel for one in diagnosis.held_out]
+    names = [fit.channel for fit in diagnosis.held_out]
 
     def draw(figure: Figure) -> None:
         from matplotlib.patches import Rectangle
@@ -49,10 +49,10 @@ def error_bars(diagnosis: Diagnosis) -> bytes:
         steps = [("as declared", GREY, "nominal_rmse"), ("refitted", ORANGE, "refitted_rmse")]
         if diagnosis.effects:
             steps.append(("with the effect", BLUE, "augmented_rmse"))
-        if any(one.with_laws_rmse is not None for one in diagnosis.held_out):
+        if any(fit.with_laws_rmse is not None for fit in diagnosis.held_out):
             steps.append(("with the laws", VIOLET, "with_laws_rmse"))
         for i, (label, colour, field) in enumerate(steps):
-            values = [getattr(one, field) / max(one.noise_floor, 1e-300) for one in diagnosis.held_out]
+            values = [getattr(fit, field) / max(fit.noise_floor, 1e-300) for fit in diagnosis.held_out]
             at = np.arange(len(names)) + (i - (len(steps) - 1) / 2) * 0.78 / len(steps)
             bars = axes.barh(at, values, height=0.72 / len(steps), color=colour, label=label)
             axes.bar_label(
@@ -86,7 +86,7 @@ def mismatch_map(search: Search, channel: str, place: Place, *, after: bool) -> 
     x = variable_of(search, place.variable)
     if x is None:
         return None
-    kept = problem.kept[channel]
+    mask = problem.kept[channel]
     unit = next(output.unit for output in problem.model.outputs if output.name == channel)
 
     def draw(figure: Figure) -> None:
@@ -95,10 +95,10 @@ def mismatch_map(search: Search, channel: str, place: Place, *, after: bool) -> 
         if after:
             series.append(("with the effect", BLUE, search.augmented.residual[channel]))
         for label, colour, residual in series:
-            some = np.flatnonzero(kept)
-            some = some[np.linspace(0, len(some) - 1, min(len(some), _MOST)).astype(np.intp)]
-            axes.plot(x[some], residual[some], ".", markersize=2.2, alpha=0.25, color=colour)
-            centre, mean = binned(x[kept], residual[kept])
+            rows = np.flatnonzero(mask)
+            rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), _MOST)).astype(np.intp)]
+            axes.plot(x[rows], residual[rows], ".", markersize=2.2, alpha=0.25, color=colour)
+            centre, mean = binned(x[mask], residual[mask])
             axes.plot(centre, mean, "-", linewidth=2.0, color=colour, label=f"{label} (mean)")
         if isinstance(place.start, float) and isinstance(place.end, float):
             axes.axvspan(place.start, place.end, color="#f6e7c8", alpha=0.5, zorder=0)
@@ -114,7 +114,7 @@ def worst_run(search: Search, channel: str) -> int:
     """Return the number of the run with the largest mismatch of an output."""
     problem = search.problem
     residual = np.where(problem.kept[channel], search.refitted.residual[channel], 0.0)
-    return int(np.argmax([float(np.sum(residual[one] ** 2)) for one in problem.slices]))
+    return int(np.argmax([float(np.sum(residual[run] ** 2)) for run in problem.slices]))
 
 
 def run_in_time(search: Search, channel: str, *, after: bool, laws: Laws | None = None) -> bytes:
@@ -126,8 +126,8 @@ def run_in_time(search: Search, channel: str, *, after: bool, laws: Laws | None 
     laws : of what has no name, shown where there are any
     """
     problem = search.problem
-    which = worst_run(search, channel)
-    rows, run = problem.slices[which], problem.runs[which]
+    worst = worst_run(search, channel)
+    rows, run = problem.slices[worst], problem.runs[worst]
     unit = next(output.unit for output in problem.model.outputs if output.name == channel)
 
     def draw(figure: Figure) -> None:
@@ -182,8 +182,10 @@ def law_curve(law: FoundLaw) -> bytes | None:
         axes.plot(curve.x, curve.y, color=VIOLET, linewidth=1.4, label=law.formula or "curve")
         axes.axhline(0, color="#333333", linewidth=0.8)
         axes.set_xlabel(law.variables[0])
-        what = "factor less one" if law.acts == "multiplies" else f"added [{curve.unit}]"
-        axes.set_ylabel(f"{law.channel}: {what}" if law.kind == "output" else f"taken from d{law.channel}/dt")
+        label = "factor less one" if law.acts == "multiplies" else f"added [{curve.unit}]"
+        axes.set_ylabel(
+            f"{law.channel}: {label}" if law.kind == "output" else f"taken from d{law.channel}/dt"
+        )
         axes.legend(frameon=False)
 
     return draw_svg((5.6, 3.0), draw)
@@ -200,9 +202,9 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
         share = np.zeros((len(names), len(problem.runs)))
         for i, name in enumerate(names):
             noise = max(floors[name], 1e-300)
-            for j, one in enumerate(problem.slices):
-                kept = problem.kept[name][one]
-                values = fit.residual[name][one][kept]
+            for j, run in enumerate(problem.slices):
+                kept = problem.kept[name][run]
+                values = fit.residual[name][run][kept]
                 share[i, j] = np.sqrt(np.mean(values**2)) / noise if len(values) else np.nan
         return share
 
@@ -260,9 +262,9 @@ def binned(
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
     # Values that repeat leave bins empty: these have no mean, and none is drawn.
     count = np.bincount(at, minlength=len(edges) - 1)
-    held = count > 0
-    centre = np.bincount(at, weights=x, minlength=len(edges) - 1)[held] / count[held]
-    mean = np.bincount(at, weights=y, minlength=len(edges) - 1)[held] / count[held]
+    filled = count > 0
+    centre = np.bincount(at, weights=x, minlength=len(edges) - 1)[filled] / count[filled]
+    mean = np.bincount(at, weights=y, minlength=len(edges) - 1)[filled] / count[filled]
     return centre, mean
 
 

@@ -37,40 +37,40 @@ def variables(search: Search) -> list[Variable]:
         if all(driver.name in run.columns for run in problem.runs)
     }
     order = [name for name in _FIRST if name in drivers]
-    rest = [name for name in drivers if name not in (*_FIRST, *_TURNS)]
-    made = [_channel(search, name, drivers[name]) for name in order]
-    made += _conditions(search)
-    made += [_revolution(search, name, drivers[name]) for name in _TURNS if name in drivers]
+    other_drivers = [name for name in drivers if name not in (*_FIRST, *_TURNS)]
+    listed = [_channel(search, name, drivers[name]) for name in order]
+    listed += _conditions(search)
+    listed += [_revolution(search, name, drivers[name]) for name in _TURNS if name in drivers]
     if problem.case.has_time:
         text, seconds = time_unit(problem.case)
-        made.append((f"time [{text}]", np.concatenate([run.t for run in problem.runs]) / seconds, ()))
-    made += [_channel(search, name, drivers[name]) for name in rest]
-    return [one for one in made if np.isfinite(one[1]).any() and np.nanmax(one[1]) > np.nanmin(one[1])]
+        listed.append((f"time [{text}]", np.concatenate([run.t for run in problem.runs]) / seconds, ()))
+    listed += [_channel(search, name, drivers[name]) for name in other_drivers]
+    return [one for one in listed if np.isfinite(one[1]).any() and np.nanmax(one[1]) > np.nanmin(one[1])]
 
 
 def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool) -> bytes | None:
     """Return an output's root mean square residual over its noise, a panel for each variable."""
     noise = max(next((one.noise_floor for one in diagnosis.held_out if one.channel == channel), 0.0), 1e-300)
-    chosen = variables(search)[:_PANELS]
-    kept = search.problem.kept[channel]
-    if not chosen or not kept.any():
+    shown_variables = variables(search)[:_PANELS]
+    mask = search.problem.kept[channel]
+    if not shown_variables or not mask.any():
         return None
     fits = [("refitted", ORANGE, search.refitted)]
     if after:
         fits.append(("with the effect", BLUE, search.augmented))
-    across = 4 if len(chosen) == 4 else min(_ACROSS, len(chosen))
-    down = -(-len(chosen) // across)
+    across = 4 if len(shown_variables) == 4 else min(_ACROSS, len(shown_variables))
+    down = -(-len(shown_variables) // across)
 
     def draw(figure: Figure) -> None:
         panels = figure.subplots(down, across, sharey=True, squeeze=False)
         for i, axes in enumerate(panels.flat):
-            if i >= len(chosen):
+            if i >= len(shown_variables):
                 axes.axis("off")
                 continue
-            label, values, levels = chosen[i]
+            label, values, levels = shown_variables[i]
             for j, (name, colour, fit) in enumerate(fits):
                 _panel(
-                    axes, values[kept], fit.residual[channel][kept] / noise, levels,
+                    axes, values[mask], fit.residual[channel][mask] / noise, levels,
                     label=name, colour=colour, at=(j - (len(fits) - 1) / 2, 0.8 / len(fits)),
                 )  # fmt: skip
             axes.axhline(1.0, color=GREEN, linewidth=1.2, label="noise")

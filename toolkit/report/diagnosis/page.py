@@ -100,14 +100,16 @@ def cause(diagnosis: Diagnosis) -> str | None:
     shares = []
     for fit in diagnosis.held_out:
         above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
-        taken = fit.refitted_rmse**2 - fit.augmented_rmse**2
-        if above > 0 and taken > 0:
-            shares.append((taken, above, fit.channel))
+        explained = fit.refitted_rmse**2 - fit.augmented_rmse**2
+        if above > 0 and explained > 0:
+            shares.append((explained, above, fit.channel))
     if not shares:
         return "; ".join(names) + "."
-    taken, above, channel = max(shares, key=lambda share: share[0] / share[1])
-    much = f"{100 * taken / above:.0f} % of the mean square by which {channel} is off beyond its noise"
-    return f"{'; '.join(names)}: explains {much}, on rows that no fit has seen."
+    explained, above, channel = max(shares, key=lambda share: share[0] / share[1])
+    share_text = (
+        f"{100 * explained / above:.0f} % of the mean square by which {channel} is off beyond its noise"
+    )
+    return f"{'; '.join(names)}: explains {share_text}, on rows that no fit has seen."
 
 
 def page(result: Result, use: CalibrationUse | None = None) -> str:
@@ -286,8 +288,8 @@ def _place_sentence(mismatch: Mismatch) -> str:
         text = f"{channel}: the refitted residual is more than noise, and no variable alone explains it"
     for place in mismatch.where[:1]:
         ends = place.ends(lambda value: few(value, 4))
-        much = f"over all of {place.variable}," if place.whole else f"most of it where {place.variable} is"
-        text += f", {much} {ends} {place.unit}".rstrip()
+        extent = f"over all of {place.variable}," if place.whole else f"most of it where {place.variable} is"
+        text += f", {extent} {ends} {place.unit}".rstrip()
     return f"{text} ({chance(mismatch.p_value)})."
 
 

@@ -80,7 +80,7 @@ def errors_plot(diagnosis: Diagnosis, style: Style) -> Plot:
 def _where(search: Search, mismatch: Mismatch, diagnosis: Diagnosis, style: Style) -> Plot | None:
     """Return an output's residual over the first variable that has numbers, in means of equal counts."""
     problem = search.problem
-    kept = problem.kept[mismatch.channel]
+    mask = problem.kept[mismatch.channel]
     for place in mismatch.where:
         x = variable_of(search, place.variable)
         if x is None or not isinstance(place.start, float) or not isinstance(place.end, float):
@@ -91,20 +91,20 @@ def _where(search: Search, mismatch: Mismatch, diagnosis: Diagnosis, style: Styl
             series.append(("with the effects", 0, search.augmented.residual[mismatch.channel]))
         curves = []
         for label, group, residual in series:
-            at, mean = binned(x[kept], residual[kept])
+            at, mean = binned(x[mask], residual[mask])
             curves.append(
                 Curve(label=label, x=tuple(at.tolist()), y=tuple(mean.tolist()), group=group, style="both")
             )
         span = f"{_number(place.start, style)} to {_number(place.end, style)} {place.unit}".rstrip()
-        much = "everywhere from" if place.whole else "mostly at"
+        extent = "everywhere from" if place.whole else "mostly at"
         return Plot(
             name="",
             x_label=f"{place.variable} [{place.unit}]" if place.unit else place.variable,
             y_label=f"recorded − simulated {mismatch.channel} [{unit}]",
             curves=tuple(curves),
             caption=f"{mismatch.channel}: mean residual over {place.variable}; "
-            f"the mismatch is {much} {span}.",
-            alt=f"Mean of recorded less simulated {mismatch.channel} over {place.variable}, {much} {span}.",
+            f"the mismatch is {extent} {span}.",
+            alt=f"Mean of recorded less simulated {mismatch.channel} over {place.variable}, {extent} {span}.",
             legend_title="simulation",
             decimal_comma=style.decimal_comma,
         )
@@ -113,8 +113,8 @@ def _where(search: Search, mismatch: Mismatch, diagnosis: Diagnosis, style: Styl
 
 def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
     problem, channel = search.problem, diagnosis.mismatch[0].channel
-    which = worst_run(search, channel)
-    rows, run = problem.slices[which], problem.runs[which]
+    worst = worst_run(search, channel)
+    rows, run = problem.slices[worst], problem.runs[worst]
     stride = slice(None, None, max(1, -(-run.rows // _MOST)))
     good = np.isfinite(problem.observed[channel][rows][stride])
     clock, seconds = time_unit(problem.case)

@@ -63,9 +63,9 @@ class Bulk:
     def of(cls, parts: Sequence[Story], levelled: Callable[[], frozenset[str]]) -> Bulk:
         """Begin for a template's parts; what looks like a stand-in already is no longer taken for one."""
         for story in parts:
-            for one in story.root.iter(etree.ProcessingInstruction):
-                if one.target == _PI:
-                    one.text = "of another program"
+            for mark in story.root.iter(etree.ProcessingInstruction):
+                if mark.target == _PI:
+                    mark.text = "of another program"
         return cls(levelled)
 
     def takes(self, table: Element, pattern: Element) -> bool:
@@ -76,9 +76,9 @@ class Bulk:
         """
         if next(pattern.iter(*_FIELDS, q("w:outlineLvl")), None) is not None:
             return False
-        styles = {one.get(q("w:val")) for one in pattern.iter(q("w:pStyle"))}
+        styles = {element.get(q("w:val")) for element in pattern.iter(q("w:pStyle"))}
         root = table.getroottree().getroot()
-        codes = "".join(one.text or "" for one in root.iter(q("w:instrText")))
+        codes = "".join(element.text or "" for element in root.iter(q("w:instrText")))
         return not (
             styles & self.levelled()
             or re.search(r"TOC\b.*\\t", codes, re.IGNORECASE)
@@ -142,22 +142,22 @@ class Mould:
             if not all(map(_plain, said)):
                 yield self._filled(said)
                 continue
-            packed = [escape(one).encode() for one in said]
+            packed = [escape(part).encode() for part in said]
             pieces = list(self.pieces)
             for i in range(1, len(pieces), 2):
                 pieces[i] = self._fresh(pieces[i]) or packed[int(pieces[i])]
             yield (
                 b"".join(pieces),
                 tuple(
-                    "".join(said[int(one)] if i % 2 else one for i, one in enumerate(cell))
+                    "".join(said[int(part)] if i % 2 else part for i, part in enumerate(cell))
                     for cell in self.cells
                 ),
             )
 
-    def _filled(self, said: Sequence[str]) -> tuple[bytes, tuple[str, ...]]:
+    def _filled(self, texts: Sequence[str]) -> tuple[bytes, tuple[str, ...]]:
         """Fill a row as a tree: line breaks, tabs, spaces at the ends, scripts that run from the right."""
-        row, given = deepcopy(self.pattern), iter(said)
-        self.put(row, lambda _tag: next(given))
+        row, values = deepcopy(self.pattern), iter(texts)
+        self.put(row, lambda _tag: next(values))
         fresh_ids(row, self.ids)
         return self._xml(row), row_texts(row)
 
@@ -170,8 +170,8 @@ class Mould:
     def _xml(self, row: Element) -> bytes:
         xml: bytes = etree.tostring(row, encoding="UTF-8", xml_declaration=False)
         head, end, rest = xml.partition(b">")
-        for one in self.known:
-            head = head.replace(one, b"")
+        for declaration in self.known:
+            head = head.replace(declaration, b"")
         return head + end + rest
 
 
@@ -225,20 +225,20 @@ def without_rows(xml: bytes) -> tuple[bytes, list[bytes]]:
     """
     if len(xml) < _LARGE or _STANDIN.search(xml):
         return xml, []
-    kept: list[bytes] = []
+    pieces: list[bytes] = []
     runs: list[bytes] = []
     at = 0
     for start, end, count in _runs(xml):
         if count > MANY:
-            kept += [xml[at:start], f"<?{_PI} {len(runs)}?>".encode()]
+            pieces += [xml[at:start], f"<?{_PI} {len(runs)}?>".encode()]
             runs.append(xml[start:end])
             at = end
-    return b"".join([*kept, xml[at:]]), runs
+    return b"".join([*pieces, xml[at:]]), runs
 
 
 def with_rows(xml: bytes, runs: Sequence[bytes]) -> bytes:
     """Return a part with its rows back in their places."""
-    return _STANDIN.sub(lambda found: runs[int(found[1])], xml) if runs else xml
+    return _STANDIN.sub(lambda match: runs[int(match[1])], xml) if runs else xml
 
 
 def _runs(xml: bytes) -> Iterator[tuple[int, int, int]]:

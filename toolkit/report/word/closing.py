@@ -14,7 +14,7 @@ from lxml import etree
 
 from toolkit.errors import RenderError
 from toolkit.report.content import ReportContent
-from toolkit.report.word.contents_pages import poppler
+from toolkit.report.word.toc_pages import poppler
 from toolkit.report.word.xml import W_P, W_SDT, W_T, Element, new_run, q
 from toolkit.trust.seal.qr import Place
 

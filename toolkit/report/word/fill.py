@@ -18,7 +18,6 @@ from toolkit.report.tags import Tag
 from toolkit.report.word.bulk import Bulk, row_texts
 from toolkit.report.word.check import LintFinding, check_stories
 from toolkit.report.word.closing import close
-from toolkit.report.word.contents import write_contents
 from toolkit.report.word.controls import (
     apply_condition,
     fill_control,
@@ -36,6 +35,7 @@ from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark
 from toolkit.report.word.pictures import Ids, free_height, insert_at_mark, picture_run
 from toolkit.report.word.rows import fill_table
 from toolkit.report.word.scan import Site, row_in, scan, table_of
+from toolkit.report.word.toc import write_contents
 from toolkit.report.word.xml import (
     W_P,
     W_TR,

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
-from toolkit.report.word.contents import Contents
 from toolkit.report.word.lint import LintFinding
+from toolkit.report.word.toc import Contents
 from toolkit.report.word.xml import STORIES, W_P, W_SDT, W_TR, Element, ancestor, q
 
 

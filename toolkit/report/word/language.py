@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import visible_texts
 from toolkit.report.word.xml import W_P, Element, Story, q, set_text, stories, write_back
-from toolkit.words.catalogue import locale_of
-from toolkit.words.phrasebook import phrasebook
+from toolkit.words.phrasebook import locale_of, phrasebook
 
 _NUMBERED = re.compile(r"(\d+(?:\.\d+)*\s{2,})?(.*)", re.DOTALL)
 _WORDS = re.compile(r"[^\W\d_]{2,}")

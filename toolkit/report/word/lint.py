@@ -12,8 +12,8 @@ from typing import Any, Literal
 from lxml import etree
 
 from toolkit.report.style import Style
-from toolkit.report.word.contents import can_update, contents_fields
 from toolkit.report.word.scan import place_of
+from toolkit.report.word.toc import can_update, contents_fields
 from toolkit.report.word.xml import NS, Element, Story, parser, q, walk_fields
 
 RULES = {

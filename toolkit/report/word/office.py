@@ -139,8 +139,8 @@ class Office:
     def close(self) -> None:
         """End what still runs and remove the profile."""
         self._end_warm()
-        for one in self._beside:
-            one.close()
+        for office in self._beside:
+            office.close()
         self._beside = []
         shutil.rmtree(self.folder, ignore_errors=True)
         self._guard.dismiss()
@@ -150,8 +150,8 @@ class Office:
 
         One lays out on one core only; two with profiles of their own convert ten reports in half the time.
         """
-        wanted = min(_MOST, os.cpu_count() or 1, documents // _WORTH)
-        while len(self._beside) + 1 < wanted:
+        instances = min(_MOST, os.cpu_count() or 1, documents // _WORTH)
+        while len(self._beside) + 1 < instances:
             self._beside.append(Office(timeout_s=self.timeout_s))
 
     def convert(self, documents: Sequence[Path], out: Path) -> list[Path]:
@@ -162,11 +162,11 @@ class Office:
         RenderError
             LibreOffice took too long, or a PDF is not there or is no PDF
         """
-        made = self.convert_each(documents, out)
-        for one in made:
-            if isinstance(one, RenderError):
-                raise one
-        return [one for one in made if isinstance(one, Path)]
+        outcomes = self.convert_each(documents, out)
+        for outcome in outcomes:
+            if isinstance(outcome, RenderError):
+                raise outcome
+        return [outcome for outcome in outcomes if isinstance(outcome, Path)]
 
     def convert_each(self, documents: Sequence[Path], out: Path) -> list[Path | RenderError]:
         """Convert Word files to PDF; return each PDF, or why there is none.
@@ -176,34 +176,36 @@ class Office:
         count = min(1 + len(self._beside), max(1, len(documents)))
         shares = [documents[i::count] for i in range(count)]
         with ThreadPoolExecutor(count) as pool:
-            made = pool.map(lambda one, share: one._convert(share, out), [self, *self._beside], shares)
+            outcomes = pool.map(
+                lambda office, share: office._convert(share, out), [self, *self._beside], shares
+            )
             pdfs = {
                 source: pdf
-                for share, done in zip(shares, made, strict=True)
-                for source, pdf in zip(share, done, strict=True)
+                for share, converted in zip(shares, outcomes, strict=True)
+                for source, pdf in zip(share, converted, strict=True)
             }
         return [pdfs[document] for document in documents]
 
     def _convert(self, documents: Sequence[Path], out: Path) -> list[Path | RenderError]:
-        wanted = [out / f"{document.stem}.pdf" for document in documents]
+        targets = [out / f"{document.stem}.pdf" for document in documents]
         late: RenderError | None = None
         try:
-            said = self._run(documents, out, wanted)
+            message = self._run(documents, out, targets)
             if self._warm is not None:
                 # The waiting instance took the job; where it did not, a fresh one gets it.
                 self._end_warm()
-                if not all(pdf.is_file() for pdf in wanted):
-                    said = self._run(documents, out, wanted)
+                if not all(pdf.is_file() for pdf in targets):
+                    message = self._run(documents, out, targets)
         except RenderError as error:
-            late, said = error, ""
+            late, message = error, ""
         return [
-            pdf if _is_pdf(pdf) else late or _no_pdf(source.name, said)
-            for source, pdf in zip(documents, wanted, strict=True)
+            pdf if _is_pdf(pdf) else late or _no_pdf(source.name, message)
+            for source, pdf in zip(documents, targets, strict=True)
         ]
 
-    def _run(self, documents: Sequence[Path], out: Path, wanted: Sequence[Path]) -> str:
+    def _run(self, documents: Sequence[Path], out: Path, targets: Sequence[Path]) -> str:
         """Run one conversion and return what LibreOffice said of it."""
-        for old in wanted:
+        for old in targets:
             old.unlink(missing_ok=True)
         process = self._start(
             [
@@ -217,7 +219,7 @@ class Office:
         )
         begun = time.monotonic()
         try:
-            said = _wait(process, time_for(documents, self.timeout_s), also=self._warm)
+            message = _wait(process, time_for(documents, self.timeout_s), also=self._warm)
         except subprocess.TimeoutExpired as error:
             _kill(process)
             raise RenderError(
@@ -228,7 +230,7 @@ class Office:
                 rule="render-timeout",
                 next_step="run 'toolkit doctor'; convert the document by hand to see what stops it",
             ) from error
-        return said.decode("utf-8", "replace").strip()[-300:] or f"exit code {process.returncode}"
+        return message.decode("utf-8", "replace").strip()[-300:] or f"exit code {process.returncode}"
 
     def _end_warm(self) -> None:
         if self._warm is not None:
@@ -275,7 +277,7 @@ def _wait(process: subprocess.Popen[bytes], limit_s: float, *, also: subprocess.
     subprocess.TimeoutExpired
         after the limit it has worked for so long, or stands still, or has had several times the limit
     """
-    groups = {one.pid for one in (process, also) if one is not None}
+    groups = {program.pid for program in (process, also) if program is not None}
     begun, first = time.monotonic(), _processor_s(groups)
     worked, wait = 0.0, limit_s
     while True:
@@ -333,11 +335,11 @@ def _is_pdf(path: Path) -> bool:
     return data[:5] == b"%PDF-" and b"%%EOF" in data[-1024:]
 
 
-def _no_pdf(name: str, said: str) -> RenderError:
+def _no_pdf(name: str, message: str) -> RenderError:
     return RenderError(
         "LibreOffice made no PDF",
         where=name,
-        got=said or "nothing",
+        got=message or "nothing",
         expected="a PDF of the filled report",
         rule="render-failed",
         next_step="run 'toolkit doctor'; open the .docx in LibreOffice to see why",
@@ -352,9 +354,9 @@ def find_soffice() -> str:
     RenderError
         it is not installed
     """
-    found = os.environ.get("TOOLKIT_SOFFICE") or shutil.which("soffice") or shutil.which("libreoffice")
-    if found and (Path(found).is_file() or shutil.which(found)):
-        return found
+    program = os.environ.get("TOOLKIT_SOFFICE") or shutil.which("soffice") or shutil.which("libreoffice")
+    if program and (Path(program).is_file() or shutil.which(program)):
+        return program
     raise RenderError(
         "LibreOffice is not installed",
         where="soffice",

@@ -46,8 +46,8 @@ class Ids:
         """Start above every id that the template uses."""
         highest = 0
         for story in stories:
-            for one in story.root.iter(q("wp:docPr")):
-                text = one.get("id") or "0"
+            for picture in story.root.iter(q("wp:docPr")):
+                text = picture.get("id") or "0"
                 highest = max(highest, int(text) if text.isdigit() else 0)
         return cls(drawing=min(highest, 2**30), control=1_000_000)
 
@@ -85,12 +85,12 @@ def picture_run(
         drawing.append(inline)
         return run
     # A floating placeholder keeps its position and wrapping; only its picture changes.
-    kept = deepcopy(anchor)
+    frame = deepcopy(anchor)
     for tag in ("wp:extent", "wp:docPr", "a:graphic"):
-        old, new = kept.find(q(tag)), inline.find(q(tag))
+        old, new = frame.find(q(tag)), inline.find(q(tag))
         if old is not None and new is not None:
-            kept.replace(old, new)
-    drawing.append(kept)
+            frame.replace(old, new)
+    drawing.append(frame)
     return run
 
 
@@ -113,8 +113,8 @@ def _inline(rel: str, cx: int, cy: int, alt: str, name: str, identity: int) -> E
 def insert_at_mark(paragraph: Element, mark: str, run: Element) -> None:
     """Put a run where a mark character stands in a paragraph's text, splitting the run around it."""
     for t in paragraph.iter(W_T):
-        before, found, after = (t.text or "").partition(mark)
-        if not found:
+        before, mark_text, after = (t.text or "").partition(mark)
+        if not mark_text:
             continue
         owner = ancestor(t, W_R)
         rest = deepcopy(owner)
@@ -156,9 +156,9 @@ def _placeholder_width(at: Element) -> int | None:
     if extent is not None:
         return int(extent.get("cx") or 0) or None
     for shape in at.iter(q("v:shape")) if at.tag != W_P else ():
-        found = re.search(r"(?:^|[;\s])width:\s*(\d+(?:\.\d+)?)(pt|in|cm|mm|px)?", shape.get("style") or "")
-        if found:
-            return round(float(found[1]) * _VML_EMU[found[2] or "px"])
+        width = re.search(r"(?:^|[;\s])width:\s*(\d+(?:\.\d+)?)(pt|in|cm|mm|px)?", shape.get("style") or "")
+        if width:
+            return round(float(width[1]) * _VML_EMU[width[2] or "px"])
     return None
 
 
@@ -179,17 +179,17 @@ def _room(at: Element, story: Story) -> tuple[int, int]:
 
 
 def _cell_width(cell: Element) -> int | None:
-    own = cell.find(f"{q('w:tcPr')}/{q('w:tcW')}")
-    if own is not None and own.get(q("w:type")) == "dxa" and (own.get(q("w:w")) or "").isdigit():
-        return int(own.get(q("w:w"))) - _CELL_MARGIN
+    stated = cell.find(f"{q('w:tcPr')}/{q('w:tcW')}")
+    if stated is not None and stated.get(q("w:type")) == "dxa" and (stated.get(q("w:w")) or "").isdigit():
+        return int(stated.get(q("w:w"))) - _CELL_MARGIN
     table, row = ancestor(cell, W_TBL), ancestor(cell, W_TR)
     grid = [int(float(g.get(q("w:w")) or 0)) for g in table.findall(f"{q('w:tblGrid')}/{q('w:gridCol')}")]
     if row not in own_rows(table):
         return None
     at = 0
-    for one in (cell_ for cell_ in row.iter(W_TC) if ancestor(cell_, W_TR) is row):
-        span = _number_of(one, "w:tcPr/w:gridSpan")
-        if one is cell:
+    for cell_before in (cell_ for cell_ in row.iter(W_TC) if ancestor(cell_, W_TR) is row):
+        span = _number_of(cell_before, "w:tcPr/w:gridSpan")
+        if cell_before is cell:
             inside = sum(grid[at : at + span])
             return inside - _CELL_MARGIN if inside > _CELL_MARGIN else None
         at += span
@@ -197,8 +197,8 @@ def _cell_width(cell: Element) -> int | None:
 
 
 def _number_of(cell: Element, path: str) -> int:
-    found = cell.find("/".join(q(one) for one in path.split("/")))
-    text = "" if found is None else found.get(q("w:val")) or ""
+    element = cell.find("/".join(q(step) for step in path.split("/")))
+    text = "" if element is None else element.get(q("w:val")) or ""
     return max(int(text), 1) if text.isdigit() else 1
 
 
@@ -226,9 +226,9 @@ def _of_body(at: Element, story: Story) -> Element | None:
     inner = at
     while inner is not None:
         for sibling in inner.itersiblings():
-            found = next(sibling.iter(q("w:sectPr")), None)
-            if found is not None:
-                return found
+            section = next(sibling.iter(q("w:sectPr")), None)
+            if section is not None:
+                return section
         inner = inner.getparent()
     return None
 

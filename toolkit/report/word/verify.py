@@ -4,36 +4,189 @@ from __future__ import annotations
 
 import io
 import re
+import unicodedata
 import zipfile
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from toolkit.inputs import PDF_FILE, read_input
-from toolkit.report.word.contents_pages import pdf_outline, pdf_text, poppler, printed_pages, titles_of
 from toolkit.report.word.filled import Filled, text_elements
 from toolkit.report.word.scan import BROKEN, LITERAL, control_tag
-from toolkit.report.word.verify_text import Check, text_checks
+from toolkit.report.word.toc_pages import pdf_outline, pdf_text, poppler, printed_pages, squeeze, titles_of
 from toolkit.report.word.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
+
+_LONG, _UNBROKEN = 40, 20  # characters of prose, and of one word, that a page's end may cut
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One check: ``ok``, or what was not as it should be. A warning does not stop the delivery."""
+
+    name: str
+    ok: bool
+    message: str
+    warning: bool = False
+
+
+def text_checks(text: str, filled: Filled) -> list[Check]:
+    """Check that every value and table cell is in a PDF's text, a form feed after each page."""
+    page = squeeze(text)
+    sheets = [squeeze(sheet) for sheet in text.split("\f")]
+    rows_left, printed = _absent_rows(page, filled.cells, sheets)
+    # A tag that no part of the template holds for us, in a diagram or a formula, would be printed as it is.
+    printed_text = squeeze(" ".join(entry.text for entry in filled.manifest))
+    unfilled = [tag for tag in re.findall(r"\{\{tk:[^{}]{0,60}", page) if tag not in printed_text]
+    lost, unreadable = [], []
+    hidden = _not_printed(filled, page)
+    for entry in dict.fromkeys(filled.manifest):
+        if entry.text in printed or entry.part in hidden:
+            continue
+        value = squeeze(entry.text)
+        if not value or value in page or _in_pieces(value, page, entry.text, sheets):
+            continue
+        plain = "".join(ch for ch in value if not _hard_to_extract(ch))
+        if plain != value and all(squeeze(w) in page for w in _plain_words(entry.text)):
+            unreadable.append(entry.tag)
+        else:
+            lost.append(f"{entry.tag} {entry.text[:40]!r}")
+    checks = [
+        Check(
+            name="values",
+            ok=not lost,
+            message="; ".join(lost[:5]) or f"{len(filled.manifest)} values found in the PDF",
+        ),
+        Check(name="literals", ok=not unfilled, message=", ".join(unfilled[:5]) or "no tag is printed"),
+        Check(
+            name="cells",
+            ok=not rows_left,
+            message="; ".join(rows_left[:5]) or f"{sum(map(len, filled.cells))} table cells found in the PDF",
+        ),
+    ]
+    if filled.page_mark is not None:
+        mark = squeeze(filled.page_mark)
+        bare = [str(number) for number, sheet in enumerate(sheets[:-1], start=1) if mark not in sheet]
+        message = f"{filled.page_mark[:40]!r} is not on page {', '.join(bare[:5])}"
+        checks.append(
+            Check(name="marks", ok=not bare, message=message if bare else "the mark is on every page")
+        )
+    if unreadable:
+        checks.append(
+            Check(
+                name="script",
+                ok=False,
+                warning=True,
+                message=f"{', '.join(unreadable[:5])}: characters that no installed font shows, "
+                "or that run from right to left, could not be read back from the PDF",
+            )
+        )
+    return checks
+
+
+def _not_printed(filled: Filled, page: str) -> set[str]:
+    """Return the headers and footers that no page shows: of first or even pages that there are not.
+
+    Which of them a page shows follows from the document's settings and its number of pages. One that may
+    be hidden is taken as hidden where neither its own words nor any of its values are in the PDF.
+    """
+    hidden = set(filled.never_shown)
+    for part, words in filled.perhaps_shown:
+        texts = [word_text for word_text in (squeeze(word) for word in words) if len(word_text) > 2]
+        texts += [squeeze(word_text.text) for word_text in filled.manifest if word_text.part == part]
+        if not any(word_text in page for word_text in texts):
+            hidden.add(part)
+    return hidden
+
+
+def _absent_rows(
+    page: str, rows: Sequence[Sequence[str]], sheets: Sequence[str]
+) -> tuple[list[str], set[str]]:
+    """Return the cells of rows that are not in the text in their order, and the cells of those that are."""
+    lost: list[str] = []
+    cells_in_rows: set[str] = set()
+    cursor = 0
+    for row in rows:
+        joined = squeeze("".join(row))
+        at = page.find(joined, cursor)
+        if at >= 0:
+            cursor = at + len(joined)
+            cells_in_rows.update(row)
+            continue
+        # A row that breaks over a page, or whose cells the PDF paints in another order: cell by cell.
+        for cell in row:
+            value = squeeze(cell)
+            if (
+                value not in page
+                and not _in_pieces(value, page, cell, sheets)
+                and not any(map(_hard_to_extract, value))
+            ):
+                lost.append(cell[:60])
+    return lost, cells_in_rows
+
+
+def _in_pieces(value: str, page: str, original: str, sheets: Sequence[str]) -> bool:
+    """Tell whether a long text is there, cut by the end of a page: header and footer stand in between.
+
+    A number may not be cut.
+    """
+    words = original.split()
+    if len(words) > 3 and len(value) > _LONG:
+        return all(squeeze(word) in page for word in words)
+    if len(value) < _UNBROKEN:
+        return False
+    # One long word, such as a hash in a narrow column: its beginning on a page, its end on the next.
+    for here, there in pairwise(sheets):
+        cut = 8
+        if value[:cut] not in here:
+            continue
+        while cut < len(value) and value[: cut + 1] in here:
+            cut += 1
+        if value[cut:] in there:
+            return True
+    return False
+
+
+def _hard_to_extract(character: str) -> bool:
+    return (
+        unicodedata.bidirectional(character) in ("R", "AL", "AN")
+        or unicodedata.category(character)
+        in (
+            "So",
+            "Sk",
+            "Cn",
+            "Co",
+            "Mn",
+            "Me",
+            "Cf",
+        )
+        or ord(character) > 0xFFFF
+    )
+
+
+def _plain_words(text: str) -> list[str]:
+    return [word for word in text.split() if not any(map(_hard_to_extract, word))]
 
 
 def verify_docx(filled: Filled) -> tuple[Check, ...]:
     """Check the filled Word file itself: placeholders gone, every figure there with its text."""
     values = " ".join(entry.text for entry in filled.manifest)
-    left, alts = [], []
+    unfilled, alts = [], []
     for element in text_elements(filled.docx, filled.main_part):
         if element.tag == W_P:
             text = paragraph_text(element)
             if "{{" not in text:
                 continue
-            left += [m[0] for m in LITERAL.finditer(text) if m[0] not in values]
+            unfilled += [m[0] for m in LITERAL.finditer(text) if m[0] not in values]
             if BROKEN.search(text) and "{{" not in values:
-                left.append(text[:40])
+                unfilled.append(text[:40])
         elif element.tag == W_SDT:
             tag = control_tag(element)
             if tag is not None and (
                 tag.family == "if" or element.find(f"{SDT_PR}/{q('w:showingPlcHdr')}") is not None
             ):
-                left.append(str(tag))
+                unfilled.append(str(tag))
         elif not in_fallback(element):
             alts.append(element.get("descr") or "")
     absent = [
@@ -42,7 +195,7 @@ def verify_docx(filled: Filled) -> tuple[Check, ...]:
         if " ".join(alt.split()) not in {" ".join(alt.split()) for alt in alts}
     ]
     return (
-        Check(name="placeholders", ok=not left, message=", ".join(left[:5]) or "none left"),
+        Check(name="placeholders", ok=not unfilled, message=", ".join(unfilled[:5]) or "none left"),
         Check(
             name="alt-text",
             ok=not absent and all(alt for _, alt in filled.figures),
@@ -60,8 +213,8 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
         poppler's programs are not installed
     """
     info = poppler(["pdfinfo", str(pdf)])
-    found = re.search(r"^Pages:\s+(\d+)", info, re.MULTILINE)
-    pages = int(found[1]) if found else 0
+    pages_line = re.search(r"^Pages:\s+(\d+)", info, re.MULTILINE)
+    pages = int(pages_line[1]) if pages_line else 0
     data = read_input(pdf, PDF_FILE)
     with ThreadPoolExecutor(2) as pool:
         fonts = pool.submit(poppler, ["pdffonts", str(pdf)])
@@ -155,13 +308,15 @@ def contents_problems(pdf: Path, text: str, filled: Filled) -> list[str]:
     contents = filled.contents
     if not contents.entries:
         return []
-    found = titles_of(contents.headings, pdf_outline(pdf))
-    pages = {bookmark: page for bookmark, _, _, page in found}
-    said = []
-    if len(found) < len(contents.headings):
-        seen = {one for _, one, _, _ in found}
-        said += [f"heading {one!r} is not in the PDF" for _, one in contents.headings if one not in seen]
-        said = said or ["a heading is not in the PDF"]
+    titles = titles_of(contents.headings, pdf_outline(pdf))
+    pages = {bookmark: page for bookmark, _, _, page in titles}
+    problems = []
+    if len(titles) < len(contents.headings):
+        outlined = {title for _, title, _, _ in titles}
+        problems += [
+            f"heading {title!r} is not in the PDF" for _, title in contents.headings if title not in outlined
+        ]
+        problems = problems or ["a heading is not in the PDF"]
     printed = printed_pages(text, contents.entries)
     plain = not _restarts(filled)
     for entry in contents.entries:
@@ -169,10 +324,10 @@ def contents_problems(pdf: Path, text: str, filled: Filled) -> list[str]:
             continue
         shown = printed.get(entry.bookmark)
         if shown is None:
-            said.append(f"{entry.text!r} is not in the contents")
+            problems.append(f"{entry.text!r} is not in the contents")
         elif entry.heading and plain and shown != str(pages.get(entry.bookmark, shown)):
-            said.append(f"{entry.text!r} is on page {pages[entry.bookmark]}, the contents say {shown}")
-    return said
+            problems.append(f"{entry.text!r} is on page {pages[entry.bookmark]}, the contents say {shown}")
+    return problems
 
 
 def _restarts(filled: Filled) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.channels import signs
 from toolkit.errors import ConfigError
 from toolkit.tires.global_model import Rows
-from toolkit.tires.mf_parameters import MF52, MF61
+from toolkit.tires.mf import MF52, MF61
 from toolkit.tires.recorded import NotRecordedError, Program, record
 from toolkit.tires.tir import si_number
 from toolkit.tires.tir_evaluate import forces_of, positive

@@ -18,8 +18,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.tires.global_model import GlobalModel
-from toolkit.tires.mf_combined import Forces, arm, equivalent, kappa_force, longitudinal, weight_x, weight_y
-from toolkit.tires.mf_parameters import MF61, mf_forces, mf_starts
+from toolkit.tires.mf import (
+    MF61,
+    Forces,
+    arm,
+    equivalent,
+    kappa_force,
+    longitudinal,
+    mf_forces,
+    mf_starts,
+    weight_x,
+    weight_y,
+)
 from toolkit.tires.recorded import as_array, may_differ_from_zero
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine, state
 

@@ -32,13 +32,27 @@ def proof_in(data: bytes) -> str | None:
     return text
 
 
-def content_hash(data: bytes) -> str:
-    """Return the SHA-256 of a certificate's content, without its proof and its seal."""
+def content_hash(data: bytes) -> str | None:
+    """Return the SHA-256 of a certificate's content, without its proof and its seal.
+
+    None where the document is another than its content with the proof put into it: what is left out of the
+    hash is what `with_proof` writes, and nothing beside it.
+    """
     root = _parse(data)
+    for seal in root.findall(_SEAL):
+        root.remove(seal)
+    whole = _canonical(root)
     own = [comment for comment in root.findall(f"{_DCC}comment") if comment.find(ELEMENT) is not None]
-    for element in [*own, *root.findall(_SEAL)]:
-        root.remove(element)
-    return hashlib.sha256(etree.tostring(root, method="c14n", with_comments=False)).hexdigest()
+    for comment in own:
+        root.remove(comment)
+    content = _canonical(root)
+    if own and whole != _canonical(_parse(with_proof(content, own[0].findtext(ELEMENT) or ""))):
+        return None
+    return hashlib.sha256(content).hexdigest()
+
+
+def _canonical(root: Any) -> bytes:
+    return bytes(etree.tostring(root, method="c14n", with_comments=False))
 
 
 def _parse(data: bytes) -> Any:

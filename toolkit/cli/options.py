@@ -1,0 +1,362 @@
+"""Options that commands share, each declared once: by itself, or with those that go with it as a class.
+
+A command that has a parameter of such a class takes its options (`toolkit.cli.console.Command`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from toolkit.cli import console
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.sealing import Sealing
+    from toolkit.trust.keys import Signer
+    from toolkit.trust.signing import Travel
+    from toolkit.worker.posix import Limits
+
+
+def into_folder(folder: Path | None) -> Path | None:
+    """Refuse a folder that results cannot enter: the callback of an option, before anything is worked out."""
+    if folder is not None:
+        from toolkit.publication import check_folder
+
+        check_folder(folder)
+    return folder
+
+
+def into_file(path: Path | None) -> Path | None:
+    """Refuse a file that cannot be a result, as `into_folder` does."""
+    if path is not None:
+        from toolkit.publication import check_file
+
+        check_file(path)
+    return path
+
+
+def _home(folder: Path | None) -> Path | None:
+    """Refuse a home that is none: what is named is never passed over, whether it is needed or not."""
+    if folder is not None:
+        from toolkit.lab.home import find_home
+
+        find_home(folder)
+    return folder
+
+
+def _registry(folder: Path | None) -> Path | None:
+    if folder is not None:
+        from toolkit.lab.home import calibrations_folder
+
+        calibrations_folder(folder)
+    return folder
+
+
+def new_registry(folder: Path | None) -> Path | None:
+    """Refuse a registry folder that is none and cannot be made."""
+    if folder is not None:
+        from toolkit.lab.home import registry_to_write
+
+        registry_to_write(folder)
+    return folder
+
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Calibrations = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibrations",
+        callback=_registry,
+        help="Registry folder; default: calibrations/ of the laboratory's home.",
+    ),
+]
+NewCalibrations = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibrations",
+        callback=new_registry,
+        help="Registry folder, made where there is none; default: calibrations/ of the laboratory's home.",
+    ),
+]
+LockFile = Annotated[
+    bool,
+    typer.Option(
+        "--lock-file",
+        help="Keep other writers out by a lock file, where the file system has no locks; all writers must.",
+    ),
+]
+Sign = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--sign",
+        metavar="KEY",
+        help="Private SSH key that signs, or the public one of a key in the agent; once for each person.",
+    ),
+]
+RequestFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--request",
+        metavar="FILE",
+        callback=into_file,
+        help="Write what is to be signed to FILE, for 'toolkit sign' on another computer; enter nothing.",
+    ),
+]
+IssuedBy = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--issued-by",
+        metavar="ID",
+        help="With --request: who will sign, whose name the document states; once for each person.",
+    ),
+]
+Answers = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--answer",
+        metavar="FILE",
+        help="Enter what was requested, by the answer of 'toolkit sign'; once for each file.",
+    ),
+]
+Machine = Annotated[
+    str | None,
+    typer.Option(
+        "--machine",
+        help="Machine definition that states the cells' polarity; default: the packaged one of the "
+        "instrument's name.",
+    ),
+]
+Home = Annotated[
+    Path | None,
+    typer.Option(
+        "--home",
+        callback=_home,
+        help="Laboratory's home; default: the nearest folder upward with calibrations/.",
+    ),
+]
+Id = Annotated[str, typer.Argument(help="Record id, such as rig-r2.")]
+CalibrationId = Annotated[
+    str | None,
+    typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
+]
+KnownAt = Annotated[
+    datetime | None,
+    typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
+]
+Draft = Annotated[
+    bool,
+    typer.Option(
+        "--draft",
+        help="Allow a record that is not approved and in force; everything made is then marked as a draft.",
+    ),
+]
+Seal = Annotated[
+    Path | None,
+    typer.Option(
+        "--seal",
+        metavar="KEY",
+        help="Seal what is issued by this key, PKCS #12 or PEM; default: TOOLKIT_SEAL_KEY.",
+    ),
+]
+TimeStamp = Annotated[
+    str | None, typer.Option("--time-stamp", metavar="URL", help="Time-stamp server of the seal (RFC 3161).")
+]
+ProtocolFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--protocol", metavar="FILE", help="Protocol (.toml); default: the test's own, else the machine's."
+    ),
+]
+Isolated = Annotated[
+    bool,
+    typer.Option(
+        "--isolated",
+        help="Run the case's own code without network, and with a read-only view of the files but for a "
+        "temporary folder; where the kernel cannot, stop.",
+    ),
+]
+Memory = Annotated[
+    float | None,
+    typer.Option(
+        "--memory", min=0.05, help="GB that each process of the case's own code may take; default 4."
+    ),
+]
+Processes = Annotated[
+    int | None,
+    typer.Option("--processes", min=1, help="Processes that this code may have at once; default 64."),
+]
+Units = Annotated[
+    str, typer.Option("--units", help="SI or lbf, for people; the JSON answer is always in SI.")
+]
+Reader = Annotated[
+    str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """How a command speaks: one JSON document, a text for people, or nothing but errors."""
+
+    json: Json = False
+    quiet: Quiet = False
+
+    @property
+    def silent(self) -> bool:
+        """True where no text for people is printed on the way."""
+        return self.json or self.quiet
+
+    def answer(self, payload: Mapping[str, Any], text: str) -> None:
+        """Print the result."""
+        console.answer(payload, text, as_json=self.json, quiet=self.quiet)
+
+    def progress(self, title: str) -> contextlib.AbstractContextManager[Callable[[str], None]]:
+        """Show how far a command is, where people are looking."""
+        return console.progress(None, title, show=not self.silent)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegistryOptions:
+    """Which registry a command reads."""
+
+    calibrations: Calibrations = None
+    home: Home = None
+
+    def registry(self, sign: Sequence[Path] | None = None) -> Registry:
+        """Return it, with the signers of ``sign``."""
+        from toolkit.lab.home import open_registry
+
+        return open_registry(self.calibrations, self.home, signers=open_signers(sign))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecisionOptions(RegistryOptions):
+    """Which registry a decision enters, and whose signatures it carries."""
+
+    lock_file: LockFile = False
+    sign: Sign = None
+    request: RequestFile = None
+    answers: Answers = None
+
+    def registry(self, sign: Sequence[Path] | None = None) -> Registry:
+        """Return the registry, whose entries are signed."""
+        from toolkit.lab.home import open_registry
+
+        return open_registry(
+            self.calibrations, self.home, lock_file=self.lock_file,
+            signers=open_signers(sign or self.sign), travel=open_travel(self.request, self.answers),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EntryOptions(DecisionOptions):
+    """Which registry a record enters, made where there is none, and whose signatures that carries."""
+
+    calibrations: NewCalibrations = None
+
+    def registry(self, sign: Sequence[Path] | None = None) -> Registry:
+        """Return the registry, made where there is none."""
+        from toolkit.calibration.registry.registry import Registry
+        from toolkit.lab.home import registry_to_write
+
+        return Registry(
+            registry_to_write(self.calibrations, self.home), lock_file=self.lock_file,
+            signers=open_signers(sign or self.sign), travel=open_travel(self.request, self.answers),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IssueOptions(DecisionOptions):
+    """Which ledger a document enters, and by whose signatures and seal."""
+
+    issued_by: IssuedBy = None
+    seal: Seal = None
+    time_stamp: TimeStamp = None
+
+    @property
+    def asked(self) -> bool:
+        """True where a document is issued for anything that is stated."""
+        stated = (self.sign, self.request, self.answers, self.seal, self.time_stamp)
+        return any(stated) or bool(os.environ.get("TOOLKIT_SEAL_KEY"))
+
+    def sealing(self, registry: Registry, *, draft: bool) -> Sealing | None:
+        """Return the seal of what is issued; None without one."""
+        from toolkit.lab.sealing import open_sealing
+
+        home = registry.folder.parent
+        return open_sealing(self.seal, home, ask=console.ask_passphrase, stamps=self.time_stamp, draft=draft)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerOptions:
+    """Limits of a case's own code."""
+
+    isolated: Isolated = False
+    memory: Memory = None
+    processes: Processes = None
+
+    def limits(self) -> Limits:
+        """Return them, as the worker takes them."""
+        from toolkit.lab.diagnosis import worker_limits
+
+        return worker_limits(isolated=self.isolated, memory_GB=self.memory, processes=self.processes)
+
+
+def day(moment: datetime | None) -> date | None:
+    """Return the day of a date option, None where it was not given."""
+    return moment.date() if moment else None
+
+
+def reader(name: str) -> Literal["calamine", "both"]:
+    """Return the reader that ``--reader`` names, or refuse the word."""
+    if name not in ("calamine", "both"):
+        raise typer.BadParameter("calamine or both", param_hint="--reader")
+    return "both" if name == "both" else "calamine"
+
+
+def open_signers(keys: Sequence[Path] | None) -> tuple[Signer, ...]:
+    """Return the signers of ``--sign``; the passphrase of an encrypted key is asked for on the terminal.
+
+    Raises
+    ------
+    TrustError
+        ``signing-key``, ``weak-key``
+    """
+    from functools import partial
+
+    from toolkit.trust.keys import open_signer
+
+    return tuple(open_signer(key, partial(console.ask_passphrase, key)) for key in keys or ())
+
+
+def open_travel(request: Path | None, answers: Sequence[Path] | None) -> Travel:
+    """Return what travels to keys elsewhere: the request to write, or the answers that came back.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: both
+    TrustError
+        ``request``: an answer is none
+    """
+    from toolkit.trust.requests import read_request
+    from toolkit.trust.signing import Travel
+
+    if request is not None and answers:
+        from toolkit.errors import ConfigError
+
+        raise ConfigError(
+            "a request and its answer are two steps", where="--request, --answer", got="both",
+            expected="one of the two",
+            next_step="make the request, let it be signed, then give --answer; nothing was changed",
+            rule="usage",
+        )  # fmt: skip
+    return Travel(request=request, answers=tuple(map(read_request, answers or ())))

@@ -1,0 +1,156 @@
+"""Naming by unseen runs alone, where what is left is beyond all noise.
+
+A smooth mismatch foretells itself from its own past. Taken for coloured noise it makes a long recording worth
+a handful of values, among which nothing is significant, and its log score is one of the next row and not
+of the run. But a rest above a tenth of the output is known not to be noise: then the question is which effect
+simulates whole runs that no fit has seen, freely, without most of that rest. Fits are ordinary least squares.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.fit import Fit
+from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
+from toolkit.diagnosis.policy import PRIORS, SCREENING, UNSEEN, VERDICT
+from toolkit.diagnosis.search.case_view import CaseView
+from toolkit.diagnosis.search.forward_step import Rival, Step, at_bound, joint_fit
+from toolkit.diagnosis.search.noise_floor import is_beyond_noise
+from toolkit.diagnosis.search.screen import Scored, best_of
+from toolkit.diagnosis.search.screen_step import Look, about_declared
+from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.problem import Problem
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """A candidate that stands: its fit, and its unseen rows."""
+
+    scored: Scored
+    fit: Fit
+    held_out: HeldOut
+
+
+def shown_on_unseen_runs(
+    problem: Problem,
+    folds: Folds,
+    base: Fit,
+    held_base: HeldOut,
+    view: Look,
+) -> tuple[Fit, HeldOut, Step] | None:
+    """Return the first effect if it takes most of the rest of whole unseen runs, None where none does.
+
+    Of several that do, those whose errors the runs do not tell apart are one class, the likeliest first.
+    """
+    first = not base.active and folds.by_run and len(problem.runs) >= UNSEEN.runs
+    few = view.screen.trust(base.noise) <= SCREENING.least_trust
+    if not (first and few and is_beyond_noise(problem, base)):
+        return None
+    shown = []
+    for trial, made in _fitted(problem, base, view)[: UNSEEN.judged]:
+        try:
+            held_out = hold_out(problem, folds, made.active, made)
+        except FitError:
+            continue
+        if _takes_most(problem, held_base, held_out):
+            shown.append(_Shown(trial, made, held_out))
+    if not shown:
+        return None
+    gains = _gains(problem, held_base, shown)
+    best = max(gains.values())
+
+    def order(each: _Shown) -> tuple[bool, float]:
+        active, gain = each.fit.active[-1], gains[id(each)]
+        prior = active.log_prior(CaseView(problem, active.channel, active.source))
+        return gain <= best - VERDICT.close, -gain - prior
+
+    chosen, *others = sorted(shown, key=order)
+    gain = gains[id(chosen)]
+    step = Step(
+        active=chosen.fit.active[-1],
+        p_value=min(view.p_of.get(id(chosen.scored), 1.0), math.exp(-min(gain, 700.0))),
+        held_out_gain=gain,
+        gain=gain,
+        rivals=tuple(Rival(active=each.fit.active[-1], difference=gains[id(each)] - gain) for each in others),
+    )
+    return chosen.fit, chosen.held_out, step
+
+
+def _fitted(problem: Problem, base: Fit, view: Look) -> list[tuple[Scored, Fit]]:
+    """Return the likely candidates with their plain joint fits, one each, those that leave the least first.
+
+    A refit without what is missing may have gone where it no longer helps (a wheel that stands too soon):
+    they are looked at from the declared parameters as well.
+    """
+    starts = [(base, trial) for trial in _likely(view.scored)]
+    moved = np.abs(problem.off_priors(base.p)).max(initial=0.0) > PRIORS.moved
+    screen = about_declared(problem, base) if moved else None
+    if screen is not None:
+        screen.prepare(view.candidates)
+        trials = [score for candidate in view.candidates for score in screen.score(candidate)]
+        likely = _likely(screen.sharpened(trials, SCREENING.sharpened))
+        starts += [(screen.base, trial) for trial in likely]
+    best: dict[object, tuple[Scored, Fit]] = {}
+    for begin, trial in starts:
+        made = joint_fit(problem, begin, (trial.active,), plain=True)
+        if made is None or any(at_bound(each) for each in made.active):
+            continue
+        before = best.get(trial.candidate.key)
+        if before is None or _left(problem, made.simulated) < _left(problem, before[1].simulated):
+            best[trial.candidate.key] = (trial, made)
+    return sorted(best.values(), key=lambda entry: _left(problem, entry[1].simulated))
+
+
+def _likely(scored: Sequence[Scored]) -> list[Scored]:
+    """Return the candidates that explain anything, by their best start; none that is there or not."""
+    return [
+        trial
+        for trial in best_of(scored)
+        if trial.gain > 0 and not trial.candidate.discrete and not trial.active.effect.nuisance
+    ][: UNSEEN.fitted]
+
+
+def _runs(problem: Problem, simulated: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the mean square of every run, each output over its own spread, (runs,)."""
+    squares = np.zeros(len(problem.slices))
+    for name, kept in problem.kept.items():
+        spread = float(np.std(problem.observed[name][kept])) or 1.0
+        away = np.where(kept, (problem.observed[name] - simulated[name]) / spread, 0.0)
+        squares += [float(np.sum(away[rows] ** 2)) / max(int(kept[rows].sum()), 1) for rows in problem.slices]
+    return squares
+
+
+def _left(problem: Problem, simulated: Mapping[str, NDArray[np.float64]]) -> float:
+    return float(np.mean(_runs(problem, simulated)))
+
+
+def _takes_most(problem: Problem, before: HeldOut, after: HeldOut) -> bool:
+    """Tell whether most of the error is gone: nearly all of it in the median run, and half in every one."""
+    shares = 1 - _runs(problem, after.simulated) / np.maximum(_runs(problem, before.simulated), 1e-300)
+    return bool(np.median(shares) > UNSEEN.usual and shares.min() > UNSEEN.every)
+
+
+def _gains(problem: Problem, before: HeldOut, shown: Sequence[_Shown]) -> dict[int, float]:
+    """Return the gains of the log-likelihood of independent values, by the identity of each.
+
+    There are as many as the rows are worth beside the longest memory that any of the fits leaves: each is
+    judged by the same rows.
+    """
+    gains = dict.fromkeys(map(id, shown), 0.0)
+    for name, kept in problem.kept.items():
+        observed = problem.observed[name][kept]
+        worth = int(kept.sum()) / max(each.fit.noise[name].correlation_rows for each in shown)
+        left = float(np.mean((observed - before.simulated[name][kept]) ** 2))
+        for each in shown:
+            after = float(np.mean((observed - each.held_out.simulated[name][kept]) ** 2))
+            gains[id(each)] += 0.5 * worth * math.log(max(left, 1e-300) / max(after, 1e-300))
+    return gains

@@ -1,0 +1,381 @@
+"""Tables of contents and of figures: written anew from the headings and captions that a report has.
+
+LibreOffice takes what stands in such a field as it is. So the entries are written here, each with a PAGEREF
+field; for the PDF the field around them is left out, and then LibreOffice works the pages out itself. The
+pages that it found go back into the Word file.
+"""
+
+from __future__ import annotations
+
+import re
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+from lxml import etree
+
+from toolkit.report.word.numbering import StyleSheet, headings, style_of
+from toolkit.report.word.xml import (
+    W_P,
+    W_R,
+    W_T,
+    XML_SPACE,
+    Element,
+    ancestor,
+    in_fallback,
+    paragraph_text,
+    q,
+)
+
+_CHAR, _INSTR, _TYPE = q("w:fldChar"), q("w:instrText"), q("w:fldCharType")
+_P_PR = q("w:pPr")
+_BEFORE_TABS = (
+    "pStyle keepNext keepLines pageBreakBefore framePr widowControl numPr suppressLineNumbers pBdr shd"
+)
+_INDENT = 220  # twips a level, where the template has no style for an entry
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContentsField:
+    """A TOC field of the body: its code and the elements that bound it."""
+
+    code: str
+    begin: Element
+    separate: Element | None
+    end: Element
+
+    @property
+    def paragraphs(self) -> list[Element] | None:
+        """The paragraphs that it fills, from first to last; None where they are no neighbours."""
+        first, last = ancestor(self.begin, W_P), ancestor(self.end, W_P)
+        if first is None or last is None or first.getparent() is not last.getparent():
+            return None
+        members = [first]
+        while members[-1] is not last:
+            following = members[-1].getnext()
+            if following is None:
+                return None
+            members.append(following)
+        return members
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContentsEntry:
+    """One line of a table of contents: the bookmark it points at, its text, its level.
+
+    ``heading`` tells an entry of the headings from one of a list of figures; ``numbered`` that Word puts a
+    number before it; ``paged`` that the line ends with a page.
+    """
+
+    bookmark: str
+    text: str
+    level: int
+    heading: bool
+    numbered: bool
+    paged: bool
+
+
+def contents_fields(root: Element) -> list[ContentsField]:
+    """Return the TOC fields of a body, in their order."""
+    fields: list[ContentsField] = []
+    stack: list[list[Any]] = []
+    for element in root.iter(_CHAR, _INSTR):
+        kind = element.get(_TYPE)
+        if element.tag == _INSTR:
+            if stack and stack[-1][2] is None:
+                stack[-1][1] += element.text or ""
+        elif kind == "begin":
+            stack.append([element, "", None])
+        elif kind == "separate" and stack:
+            stack[-1][2] = element
+        elif kind == "end" and stack:
+            begin, code, separate = stack.pop()
+            if code.split()[:1] and code.split()[0].upper() == "TOC":
+                fields.append(ContentsField(code=code, begin=begin, separate=separate, end=element))
+    return fields
+
+
+def can_update(field: ContentsField) -> bool:
+    """Tell whether the field's switches and place are among those that are written here.
+
+    Not: entries marked by TC fields (``\\f``, ``\\l``), or from one bookmark only (``\\b``).
+    """
+    return (
+        field.paragraphs is not None
+        and not in_fallback(field.begin)
+        and ancestor(field.begin, q("w:txbxContent")) is None
+        and re.search(r"\\[bfl]\b", field.code) is None
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What was written: the lines, table by table, and every heading as (bookmark or empty, text)."""
+
+    entries: tuple[ContentsEntry, ...] = ()
+    headings: tuple[tuple[str, str], ...] = ()
+
+
+def write_contents(package: object, root: Element) -> Contents:
+    """Write every table of contents of a body anew.
+
+    Parameters
+    ----------
+    package : the opened package, for its styles
+    root : the body's tree, filled, its captions numbered
+    """
+    fields = [contents_field for contents_field in contents_fields(root) if can_update(contents_field)]
+    if not fields:
+        return Contents()
+    sheet, marks = StyleSheet.of(package), _Bookmarks(root)
+    entries: list[ContentsEntry] = []
+    for field in fields:
+        field_entries = _entries(field, root, sheet, marks)
+        _rewrite(field, field_entries, sheet, root)
+        entries += field_entries
+    bookmarks = {id(p): name for p, name in marks.given}
+    return Contents(
+        entries=tuple(entries),
+        headings=tuple(
+            (bookmarks.get(id(heading.element), ""), heading.text) for heading in headings(root, sheet)
+        ),
+    )
+
+
+class _Bookmarks:
+    """Bookmarks for the paragraphs that are pointed at: the one that Word left there, or a fresh one."""
+
+    def __init__(self, root: Element) -> None:
+        ids = [start.get(q("w:id")) or "0" for start in root.iter(q("w:bookmarkStart"))]
+        self.ids = count(max((int(start) for start in ids if start.lstrip("-").isdigit()), default=0) + 1)
+        self.names = {start.get(q("w:name")) or "" for start in root.iter(q("w:bookmarkStart"))}
+        self.fresh = count(990_000_001)
+        self.given: list[tuple[Element, str]] = []
+
+    def of(self, paragraph: Element) -> str:
+        """Return the bookmark of a paragraph."""
+        name = self._found(paragraph) or self._made(paragraph)
+        self.given.append((paragraph, name))
+        return name
+
+    def _found(self, paragraph: Element) -> str | None:
+        for one in paragraph.iter(q("w:bookmarkStart")):
+            name = one.get(q("w:name")) or ""
+            if name.startswith("_Toc"):
+                return name
+        return None
+
+    def _made(self, paragraph: Element) -> str:
+        name = next(one for one in (f"_Toc{number}" for number in self.fresh) if one not in self.names)
+        identity = str(next(self.ids))
+        start, end = etree.Element(q("w:bookmarkStart")), etree.Element(q("w:bookmarkEnd"))
+        start.set(q("w:id"), identity)
+        start.set(q("w:name"), name)
+        end.set(q("w:id"), identity)
+        paragraph.insert(1 if paragraph.find(_P_PR) is not None else 0, start)
+        paragraph.append(end)
+        return name
+
+
+def _entries(
+    field: ContentsField, root: Element, sheet: StyleSheet, marks: _Bookmarks
+) -> list[ContentsEntry]:
+    paged = re.search(r"\\n(?!\w)", field.code) is None
+    caption = re.search(r'\\[ca]\s+"?([^"\\\s]+)', field.code)
+    if caption:
+        return [
+            ContentsEntry(
+                bookmark=marks.of(p),
+                text=" ".join(paragraph_text(p).split()),
+                level=1,
+                heading=False,
+                numbered=False,
+                paged=paged,
+            )
+            for p in root.iter(W_P)
+            if not in_fallback(p) and _counts(p, caption[1])
+        ]
+    lowest, highest, extra, outline = _switches(field.code)
+    inside = field.paragraphs or []  # held, so that an identity stays that of one element
+    members = {id(p) for p in inside}
+    entries = []
+    for heading in headings(root, sheet):
+        level = extra.get(sheet.names.get(style_of(heading.element), ""))
+        if level is None and (heading.by_style or outline) and lowest <= heading.level <= highest:
+            level = heading.level
+        if level is None or id(heading.element) in members:
+            continue
+        entries.append(
+            ContentsEntry(
+                bookmark=marks.of(heading.element),
+                text=heading.text,
+                level=level,
+                heading=True,
+                numbered=heading.numbered,
+                paged=paged,
+            )
+        )
+    return entries
+
+
+def _switches(code: str) -> tuple[int, int, dict[str, int], bool]:
+    """Return lowest and highest level, the level of further styles by name, and whether ``\\u`` is set."""
+    extra: dict[str, int] = {}
+    listed = re.search(r'\\t\s+"([^"]*)"', code)
+    if listed:
+        words = [word.strip().lower() for word in re.split("[;,]", listed[1])]
+        extra = {name: int(n) for name, n in zip(words[::2], words[1::2], strict=False) if n.isdigit()}
+    spread = re.search(r'\\o(?:\s+"?(\d)\s*-\s*(\d)"?)?', code)
+    outline = re.search(r"\\u(?!\w)", code) is not None
+    if spread is None and (listed or outline):
+        return (1, 9, extra, True) if outline else (1, 0, extra, False)
+    return (
+        (int(spread[1]), int(spread[2]), extra, outline) if spread and spread[1] else (1, 9, extra, outline)
+    )
+
+
+def _counts(paragraph: Element, name: str) -> bool:
+    codes = "".join(e.text or "" for e in paragraph.iter(_INSTR)) + " ".join(
+        e.get(q("w:instr")) or "" for e in paragraph.iter(q("w:fldSimple"))
+    )
+    return re.search(rf"\bSEQ\s+{re.escape(name)}(?!\w)", codes, re.IGNORECASE) is not None
+
+
+def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleSheet, root: Element) -> None:
+    old = field.paragraphs or []
+    patterns = {style_of(p): p.find(_P_PR) for p in reversed(old) if p.find(_P_PR) is not None}
+    first, last = old[0], old[-1]
+    before = _siblings_before(first, field.begin)
+    tail = _tail(last, field.end)
+    linked = re.search(r"\\h(?!\w)", field.code) is not None
+    separator = re.search(r'\\p\s+"([^"]*)"', field.code)
+    width = _text_width(root)
+    paragraphs = [
+        _line(entry, patterns, sheet, width, linked, separator[1] if separator else "\t") for entry in entries
+    ]
+    if not paragraphs:
+        paragraphs = [etree.Element(W_P)]
+    head = [*before, _mark("begin"), _code(field.code), _mark("separate")]
+    at = 1 if paragraphs[0].find(_P_PR) is not None else 0
+    for offset, run in enumerate(head):
+        paragraphs[0].insert(at + offset, run)
+    paragraphs[-1].append(_mark("end"))
+    for paragraph in paragraphs:
+        first.addprevious(paragraph)
+    for paragraph in old:
+        paragraph.getparent().remove(paragraph)
+    if tail is not None:
+        paragraphs[-1].addnext(tail)
+
+
+def _siblings_before(paragraph: Element, begin: Element) -> list[Element]:
+    run = next(child for child in paragraph if child is begin.getparent() or begin in child.iter(_CHAR))
+    siblings: list[Element] = []
+    for child in paragraph:
+        if child is run:
+            return siblings
+        if child.tag != _P_PR:
+            siblings.append(child)
+    return siblings
+
+
+def _tail(paragraph: Element, end: Element) -> Element | None:
+    """Return what follows the field in its last paragraph, None where that is nothing to keep."""
+    tail = deepcopy(paragraph)
+    position = list(paragraph.iter()).index(end)
+    twin = list(tail.iter())[position]
+    for run in [c for c in tail if c.tag != _P_PR]:
+        tail.remove(run)
+        if run is twin or twin in run.iter():
+            break
+    section = tail.find(f"{_P_PR}/{q('w:sectPr')}") is not None
+    has_content = any(True for _ in tail.iter(q("w:br"), q("w:drawing")))
+    return tail if section or has_content or paragraph_text(tail).strip() else None
+
+
+def _line(
+    entry: ContentsEntry,
+    patterns: dict[str, Element],
+    sheet: StyleSheet,
+    width: int,
+    linked: bool,
+    separator: str,
+) -> Element:
+    paragraph = etree.Element(W_P)
+    style = sheet.identity(f"toc {entry.level}" if entry.heading else "table of figures")
+    properties = etree.Element(_P_PR)
+    if style is not None and style in patterns:
+        properties = deepcopy(patterns[style])
+        for section in properties.findall(q("w:sectPr")):
+            properties.remove(section)
+    elif style is not None:
+        etree.SubElement(properties, q("w:pStyle")).set(q("w:val"), style)
+    elif entry.level > 1:
+        etree.SubElement(properties, q("w:ind")).set(q("w:left"), str(_INDENT * (entry.level - 1)))
+    if style not in sheet.tabbed and properties.find(q("w:tabs")) is None:
+        _right_tab(properties, width)
+    paragraph.append(properties)
+    holder = paragraph
+    if linked:
+        holder = etree.SubElement(paragraph, q("w:hyperlink"))
+        holder.set(q("w:anchor"), entry.bookmark)
+        holder.set(q("w:history"), "1")
+    holder.append(_text(entry.text))
+    if entry.paged:
+        holder.append(_tab() if separator == "\t" else _text(separator))
+        holder.extend(
+            [
+                _mark("begin"),
+                _code(f" PAGEREF {entry.bookmark} \\h "),
+                _mark("separate"),
+                _text("1"),
+                _mark("end"),
+            ]
+        )
+    return paragraph
+
+
+def _right_tab(properties: Element, width: int) -> None:
+    """Put a tab stop with leading dots at the right edge; the schema wants it before the spacing."""
+    tabs = etree.Element(q("w:tabs"))
+    stop = etree.SubElement(tabs, q("w:tab"))
+    for name, value in (("val", "right"), ("leader", "dot"), ("pos", str(width))):
+        stop.set(q(f"w:{name}"), value)
+    before = {q(f"w:{one}") for one in _BEFORE_TABS.split()}
+    properties.insert(sum(1 for child in properties if child.tag in before), tabs)
+
+
+def _text_width(root: Element) -> int:
+    from toolkit.report.word.pictures import section_room
+
+    sections = list(root.iter(q("w:sectPr")))
+    return section_room(sections[0])[0] if sections else 9000
+
+
+def _mark(kind: str) -> Element:
+    run = etree.Element(W_R)
+    etree.SubElement(run, _CHAR).set(_TYPE, kind)
+    return run
+
+
+def _code(text: str) -> Element:
+    run = etree.Element(W_R)
+    code = etree.SubElement(run, _INSTR)
+    code.text = text
+    code.set(XML_SPACE, "preserve")
+    return run
+
+
+def _text(text: str) -> Element:
+    run = etree.Element(W_R)
+    t = etree.SubElement(run, W_T)
+    t.text = text
+    t.set(XML_SPACE, "preserve")
+    return run
+
+
+def _tab() -> Element:
+    run = etree.Element(W_R)
+    etree.SubElement(run, q("w:tab"))
+    return run
