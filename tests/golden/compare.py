@@ -26,7 +26,7 @@ SHARE_OF_STANDARD_ERROR = 1e-9
 SHARE_OF_EVIDENCE = 1e-7
 BY_STANDARD_ERROR = ("diagnosis", "proof")
 """Areas that are compared by standard errors."""
-SENTENCES = frozenset("message statement reason note why equation reference".split())
+SENTENCES = frozenset("message sentence statement reason note why equation reference".split())
 """Keys of sentences for people about results."""
 HELP = "description"
 """Key of a sentence about a tag: its numbers are no results."""
