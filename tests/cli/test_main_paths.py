@@ -47,6 +47,7 @@ LINES = {
     "verify": "calibrations/m15/m15-r2.json",
     "explain": "",
     "qualify": "--out out",
+    "migrate": ". --dry-run",
     "open": ". --no-browser --port 0 --certificate tire.tir --key tire.tir",
     "calibration list": "",
     "calibration show": RECORD,

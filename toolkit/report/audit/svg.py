@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from markupsafe import Markup
 
 from toolkit.audit.timeline import Stretch
+from toolkit.report.pages.kit import drawn
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -67,7 +67,7 @@ class Drawing:
 
     def markup(self) -> Markup:
         """Return the picture as it stands in a page."""
-        return Markup(ET.tostring(self._root, encoding="unicode"))  # noqa: S704  escaped by the writer
+        return drawn(ET.tostring(self._root, encoding="unicode"))
 
     def _add(self, tag: str, kind: str, values: Mapping[str, float | str]) -> ET.Element:
         attributes = {

@@ -107,7 +107,7 @@ def data(value: str, text: str) -> Markup:
 
 def drawn(text: str) -> Markup:
     """Return what a template of `environment` drew, to stand in another page as it is."""
-    return Markup(text)  # noqa: S704  the template has escaped it
+    return Markup(text)  # noqa: S704  its writer has escaped it
 
 
 def facts(title: str, texts: Mapping[str, str]) -> Markup:
