@@ -47,6 +47,51 @@ def test_kinds(fittyp):
     assert made(fittyp=fittyp).version == ("5.2" if fittyp < 60 else "6.x")
 
 
+@pytest.mark.parametrize(("fittyp", "version"), [("'61'", "6.x"), ('"6"', "5.2")])
+def test_a_kind_in_quotes_is_that_kind(fittyp, version):
+    assert made(fittyp=fittyp).version == version
+
+
+@pytest.mark.parametrize("section", ["REST", "LATERAL", "TYRE_DATA"])
+def test_a_number_of_the_magic_formula_is_known_by_its_name_in_any_section(section):
+    text = BODY.format(**SI)
+    moved = text.replace("[LATERAL_COEFFICIENTS]", f"[{section}]").replace(
+        "[SCALING_COEFFICIENTS]", "[SCALES]"
+    )
+    expected, _ = evaluate_tir(parse_tir(text), SA=0.1, FZ=4000.0)
+    forces, _ = evaluate_tir(parse_tir(moved), SA=0.1, FZ=4000.0)
+    assert forces.FY == expected.FY
+    assert abs(forces.FY) > 1000
+    with pytest.raises(CellError):
+        parse_tir(moved.replace("PDY1 = 1\n", "PDY1 = one\n"))
+    with pytest.raises(CellError):
+        parse_tir(moved + "[OTHER]\nPDY1 = 2\n")
+
+
+def test_units_and_conditions_are_no_scale_factors():
+    tir = made(units="[UNITS]\nLENGTH = 'meter'\nFORCE = 'newton'\n[RUN]\nLONGVL = 16.7\nLOADED = 3\n")
+    assert "LONGVL" not in tir.coefficients()
+    assert si_number(tir, "LONGVL") == 16.7
+
+
+@pytest.mark.parametrize(
+    ("changed", "rule"),
+    [
+        ({"load": 4.0}, "tir-nominal-load"),
+        ({"load": 4e6}, "tir-nominal-load"),
+        ({"friction": 3}, "tir-friction"),
+    ],
+)
+def test_what_no_tire_has_is_told(changed, rule):
+    def rules(load=4000.0, friction=1):
+        text = BODY.format(**SI | {"load": load}).replace("PDY1 = 1\n", f"PDY1 = {friction}\n")
+        _, findings = evaluate_tir(parse_tir(text), SA=[0.1, 0.3], FZ=4000.0)
+        return {finding.rule for finding in findings}
+
+    assert rule in rules(**changed)
+    assert not {"tir-nominal-load", "tir-friction"} & rules()
+
+
 @pytest.mark.parametrize("fittyp", ["7", "63", "'MF61'", "1 2"])
 def test_unknown_kinds_are_refused_with_all_parts(fittyp):
     with pytest.raises(ConfigError) as caught:

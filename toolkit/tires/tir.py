@@ -1,5 +1,6 @@
 """Tire property files (.tir): sections of NAME = VALUE, comments after ``$`` and ``!``, read whole.
 
+Numbers of the Magic Formula are known by their names, in whatever section they stand.
 Every line is kept in its order, so that a conversion loses nothing: entries that are known and that are
 not, comments, and the rows of tables. Names count without regard to case. Nothing is mirrored for TYRESIDE.
 
@@ -143,6 +144,9 @@ _MF52, _MF6 = (5, 6, 21, 52), (60, 61, 62)
 _LINE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)(.*)")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]{1,4})?")
 _ALIASES = {"LFZ0": "LFZO"}
+# How the Magic Formula names its numbers: P, Q, R or S, what of the curve it makes, the axis, a number; scale
+# factors begin with L.
+_NAMED = re.compile(r"[PQRS][BCDEHKPSTV][XYZ][0-9]{1,2}|L[A-Z]{2,5}0?")
 _SHAPE = "sections such as [UNITS], [MODEL], [LATERAL_COEFFICIENTS]"
 
 
@@ -216,6 +220,8 @@ class TirFile:
             FITTYP is none of 5, 6, 21, 52, 60, 61, 62
         """
         fittyp = self.get("FITTYP")
+        if isinstance(fittyp, str) and _NUMBER.fullmatch(fittyp.strip()):
+            fittyp = float(fittyp)
         known_format = str(self.get("PROPERTY_FILE_FORMAT")).upper() in ("PAC2002", "MF_05")
         if fittyp in _MF52 or (fittyp is None and known_format):
             return "5.2"
@@ -273,7 +279,7 @@ class TirFile:
         return {
             _ALIASES.get(line.key, line.key): line.value
             for line in self.lines
-            if line.key and line.section.endswith("COEFFICIENTS") and isinstance(line.value, float)
+            if line.key and _is_coefficient(line.section, line.key) and isinstance(line.value, float)
         }
 
 
@@ -325,14 +331,24 @@ def _no_tir(where: object, actual: str) -> UnreadableError:
     )  # fmt: skip
 
 
+def _is_coefficient(section: str, key: str) -> bool:
+    """Tell whether an entry is a number of the equations: programs name the sections as they like."""
+    if section.endswith("COEFFICIENTS"):
+        return True
+    return _NAMED.fullmatch(key) is not None and key not in _DIMENSION and key not in _KNOWN
+
+
 def _value(text: str, where: str, key: str, section: str) -> str | float:
+    coefficient = _is_coefficient(section, key)
     if text[:1] in ("'", '"'):
-        return text[1:-1]
+        if not coefficient:
+            return text[1:-1]
+        text = text[1:-1].strip()
     if _NUMBER.fullmatch(text):
         number = float(text.lower().replace("d", "e"))
         if math.isfinite(number):
             return number
-    if section.endswith("COEFFICIENTS") or _NUMBER.fullmatch(text) or text.lower().strip("+-") in _NO_NUMBERS:
+    if coefficient or _NUMBER.fullmatch(text) or text.lower().strip("+-") in _NO_NUMBERS:
         raise CellError(
             f"the tire file's {key} is no number", where=where, got=repr(text) if text else "nothing",
             expected="a finite number with a decimal point", next_step="mend that line", rule="tir-number",
@@ -348,7 +364,7 @@ def _refuse_contradictions(tir: TirFile) -> None:
     for line in tir.lines:
         if not isinstance(line.value, float):
             continue
-        coefficient = line.section.endswith("COEFFICIENTS")
+        coefficient = _is_coefficient(line.section, line.key)
         key = _ALIASES.get(line.key, line.key)
         first = entries.setdefault(("COEFFICIENTS" if coefficient else line.section, key), line.value)
         if first != line.value:

@@ -8,8 +8,10 @@ import numpy as np
 
 from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
+from toolkit.reduction.limits import FRICTION, LEAST_LOAD_N
 from toolkit.tires.mf import Forces
 from toolkit.tires.models import mf52, mf61
+from toolkit.tires.plausibility import LARGEST
 from toolkit.tires.slip import ANGLES, Angles, state
 from toolkit.tires.tir import TirFile, factors, scale, si_number
 
@@ -87,7 +89,10 @@ def evaluate_tir(
     result = Forces(FX=FX, FY=FY, MZ=MZ)
     _refuse_infinite(tir, result)
     inputs = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
-    findings += [*tir.findings(), *lacking_findings(tir, p), *_beyond(tir, inputs)]
+    findings += [
+        *tir.findings(), *lacking_findings(tir, p), *_nominal_load(tir, FNOMIN), *_beyond(tir, inputs),
+        *_beyond_friction(tir, FZ, result),
+    ]  # fmt: skip
     return result, tuple(findings)
 
 
@@ -178,6 +183,28 @@ def _beyond(tir: TirFile, array_likes: Mapping[str, ArrayLike]) -> list[Finding]
             )
             findings.append(Finding(rule="tir-range", where=tir.where, message=text))
     return findings
+
+
+def _nominal_load(tir: TirFile, FNOMIN: float) -> list[Finding]:
+    """Return a finding where the nominal load is no tire's: kN that count as N, or the reverse."""
+    if LEAST_LOAD_N <= FNOMIN <= LARGEST["force"]:
+        return []
+    text = f"FNOMIN is {FNOMIN:.6g} N by [UNITS]; tires have {LEAST_LOAD_N:g} to {LARGEST['force']:g} N"
+    return [Finding(rule="tir-nominal-load", where=tir.where, message=text)]
+
+
+def _beyond_friction(tir: TirFile, FZ: ArrayLike, forces: Forces) -> list[Finding]:
+    """Return a finding where the file's numbers make more force than any tire has for its load."""
+    load = np.broadcast_to(np.asarray(FZ, dtype=np.float64), forces.FY.shape)
+    use = np.hypot(forces.FX, forces.FY) / np.maximum(load, LEAST_LOAD_N)
+    over = use > FRICTION.high
+    if not over.any():
+        return []
+    text = (
+        f"the force in the road's plane is up to {use.max():.3g} times the load, in {int(over.sum())} of "
+        f"{over.size} rows; no tire exceeds {FRICTION.high:g}"
+    )
+    return [Finding(rule="tir-friction", where=tir.where, message=text)]
 
 
 def _refuse_infinite(tir: TirFile, result: Forces) -> None:
