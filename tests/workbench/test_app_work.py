@@ -162,8 +162,14 @@ def test_learn_what_a_simulation_lacks(browser: BrowserContext, bench: Served, t
     assert float(left.get_attribute("value") or "nan") > 4 * fitted
     photographed(page, "model")
     looked_at(page, "model")
-    # A zoom stays while sizes change.
+    # A chart stays what it is while colours change, and its zoom while sizes do.
     chart = page.locator(".curves .u-over").first
+    expect(chart).to_be_visible()
+    drawn = chart.evaluate_handle("over => over")
+    for scheme in ("dark", "light"):
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.evaluate("() => new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
+        assert drawn.evaluate("over => over.isConnected"), scheme
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
     assert box is not None

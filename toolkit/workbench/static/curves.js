@@ -53,15 +53,16 @@ function range(of) {
   };
 }
 function draw(element) {
-  const content = JSON.parse(element.dataset.curves), soft = ink("--soft"), small = element.classList.contains("small");
-  const grid = { stroke: ink("--grid"), width: 1 };
+  const content = JSON.parse(element.dataset.curves), small = element.classList.contains("small");
+  // Colours are asked for at each drawing: a scheme that changes redraws the same chart, under the pointer that is on it.
+  const soft = () => ink("--soft"), grid = { stroke: () => ink("--grid"), width: 1 };
   const axis = (label) => ({ label: small ? undefined : label, values: (_, ticks) => ticks.map((tick) => figures.format(tick)), stroke: soft, grid, ticks: grid, labelSize: 20, font: "11px system-ui", labelFont: "12px system-ui" });
   const plot = new uPlot({
     mode: 2, width: Math.max(element.clientWidth, 160), height: small ? 130 : 300, legend: { show: false },
     scales: { x: { time: false, range: range(content.x_range) }, y: { range: range(content.y_range) } },
     cursor: { points: { show: false }, dataIdx: () => null, drag: { x: true, y: true, uni: 20 } },
     axes: [axis(content.x_label), Object.assign(axis(content.y_label), { size: small ? 50 : 62 })],
-    series: [{}, ...content.series.map((series) => ({ stroke: stroke(series), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: paths(content, element) }))],
+    series: [{}, ...content.series.map((series) => ({ stroke: () => stroke(series), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: paths(content, element) }))],
   }, [null, ...content.series.map((series) => [series.x, series.y])], element);
   drawn.set(element, { plot, content });
   plot.over.addEventListener("mousemove", (event) => tell(element, nearest(element, event)));
@@ -130,18 +131,14 @@ function drawCurves(root) {
   [...drawn].forEach(([element, { plot }]) => { if (!element.isConnected) { plot.destroy(); drawn.delete(element); } });
   root.querySelectorAll(".curves[data-curves]:empty").forEach(draw);
 }
-function drawCurvesAgain() {
-  [...drawn].forEach(([element, { plot }]) => { plot.destroy(); element.replaceChildren(); });
-  drawn.clear();
-  drawCurves(document);
-}
+function redraw() { drawn.forEach(({ plot }) => plot.redraw(false, true)); }
 document.addEventListener("change", (event) => {
   const form = event.target.closest("form.switches");
   if (form) form.querySelectorAll(".curves").forEach((element) => drawn.has(element) && shown(element));
 });
 document.addEventListener("htmx:afterSwap", (event) => drawCurves(event.target));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawCurvesAgain);
-matchMedia("print").addEventListener("change", drawCurvesAgain);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+matchMedia("print").addEventListener("change", redraw);
 let pause = 0;
 addEventListener("resize", () => { clearTimeout(pause); pause = setTimeout(() => drawn.forEach(({ plot }, element) => plot.setSize({ width: Math.max(element.clientWidth, 160), height: element.classList.contains("small") ? 130 : 300 })), 100); });
 drawCurves(document);
