@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit
+from toolkit.diagnosis.fit.noise import Autoregression, fit_noise, log_likelihood, whiten
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE
@@ -67,13 +68,56 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
     p = min(1.0, len(power) * _tail(ratio[k], len(runs)))
     line_power = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
     share = max(0.0, float(line_power / max(power[1:].sum(), 1e-300)))
-    return Line(frequency=k / (n * step), p_value=p, share=share)
+    frequency = k / (n * step)
+    if p < STRUCTURE.line:
+        p = max(p, min(1.0, len(power) * _beyond_its_past(problem, name, residual, frequency, 1 / (n * step))))
+    return Line(frequency=frequency, p_value=p, share=share)
 
 
 def _level(power: NDArray[np.float64], k: int) -> float:
     low, high = max(1, k - STRUCTURE.line_around), min(len(power), k + STRUCTURE.line_around + 1)
     around = np.concatenate([power[low : max(low, k - 2)], power[min(high, k + 3) : high]])
     return float(np.median(around)) if len(around) else 0.0
+
+
+def _beyond_its_past(
+    problem: Problem, name: str, residual: NDArray[np.float64], frequency: float, width: float
+) -> float:
+    """Return the chance that coloured noise has waves of a frequency as large, each run's of its own phase.
+
+    Noise that came through a resonance of the plant has a peak in its spectrum as well, as narrow as the line
+    of a short run. But its own past foretells it, and beside that past a wave explains nothing more.
+
+    Parameters
+    ----------
+    width : of a line [1/s], within which the frequency may be off
+    """
+    from scipy.stats import chi2
+
+    where = problem.layout(name)
+    values = residual[where.index]
+    noise = fit_noise(values, where, floor=problem.floor[name])
+    columns = 2 * len(problem.runs)
+
+    def likelihood(frequency: float) -> float:
+        """Return the log-likelihood beside waves by ordinary or by generalised least squares."""
+        waves = np.zeros((problem.rows, columns))
+        for k, (run, place) in enumerate(zip(problem.runs, problem.slices, strict=True)):
+            angle = 2 * np.pi * frequency * (run.t - run.t[0])
+            waves[place, 2 * k], waves[place, 2 * k + 1] = np.cos(angle), np.sin(angle)
+        reached = -math.inf
+        for weights in (Autoregression(reflection=(), sd=1.0), noise):
+            white = whiten(np.column_stack([waves[where.index], values]), where, weights)
+            left = values - waves[where.index] @ np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=None)[0]
+            there = fit_noise(left, where, floor=problem.floor[name], used=columns)
+            reached = max(reached, log_likelihood(left, where, there))
+        return reached
+
+    best = -math.inf
+    for reach in (width, width / 8):
+        near = [(likelihood(at), at) for at in frequency + reach * np.linspace(-1, 1, 17)]
+        best, frequency = max((best, frequency), *near)
+    return float(chi2.sf(max(2 * (best - log_likelihood(values, where, noise)), 0.0), columns + 1))
 
 
 def _tail(ratio: float, runs: int) -> float:
