@@ -27,11 +27,15 @@ _TOO_LARGE = ("more than its stated noise",)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance."""
+    """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance.
+
+    ``width`` is what the shortest run leaves open of its frequency [1/s].
+    """
 
     frequency: float
     p_value: float
     share: float
+    width: float
 
 
 def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
@@ -68,10 +72,7 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
     p = min(1.0, len(power) * _tail(ratio[k], len(runs)))
     line_power = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
     share = max(0.0, float(line_power / max(power[1:].sum(), 1e-300)))
-    frequency = k / (n * step)
-    if p < STRUCTURE.line:
-        p = max(p, min(1.0, len(power) * _beyond_its_past(problem, name, residual, frequency, 1 / (n * step))))
-    return Line(frequency=frequency, p_value=p, share=share)
+    return Line(frequency=k / (n * step), p_value=p, share=share, width=1 / (n * step))
 
 
 def _level(power: NDArray[np.float64], k: int) -> float:
@@ -80,17 +81,11 @@ def _level(power: NDArray[np.float64], k: int) -> float:
     return float(np.median(around)) if len(around) else 0.0
 
 
-def _beyond_its_past(
-    problem: Problem, name: str, residual: NDArray[np.float64], frequency: float, width: float
-) -> float:
-    """Return the chance that coloured noise has waves of a frequency as large, each run's of its own phase.
+def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], line: Line) -> float:
+    """Return the chance that coloured noise has waves as large, each run's of its own phase.
 
     Noise that came through a resonance of the plant has a peak in its spectrum as well, as narrow as the line
     of a short run. But its own past foretells it, and beside that past a wave explains nothing more.
-
-    Parameters
-    ----------
-    width : of a line [1/s], within which the frequency may be off
     """
     from scipy.stats import chi2
 
@@ -113,11 +108,14 @@ def _beyond_its_past(
             reached = max(reached, log_likelihood(left, where, there))
         return reached
 
-    best = -math.inf
-    for reach in (width, width / 8):
+    best, frequency = -math.inf, line.frequency
+    for reach in (line.width, line.width / 8):
         near = [(likelihood(at), at) for at in frequency + reach * np.linspace(-1, 1, 17)]
         best, frequency = max((best, frequency), *near)
-    return float(chi2.sf(max(2 * (best - log_likelihood(values, where, noise)), 0.0), columns + 1))
+    gain = 2 * (best - log_likelihood(values, where, noise))
+    # As many frequencies were looked at as half the rows of a run.
+    looked = 0.5 / (line.width * float(np.median(np.diff(problem.runs[0].t))))
+    return min(1.0, looked * float(chi2.sf(max(gain, 0.0), columns + 1)))
 
 
 def _tail(ratio: float, runs: int) -> float:
