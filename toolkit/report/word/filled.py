@@ -29,6 +29,17 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Chart:
+    """A chart of Word's own: its alternative text, its size on the page, and the texts that it shows."""
+
+    tag: str
+    alt: str
+    width_emu: int
+    height_emu: int
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Filled:
     """A filled report: the .docx, and what must be found in it and in its PDF.
 
@@ -38,7 +49,7 @@ class Filled:
     page can show, ``perhaps_shown`` those that depend on the number of pages, with their own words;
     ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them;
     ``in_margins`` the figures that stand in headers and footers alone; ``page_mark`` the line that every page
-    carries.
+    carries; ``charts`` those of the figures that are charts of Word's own, in their order.
     """
 
     docx: bytes
@@ -57,6 +68,7 @@ class Filled:
     rows_of_the_run: frozenset[int] = frozenset()
     in_margins: frozenset[str] = frozenset()
     page_mark: str | None = None
+    charts: tuple[Chart, ...] = ()
 
 
 # A Word file as it was written, read back piece by piece: its tables may be of any length.
