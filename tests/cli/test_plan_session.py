@@ -268,7 +268,7 @@ def test_a_plan_from_a_candidate_is_a_draft_that_is_asked_for(tmp_path: Path) ->
         "plan", "session", "cell", "--calibration", "cell-r1", "--draft", "--home", home, "--json", code=None
     )
     findings = json.loads(said.stdout)["findings"]
-    assert [(finding["rule"], finding["level"]) for finding in findings][0] == ("draft", "note")
+    assert next((finding["rule"], finding["level"]) for finding in findings) == ("draft", "note")
     # What has no such option does not advise it.
     due = toolkit("plan", "interval", "cell", "--home", home, code=2)
     assert "approve" in due.stderr

@@ -94,7 +94,7 @@ def test_an_empty_list_of_fixtures_is_refused(tmp_path: Path, knowledge: Knowled
 
 
 def test_a_load_far_beyond_what_was_put_on_is_left_out(tmp_path: Path, knowledge: Knowledge) -> None:
-    text = TEXT.replace("[limit]\nFY = { value = 4448.2216152605, unit = \"N\" }\n", "")
+    text = TEXT.replace('[limit]\nFY = { value = 4448.2216152605, unit = "N" }\n', "")
     largest = knowledge.record.load("FY").largest
     assert 1500 < 1.1 * largest < 20_000
     feasible = made(tmp_path, knowledge, text.replace("1500]", "1500, 20000]"))

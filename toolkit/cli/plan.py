@@ -45,7 +45,7 @@ def session(
         typer.Option(
             "--fixtures",
             metavar="FILE",
-            help="Loading fixtures (.toml): weights, arms, minutes; default: those of the machine definition, "
+            help="Loading fixtures (.toml): weights, arms, minutes; default: the machine definition's, "
             "else the loads of the last session.",
         ),
     ] = None,

@@ -35,7 +35,10 @@ _PICTURE = re.compile(r"next_\w{1,60}\.png")
 _OPTIONS: Mapping[PlanKind, Mapping[str, str]] = {
     "session": {"minutes": "--minutes", "loads": "--loads", "criterion": "--criterion"},
     "test": {
-        "minutes": "--minutes", "sliding": "--sliding", "rise": "--rise", "between_files": "--between-files",
+        "minutes": "--minutes",
+        "sliding": "--sliding",
+        "rise": "--rise",
+        "between_files": "--between-files",
     },
     "next": {"budget": "--budget"},
     "interval": {"reliability": "--reliability", "tests": "--tests"},
@@ -92,7 +95,7 @@ def titles_of(kept: KeptPlan) -> dict[str, str]:
 
 
 def fixtures_of(home: Path) -> dict[str, str]:
-    """Return the loading fixtures of a home by id: files in it, or in its folder ``fixtures``, that are some."""
+    """Return the loading fixtures of a home by id: those in it and in `FIXTURES` in it."""
     from toolkit.declared import read
     from toolkit.errors import ToolkitError
     from toolkit.machine.loading import LoadingFixtures

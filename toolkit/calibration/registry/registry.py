@@ -257,7 +257,7 @@ class Registry:
         The newest ``in_force_from`` not after ``on`` wins, among equals the one approved last. A record
         that is void on ``on``, by a withdrawal known at ``known_at``, does not count. An approval that was
         entered after ``known_at`` serves only where no earlier one does: a report of that time could not
-        know it, but a ledger may begin later than the calibrations that it tells of. ``drafts``: what asks can
+        know it, but a ledger may begin later than the calibrations that it tells of. ``drafts``: who asks can
         make a draft of another record, and the error says so.
 
         Raises
