@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import RenderError, ToolkitError
+from toolkit.inputs import PDF_FILE, read_input
 from toolkit.publication import publication
 from toolkit.recording.marks import refuse_original
 from toolkit.report.content import Plot, ReportContent
@@ -279,7 +280,7 @@ class _Run:
         docx.write_bytes(copy.docx)
         shutil.move(copy.pdf, pdf)
         if self.filled.charts:
-            pdf.write_bytes(with_alternatives(pdf.read_bytes(), self.filled.charts))
+            pdf.write_bytes(with_alternatives(read_input(pdf, PDF_FILE), self.filled.charts))
         checks, pages = verify_pdf(pdf, self.filled)
         self.checks += checks
         _demand(self.checks)

@@ -10,6 +10,7 @@ import math
 import re
 import zipfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import count
 from typing import Any
 from xml.sax.saxutils import escape
@@ -31,6 +32,17 @@ _SMALLEST = 300  # hundredths of a point
 _STEPS = 8  # of the upright axis, at most
 _SHEET_NAME = 31  # characters that Excel allows
 _MODIFIED = re.compile(rb"<dcterms:(created|modified)[^>]*>[^<]*</dcterms:\1>")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chart:
+    """A chart of Word's own: its alternative text, its size on the page, and the texts that it shows."""
+
+    tag: str
+    alt: str
+    width_emu: int
+    height_emu: int
+    texts: tuple[str, ...]
 
 
 def chart_xml(plot: Plot, language: str, *, scale: float = 1.0) -> bytes:

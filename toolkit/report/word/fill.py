@@ -16,6 +16,7 @@ from toolkit.report.content import SIGNATURE, ReportContent, Table
 from toolkit.report.figures import Picture
 from toolkit.report.tags import DRAWN, Tag, width_emu
 from toolkit.report.word.bulk import Bulk, row_texts
+from toolkit.report.word.chart import Chart
 from toolkit.report.word.check import LintFinding, check_stories
 from toolkit.report.word.closing import close
 from toolkit.report.word.controls import (
@@ -29,7 +30,7 @@ from toolkit.report.word.controls import (
     replace_content,
     settle,
 )
-from toolkit.report.word.filled import Chart, Entry, Filled
+from toolkit.report.word.filled import Entry, Filled
 from toolkit.report.word.numbering import levelled, number_captions
 from toolkit.report.word.package import Template, open_package, undated
 from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark_pages, set_properties

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from toolkit.report.word.chart import Chart
 from toolkit.report.word.lint import LintFinding
 from toolkit.report.word.toc import Contents
 from toolkit.report.word.xml import STORIES, W_P, W_SDT, W_TR, Element, ancestor, q
@@ -26,17 +27,6 @@ class Entry:
     def as_dict(self) -> dict[str, str]:
         """Return the entry as a JSON-ready dict."""
         return {"tag": self.tag, "text": self.text, "part": self.part}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Chart:
-    """A chart of Word's own: its alternative text, its size on the page, and the texts that it shows."""
-
-    tag: str
-    alt: str
-    width_emu: int
-    height_emu: int
-    texts: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

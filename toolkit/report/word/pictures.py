@@ -13,8 +13,15 @@ from lxml import etree
 
 from toolkit.report.content import Plot
 from toolkit.report.figures import SIZE_IN, Picture
-from toolkit.report.word.chart import BOOK_RELATION, BOOK_TYPE, CHART_TYPE, chart_book, chart_texts, chart_xml
-from toolkit.report.word.filled import Chart
+from toolkit.report.word.chart import (
+    BOOK_RELATION,
+    BOOK_TYPE,
+    CHART_TYPE,
+    Chart,
+    chart_book,
+    chart_texts,
+    chart_xml,
+)
 from toolkit.report.word.scan import own_rows
 from toolkit.report.word.xml import (
     NS,

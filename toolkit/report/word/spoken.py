@@ -11,7 +11,7 @@ import io
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from toolkit.report.word.filled import Chart
+from toolkit.report.word.chart import Chart
 from toolkit.report.word.xml import clean
 from toolkit.trust.seal.pdf import pdf_writer
 
