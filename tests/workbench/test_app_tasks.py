@@ -94,7 +94,7 @@ def typed_session(page: Page, source: Path) -> None:
 def test_see_what_limits_U(browser: BrowserContext, empty: Served, tmp_path: Path) -> None:
     page = opened(browser, empty, [], [])
     typed_session(page, session(tmp_path / "s", 2025, 0.1))
-    expect(page.locator("[data-part=budget] .chart canvas")).to_have_count(1)
+    expect(page.locator("[data-part=budget] .curves canvas")).to_have_count(1)
     # A statement is typed in its field, and stands in the text.
     resolution = page.locator("[data-key='cells.S.resolution']")
     expect(resolution).to_have_value("1e-07")

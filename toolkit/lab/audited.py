@@ -19,7 +19,7 @@ from toolkit.audit.model import CLEAN, GRADES
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.inputs import RESULT_FILE, open_regular, unreadable
 from toolkit.lab.audit import LINES
-from toolkit.lab.seen_test import row_chart
+from toolkit.lab.chart import Chart, row_chart
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -131,7 +131,7 @@ class Audited:
             raise _changed(self.lines)
         return line
 
-    def charts(self, place: int, registry: Registry) -> tuple[dict[str, Any], bool]:
+    def charts(self, place: int, registry: Registry) -> tuple[dict[str, Chart], bool]:
         """Return the loads of a file row by row, as it has them and by the record in force.
 
         The second says whether the file is still the one that was audited.

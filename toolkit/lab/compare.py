@@ -106,7 +106,12 @@ def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
 
 
 def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, list[Finding]]:
-    from toolkit.comparison.maker_table import is_characteristics_table, maker_characteristics, maker_rows
+    from toolkit.comparison.maker_table import (
+        is_characteristics_table,
+        maker_characteristics,
+        maker_conditions,
+        maker_rows,
+    )
     from toolkit.comparison.model import Entry
     from toolkit.files import sha256_file
 
@@ -118,9 +123,11 @@ def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, li
         ), []
     identity = sha256_file(path)[:12] if path.is_file() else ""
     read, findings = maker_rows(path, axes=axes, angles_rad=angles, identity=identity)
-    return Entry(label=path.stem, kind="table", identity=identity, source=str(path), rows=read), list(
-        findings
-    )
+    entry = Entry(
+        label=path.stem, kind="table", identity=identity, source=str(path), rows=read,
+        conditions=maker_conditions(path, axes=axes),
+    )  # fmt: skip
+    return entry, list(findings)
 
 
 def _write_figures(comparison: Comparison, style: Style, stage: Path, folder: Path) -> dict[str, Path]:

@@ -93,6 +93,7 @@ class SweepCondition(TypedDict):
     inclination_deg: float | None
     pressure_kPa: float | None
     load_N: float
+    speed_km_h: Annotated[float | None, "null where the test has one speed"]
     direction: Annotated[str, "up or down"]
     samples: int
 
@@ -165,6 +166,7 @@ def sweeps_payload(sweeps: Sweeps) -> SweepsEntry:
                 "inclination_deg": None if s.inclination_rad is None else math.degrees(s.inclination_rad),
                 "pressure_kPa": None if s.pressure_Pa is None else s.pressure_Pa / 1e3,
                 "load_N": s.load_N,
+                "speed_km_h": None if s.speed_m_s is None else s.speed_m_s * 3.6,
                 "direction": s.direction,
                 "samples": s.samples,
             }
@@ -184,6 +186,7 @@ def sweeps_text(sweeps: Sweeps) -> str:
         ("inclination", "deg", [c["inclination_deg"] for c in conditions]),
         ("pressure", "kPa", [c["pressure_kPa"] for c in conditions]),
         ("load", "N", [c["load_N"] for c in conditions]),
+        ("speed", "km/h", [c["speed_km_h"] for c in conditions]),
     )
     for name, unit, column in levels:
         values = sorted({round(value, 1) for value in column if value is not None})

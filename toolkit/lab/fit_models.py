@@ -81,7 +81,7 @@ def fit_table_models(
     seconds: dict[str, float] = {}
     for model in single:
         started = time.perf_counter()
-        result = fit_table(measured, (model,), loss=loss)
+        result = fit_table(measured, model, loss=loss)
         seconds[model.name] = time.perf_counter() - started
         curves += result.fits
         findings += tuple(finding for finding in result.findings if finding not in findings)
@@ -226,26 +226,43 @@ def _global(
     where: str,
     seconds: dict[str, float],
 ) -> tuple[tuple[ModelFit, ...], tuple[Finding, ...], tuple[CurveFit, ...]]:
-    from toolkit.tires.global_fit import fit_global, global_findings, not_varied
+    from toolkit.tires.global_fit import fit_global, global_findings, not_varied, selection_of
     from toolkit.tires.global_seeds import seeds_of, why_not_global
 
     if not models:
         return (), (), ()
+    whole = []
     for model in models:
-        if (problem := why_not_global(data, model)) is not None:
+        selection = selection_of(data, model)
+        whole.append(not selection.left_out)
+        if (problem := why_not_global(data.take(selection.rows), model)) is not None:
             raise FitError(
                 problem.what, where=f"{where}, {problem.where}", got=problem.got, expected=problem.expected,
                 next_step=problem.next_step, rule=problem.rule,
             )  # fmt: skip
     seeds = seeds_of(data)
     model_fits = []
-    for model in models:
+    for model, all_rows in zip(models, whole, strict=True):
         started = time.perf_counter()
-        model_fits.append(fit_global(model, data, loss=loss, weights=weights, seeds=seeds.seeds))
+        known = seeds.seeds if all_rows else None
+        model_fits.append(fit_global(model, data, loss=loss, weights=weights, seeds=known))
         seconds[model.name] = time.perf_counter() - started
     fits = tuple(model_fits)
-    findings = [finding for fit in fits for finding in global_findings(fit)]
-    return fits, (*not_varied(fits, where), *findings), seeds.fits
+    findings = [*_apart(fits, where), *not_varied(fits, where)]
+    findings += [finding for fit in fits for finding in global_findings(fit)]
+    return fits, tuple(findings), seeds.fits
+
+
+def _apart(fits: Sequence[ModelFit], where: str) -> list[Finding]:
+    """Return which rows were left out, once for all models that leave out the same."""
+    groups: dict[tuple[str, ...], list[ModelFit]] = {}
+    for fit in fits:
+        groups.setdefault((*fit.selection.apart, *fit.selection.stands), []).append(fit)
+    return [
+        finding
+        for alike in groups.values()
+        for finding in alike[0].selection.findings(models=[fit.model for fit in alike], where=where)
+    ]
 
 
 def _fitted(

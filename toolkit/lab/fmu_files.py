@@ -72,7 +72,8 @@ def write_fit_fmu(
     from toolkit.tires.tir import parse_tir
     from toolkit.tires.tir_write import FITTYP, tir_text, tire_fit
 
-    data, use = fitted.data, fitted.use
+    fit = next(fit for fit in fitted.globals if fit.model == model_name)
+    data, use = fitted.data.take(fit.selection.rows), fitted.use
     if "two_loads" not in what_varies(data):
         raise FitError(
             "an FMU needs two loads or more", where=source, got=f"one load, {data.loads[0]:.0f} N",
@@ -81,7 +82,6 @@ def write_fit_fmu(
         )  # fmt: skip
     model = find(model_name)
     assert isinstance(model, GlobalModel)  # noqa: S101  `check_fmu` saw to it
-    fit = next(fit for fit in fitted.globals if fit.model == model_name)
     equations: TireEquations
     if model_name in FITTYP:
         text = tir_text(tire_fit(model, fit, data, side=side))

@@ -18,8 +18,8 @@ from typing import Any
 
 from toolkit.errors import UnreadableError
 from toolkit.inputs import RESULT_FILE, TABLE_FILE, read_input, read_regular
+from toolkit.lab.chart import Chart, Series, sampling
 from toolkit.lab.holdings import ANSWER
-from toolkit.lab.seen_test import SAMPLES
 
 PAGE, PREDICTIONS = "diagnosis.html", "predictions"
 _FIGURE = re.compile(r'<img alt="([^"]*)" src="(data:image/svg\+xml;base64,[A-Za-z0-9+/=]+)">')
@@ -38,7 +38,7 @@ class SeenDiagnosis:
 
     answer: dict[str, Any]
     figures: tuple[tuple[str, str], ...]
-    charts: tuple[tuple[str, dict[str, Any]], ...]
+    charts: tuple[tuple[str, Chart], ...]
 
 
 def read_diagnosis(folder: Path) -> SeenDiagnosis:
@@ -71,13 +71,13 @@ def _figures(path: Path) -> Iterator[tuple[str, str]]:
     yield from ((html.unescape(alt), source) for alt, source in _FIGURE.findall(text))
 
 
-def _charts(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+def _charts(folder: Path) -> Iterator[tuple[str, Chart]]:
     """Yield the predictions of each channel over the time of its file, else over its rows."""
     for path in sorted(folder.glob("*.csv")):
         try:
             rows = list(csv.reader(io.StringIO(read_regular(path, TABLE_FILE).decode())))
             columns = dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
-            step = max(1, -(-(len(rows) - 1) // SAMPLES))
+            step = sampling(len(rows) - 1)
             numbers = {name: [float(text) for text in column[::step]] for name, column in columns.items()}
         except (OSError, ValueError, IndexError):
             continue
@@ -87,7 +87,7 @@ def _charts(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
         timed = bool(first) and not any(first == f"{name}_{curve}" for name in channels for curve in _CURVES)
         x_label, x = (first, numbers[first]) if timed else ("row", list(range(1, len(rows), step)))
         for channel in channels:
-            series = [
+            series: list[Series] = [
                 {"label": curve, "x": x, "y": numbers[f"{channel}_{curve}"], "line": True}
                 for curve in _CURVES
                 if f"{channel}_{curve}" in numbers and all(map(math.isfinite, numbers[f"{channel}_{curve}"]))

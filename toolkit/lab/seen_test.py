@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from toolkit.lab.chart import Chart, Condition, Series, row_chart
 
+if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.resolve import Resolved
     from toolkit.pipeline import TestResult
-
-    Rows = Sequence[float] | NDArray[np.float64]
 
 
 def results_answer(resolved: Resolved) -> dict[str, Any]:
@@ -84,9 +82,6 @@ def _condition(plain: Mapping[str, Any]) -> tuple[Any, ...]:
 K = 2.0
 """Coverage factor of the U of one condition."""
 _POINTS = 121
-_UNITS = {"FY": "N", "MZ": "N·m"}
-SAMPLES = 3 * 2**10
-"""Rows that a chart draws at most: the others are left out, each by its place."""
 
 
 def curves_of_test(result: TestResult) -> dict[str, Any]:
@@ -95,11 +90,7 @@ def curves_of_test(result: TestResult) -> dict[str, Any]:
     from toolkit.tires.evaluate import value_at
 
     by_row = {(point.file, point.first_row): point for point in result.characteristics.points}
-    charts: dict[str, dict[str, Any]] = {
-        "FY": _chart("SA [deg]", "FY [N]"),
-        "MZ": _chart("SA [deg]", "MZ [N·m]"),
-        "gough": _chart("MZ [N·m]", "FY [N]"),
-    }
+    drawn: dict[str, list[Series]] = {"FY": [], "MZ": [], "gough": []}
     loads: list[float] = []
     rotations: list[str] = []
     for direction in directions_of(result.reduced, result.characteristics.fits):
@@ -108,54 +99,28 @@ def curves_of_test(result: TestResult) -> dict[str, Any]:
             loads.append(group.load_N)
         if rotation not in rotations:
             rotations.append(rotation)
-        belongs = {"load": loads.index(group.load_N), "rotation": rotation, "load_N": group.load_N}
+        place = loads.index(group.load_N)
+        condition: Condition = {"load": place, "load_N": group.load_N, "rotation": rotation}
         points = [by_row[c.file, c.first_row] for c in group.conditions]
         SA = [math.degrees(c.SA) for c in group.conditions]
         FY, MZ = ([float(v) for v in group.values(channel)] for channel in ("FY", "MZ"))
         U_FY, U_MZ = [K * p.u_FY for p in points], [K * p.u_MZ for p in points]
-        charts["FY"]["series"].append({**belongs, "x": SA, "y": FY, "U": U_FY})
-        charts["MZ"]["series"].append({**belongs, "x": SA, "y": MZ, "U": U_MZ})
-        charts["gough"]["series"].append({**belongs, "x": MZ, "y": FY, "U": U_FY, "U_x": U_MZ})
+        drawn["FY"].append(Series(x=SA, y=FY, U=U_FY, condition=condition))
+        drawn["MZ"].append(Series(x=SA, y=MZ, U=U_MZ, condition=condition))
+        drawn["gough"].append(Series(x=MZ, y=FY, U=U_FY, U_x=U_MZ, condition=condition))
         grid = np.linspace(group.SA[0], group.SA[-1], _POINTS)
-        lines = {}
-        for channel in ("FY", "MZ"):
-            fit = direction.fit.FY if channel == "FY" else direction.fit.MZ
-            if fit is not None:
-                lines[channel] = value_at(fit, grid).tolist()
-                line = {"x": np.degrees(grid).tolist(), "y": lines[channel], "line": True}
-                charts[channel]["series"].append({**belongs, **line})
-        if len(lines) == 2:
-            line = {"x": lines["MZ"], "y": lines["FY"], "line": True}
-            charts["gough"]["series"].append({**belongs, **line})
+        fits = {"FY": direction.fit.FY, "MZ": direction.fit.MZ}
+        lines = {name: value_at(fit, grid).tolist() for name, fit in fits.items() if fit is not None}
+        for name, values in lines.items():
+            drawn[name].append(Series(x=np.degrees(grid).tolist(), y=values, line=True, condition=condition))
+        if len(lines) == len(fits):
+            drawn["gough"].append(Series(x=lines["MZ"], y=lines["FY"], line=True, condition=condition))
+    charts: dict[str, Chart] = {
+        "FY": {"x_label": "SA [deg]", "y_label": "FY [N]", "series": drawn["FY"]},
+        "MZ": {"x_label": "SA [deg]", "y_label": "MZ [N·m]", "series": drawn["MZ"]},
+        "gough": {"x_label": "MZ [N·m]", "y_label": "FY [N]", "series": drawn["gough"]},
+    }
     return {"charts": charts, "loads": loads, "rotations": rotations}
-
-
-def common_ranges(charts: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
-    """Return the ranges of both axes that hold every point of some charts with its U."""
-    ranges = {}
-    for axis, U in (("x", "U_x"), ("y", "U")):
-        ends = [
-            end
-            for chart in charts
-            for series in chart["series"]
-            for value, half in zip(series[axis], series.get(U) or [0.0] * len(series[axis]), strict=True)
-            for end in (value - half, value + half)
-        ]
-        if ends:
-            pad = 0.04 * (max(ends) - min(ends) or 1.0)
-            ranges[f"{axis}_range"] = [min(ends) - pad, max(ends) + pad]
-    return ranges
-
-
-def row_chart(load: str, old: Rows | None, new: Rows) -> dict[str, Any]:
-    """Return a load of one file over its rows: by the record in force, and as the file has it."""
-    thinned = max(1, -(-len(new) // SAMPLES))
-    rows = list(range(1, len(new) + 1, thinned))
-    chart = _chart("row", f"{load} [{_UNITS[load]}]")
-    if old is not None:
-        chart["series"].append({"label": "file", "x": rows, "y": _thin(old, thinned), "line": True})
-    chart["series"].append({"label": "record", "x": rows, "y": _thin(new, thinned), "line": True})
-    return chart
 
 
 def shown_conditions(
@@ -174,11 +139,3 @@ def shown_conditions(
 
 def _nearest(loads: Sequence[float], load: float) -> float:
     return min(loads, key=lambda candidate: abs(candidate - load))
-
-
-def _thin(values: Rows, step: int) -> list[float]:
-    return [float(value) for value in values[::step]]
-
-
-def _chart(x_label: str, y_label: str) -> dict[str, Any]:
-    return {"x_label": x_label, "y_label": y_label, "series": []}

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from toolkit.errors import ConfigError
 from toolkit.estimate import plus_minus
 from toolkit.files import same_file
+from toolkit.lab.chart import Chart, Series, sampling
 from toolkit.lab.holdings import CASE
-from toolkit.lab.seen_test import SAMPLES
 from toolkit.lab.uploads import claimed_folder
 from toolkit.publication import publication
 
@@ -165,20 +165,22 @@ def keep_model(home: Path, model: ModelFile, sized: Sequence[Sized]) -> str:
     return f"{MODELS}/{folder.name}/{MODEL}"
 
 
-def _charts(row: Beside, *, has_time: bool) -> Iterator[tuple[str, dict[str, Any]]]:
+def _charts(row: Beside, *, has_time: bool) -> Iterator[tuple[str, Chart]]:
     """Yield the output of a run, ``beside`` what was recorded, and what is ``left`` of it."""
     import numpy as np
 
-    def series(label: str, values: NDArray[np.float64], *, line: bool) -> dict[str, Any]:
+    def series(label: str, values: NDArray[np.float64], *, line: bool) -> Series:
         at = np.flatnonzero(np.isfinite(values))
-        at = at[:: max(1, -(-len(at) // SAMPLES))]
+        at = at[:: sampling(len(at))]
         x = row.x[at] if has_time else at + 1.0
         return {"label": label, "x": x.tolist(), "y": values[at].tolist(), "line": line}
 
-    labels = {"x_label": "t [s]" if has_time else "row", "y_label": f"{row.output} [{row.unit}]"}
     recorded = series("file", row.recorded, line=False)
-    yield "beside", {**labels, "series": [recorded, series("augmented", row.simulated, line=True)]}
-    yield "left", {**labels, "series": [series("augmented", row.simulated - row.recorded, line=True)]}
+    simulated = series("augmented", row.simulated, line=True)
+    left = series("augmented", row.simulated - row.recorded, line=True)
+    x_label, y_label = "t [s]" if has_time else "row", f"{row.output} [{row.unit}]"
+    yield "beside", {"x_label": x_label, "y_label": y_label, "series": [recorded, simulated]}
+    yield "left", {"x_label": x_label, "y_label": y_label, "series": [left]}
 
 
 def _step(value: float, error: float | None) -> float:

@@ -72,6 +72,7 @@ def write_fit(
     from toolkit.tires.models import find
     from toolkit.tires.tir_write import tire_fit, write_tir
 
+    data = data.take(fit.selection.rows)
     varies = what_varies(data)
     if "two_loads" not in varies:
         raise FitError(

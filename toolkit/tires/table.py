@@ -16,6 +16,7 @@ import io
 import math
 import re
 from dataclasses import dataclass
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, get_args
 
@@ -65,6 +66,17 @@ class TireTable:
                 message=mark,
             )
             for mark in self.marks
+        )
+
+    def take(self, rows: NDArray[np.bool_]) -> TireTable:
+        """Return some of the rows, by a mask."""
+        return TireTable(
+            path=self.path,
+            axes=self.axes,
+            columns=tuple((symbol, column[rows]) for symbol, column in self.columns),
+            header=self.header,
+            cells=tuple(compress(self.cells, rows)),
+            marks=self.marks,
         )
 
     def get(self, symbol: str) -> NDArray[np.float64] | None:

@@ -14,6 +14,7 @@ from starlette.responses import RedirectResponse
 
 from toolkit.calibration.registry.registry import ID
 from toolkit.errors import ConfigError, ToolkitError
+from toolkit.lab.chart import Chart, Series
 from toolkit.lab.decisions import Order
 from toolkit.lab.pending import decide as settle_decision
 from toolkit.trust.requested import Requested
@@ -214,33 +215,25 @@ ROUTES: Routes = (
 )
 
 
-def residual_chart(rows: Mapping[str, Any], unit: str) -> dict[str, Any]:
+def residual_chart(rows: Mapping[str, Any], unit: str) -> Chart:
     """Return residuals over the reference load, by direction where the session states it.
 
-    >>> rows = {"reference": [2.0, 1.0], "residual": [0.1, -0.1], "direction": ["up", "down"]}
-    >>> residual_chart(rows, "N")["data"]
-    [[1.0, 2.0], [None, 0.1], [-0.1, None]]
+    >>> rows = {"reference": [2.0, 1.0, 0.0], "residual": [0.1, -0.1, 0.2], "direction": ["up", "down", "up"]}
+    >>> [(series["label"], series["x"], series["y"]) for series in residual_chart(rows, "N")["series"]]
+    [('up', [0.0, 2.0], [0.2, 0.1]), ('down', [1.0], [-0.1])]
     """
-    senses = rows["direction"] or [""] * len(rows["reference"])
-    names = list(dict.fromkeys(sorted(senses, reverse=True)))
-    order = sorted(range(len(senses)), key=lambda at: float(rows["reference"][at]))
-    return {
-        "x_label": f"reference [{unit}]",
-        "y_label": f"residual [{unit}]",
-        "series": [{"label": f"residual {name}".strip()} for name in names],
-        "data": [
-            [rows["reference"][at] for at in order],
-            *([rows["residual"][at] if senses[at] == name else None for at in order] for name in names),
-        ],
-    }
+    senses = rows["direction"] or ["residual"] * len(rows["reference"])
+    points = sorted(zip(rows["reference"], rows["residual"], senses, strict=True))
+    series: list[Series] = [
+        {"label": name, "x": [x for x, _, sense in points if sense == name],
+         "y": [y for _, y, sense in points if sense == name]}
+        for name in sorted(set(senses), reverse=True)
+    ]  # fmt: skip
+    return {"x_label": f"reference [{unit}]", "y_label": f"residual [{unit}]", "series": series}
 
 
-def budget_chart(load: str, budget: Mapping[str, Any]) -> dict[str, Any]:
+def budget_chart(load: str, budget: Mapping[str, Any]) -> Chart:
     """Return U over the range of a load."""
-    unit = budget["unit"]
-    return {
-        "x_label": f"{load} [{unit}]",
-        "y_label": f"U [{unit}]",
-        "series": [{"label": "U", "line": True}],
-        "data": [[point["value"] for point in budget["range"]], [point["U"] for point in budget["range"]]],
-    }
+    unit, points = budget["unit"], budget["range"]
+    U: Series = {"label": "U", "x": [p["value"] for p in points], "y": [p["U"] for p in points], "line": True}
+    return {"x_label": f"{load} [{unit}]", "y_label": f"U [{unit}]", "series": [U]}

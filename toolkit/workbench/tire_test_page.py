@@ -11,8 +11,9 @@ from urllib.parse import urlencode
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
+from toolkit.lab.chart import common_ranges
 from toolkit.lab.holdings import rows_of_tests
-from toolkit.lab.seen_test import common_ranges, recordings_answer, results_answer, shown_conditions
+from toolkit.lab.seen_test import recordings_answer, results_answer, shown_conditions
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:

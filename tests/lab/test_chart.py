@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from toolkit.lab.seen_test import common_ranges, row_chart
+from toolkit.lab.chart import common_ranges, row_chart
 
 
 def test_a_row_chart_keeps_few_rows_whole_and_thins_many_to_their_own_values() -> None:
