@@ -10,7 +10,7 @@ from starlette.responses import RedirectResponse, Response
 from toolkit.inputs import RESULT_FILE, read_regular
 from toolkit.lab.desk.chart import Chart, Series
 from toolkit.lab.desk.jobs import start_job
-from toolkit.lab.desk.kept_plans import KINDS, plan_words, read_plan, titles_of
+from toolkit.lab.desk.kept_plans import KINDS, fixtures_of, plan_words, read_plan, titles_of
 from toolkit.lab.desk.previews import templates_of
 from toolkit.workbench.page import page
 
@@ -44,7 +44,7 @@ def plan_list(request: Request) -> Response:
     return page(
         request, "part_plans", plans=holdings.places["plan"], instruments=bench.registry.instruments(),
         tests=holdings.places["test"], answers=holdings.places["diagnosis"],
-        templates=templates_of(bench.home),
+        templates=templates_of(bench.home), fixtures=fixtures_of(bench.home),
     )  # fmt: skip
 
 
@@ -82,7 +82,8 @@ def start(request: Request) -> Response:
     form = request.state.form
     subject = _subject(bench, kind, form)
     template = templates_of(bench.home).get(form.get("template", ""))
-    words = plan_words(bench.home, kind, form, subject, template)
+    fixtures = fixtures_of(bench.home).get(form.get("fixtures", ""))
+    words = plan_words(bench.home, kind, form, subject, template, fixtures)
     job = start_job(bench.home, kind="plan", title=" ".join(filter(None, (kind, subject))), words=words)
     return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)
 

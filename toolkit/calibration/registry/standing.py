@@ -135,7 +135,7 @@ def standing(
     if named is None:
         if on is None:
             raise TypeError("a record is chosen by its name or by the test's day")
-        record = registry.in_force(instrument, on=on, known_at=known_on)
+        record = registry.in_force(instrument, on=on, known_at=known_on, drafts=True)
     else:
         record = registry.load(named)
     reasons = _reasons(registry, record, instrument, on, known_on)

@@ -11,11 +11,13 @@ from typing import Any, Literal, get_args
 
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.inputs import RESULT_FILE, read_input
-from toolkit.lab.desk.holdings import PLAN
-from toolkit.lab.home import TEMPLATES
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.home import PLAN, TEMPLATES
 
 PLANS = "plans"
 """Folder of the home into which plans of the workbench are written."""
+FIXTURES = "fixtures"
+"""Folder of the home for files of loading fixtures; they may lie in the home itself too."""
 PlanKind = Literal["session", "test", "next", "interval"]
 KINDS: tuple[PlanKind, ...] = get_args(PlanKind)
 _NEEDED: Mapping[PlanKind, tuple[str, ...]] = {
@@ -32,10 +34,18 @@ _PICTURE = re.compile(r"next_\w{1,60}\.png")
 # Fields of a form by the option that each stands for; what may be said several times is parted by commas.
 _OPTIONS: Mapping[PlanKind, Mapping[str, str]] = {
     "session": {"minutes": "--minutes", "loads": "--loads", "criterion": "--criterion"},
-    "test": {"minutes": "--minutes"},
+    "test": {
+        "minutes": "--minutes",
+        "sliding": "--sliding",
+        "rise": "--rise",
+        "between_files": "--between-files",
+    },
     "next": {"budget": "--budget"},
     "interval": {"reliability": "--reliability", "tests": "--tests"},
 }
+_SWITCHES: Mapping[PlanKind, Mapping[str, str]] = {
+    "session": {"two_levels": "--two-levels"}, "test": {}, "next": {}, "interval": {},
+}  # fmt: skip
 _REPEATED: Mapping[PlanKind, Mapping[str, str]] = {
     "session": {"u": "--u"},
     "test": {"u": "--u", "load": "--load"},
@@ -84,14 +94,37 @@ def titles_of(kept: KeptPlan) -> dict[str, str]:
     return {value["name"]: title_of(value["name"]) for value in kept.answer.get("values", ())}
 
 
+def fixtures_of(home: Path) -> dict[str, str]:
+    """Return the loading fixtures of a home by id: those in it and in `FIXTURES` in it."""
+    from toolkit.declared import read
+    from toolkit.errors import ToolkitError
+    from toolkit.machine.loading import LoadingFixtures
+
+    places = {}
+    for folder in (home, home / FIXTURES):
+        for path in sorted(folder.glob("*.toml")) if not folder.is_symlink() else ():
+            try:
+                read(LoadingFixtures, path)
+            except ToolkitError:
+                continue
+            place = path.relative_to(home).as_posix()
+            places[holding_id(place)] = place
+    return places
+
+
 def plan_words(
-    home: Path, kind: PlanKind, form: Mapping[str, str], subject: str | None, template: str | None
+    home: Path,
+    kind: PlanKind,
+    form: Mapping[str, str],
+    subject: str | None,
+    template: str | None,
+    fixtures: str | None = None,
 ) -> tuple[str, ...]:
     """Return the command of a plan, in a folder of its own below ``plans/``.
 
     ``subject`` is the instrument of a session or an interval, the place in the home of the test that a test
-    is planned like (None: the published tire), or of the answer whose class a run is to part. Fields that
-    are left empty are left to the command.
+    is planned like (None: the published tire), or of the answer whose class a run is to part; ``fixtures``
+    the place of a session's loading fixtures. Fields that are left empty are left to the command.
 
     Raises
     ------
@@ -110,11 +143,14 @@ def plan_words(
         words += [f"./{subject}", "--isolated"]
     elif subject is not None:
         words += ["--like", f"./{subject}"]
+    if kind == "session" and fixtures is not None:
+        words += ["--fixtures", f"./{fixtures}"]
     stated = {field: form.get(field, "").strip() for field in form}
     for field, option in _OPTIONS[kind].items():
         if stated.get(field):
             # In one word with its option: what somebody typed is never an option of its own.
             words.append(f"{option}={stated[field]}")
+    words += [option for field, option in _SWITCHES[kind].items() if stated.get(field)]
     for field, option in _REPEATED[kind].items():
         parts = (part.strip() for part in stated.get(field, "").split(","))
         words += [f"{option}={part}" for part in parts if part]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import math
 import re
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
     from toolkit.findings import Finding
     from toolkit.planning.criteria import Criterion
+    from toolkit.planning.fixtures import FeasibleLoads
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template
 
@@ -52,11 +54,18 @@ _DEMAND = re.compile(r"\s*(\w+)\s*=\s*([-+0-9.eE]+)\s*(\S.*)?")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanOrder:
-    """What a session's plan is asked for; ``demands`` are texts such as ``FY=20 N``."""
+    """What a session's plan is asked for; ``demands`` are texts such as ``FY=20 N``.
+
+    ``calibration`` names a record in place of the one in force, ``machine`` a definition that states what can
+    be loaded, in place of the packaged one of the instrument's name.
+    """
 
     instrument: str
     session: Path | None = None
+    calibration: str | None = None
+    draft: bool = False
     fixtures: Path | None = None
+    machine: str | None = None
     demands: tuple[str, ...] = ()
     minutes: float | None = None
     loads: int | None = None
@@ -79,6 +88,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
     """
     from toolkit.declared import answer
     from toolkit.lab.plans.plan_sheets import session_sheet, sheet_text, write_plan
+    from toolkit.planning.knowledge import Knowledge
     from toolkit.planning.session_plan import plan_session
     from toolkit.planning.session_search import Demand
 
@@ -86,15 +96,16 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
         _refuse_filled(order.out)
     if order.minutes is not None and not (math.isfinite(order.minutes) and order.minutes > 0):
         raise _wrong("a time cannot be used", "--minutes", order.minutes, "minutes above 0")
-    record, loads, check, text = _basis(registry, order)
+    record, loads, check, text, notes = _basis(registry, order)
     demand = Demand(
         U=tuple(_demand(record, entry) for entry in order.demands), minutes=order.minutes,
         loads=order.loads, criterion=order.criterion, seed=order.seed, two_levels=order.two_levels,
     )  # fmt: skip
     if len({name for name, _ in demand.U}) < len(demand.U):
         raise _wrong("a load is asked for twice", "--u", ", ".join(order.demands), "each load once")
-    knowledge, feasible = _knowledge(record, loads, check, order)
-    plan = plan_session(knowledge, feasible, demand)
+    feasible = _feasible(record, loads, check, order)
+    plan = plan_session(Knowledge.of(record, loads, check), feasible, demand)
+    plan = dataclasses.replace(plan, findings=(*notes, *plan.findings))
     people = plan_text(plan, record)
     payload = answer(plan) | {"fixtures_refused": feasible.refused, "files": []}
     if order.out is not None:
@@ -107,27 +118,49 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
     return payload, people, list(plan.findings)
 
 
-def _knowledge(record: CalibrationRecord, loads: Table, check: Table | None, order: PlanOrder) -> Any:
+def _feasible(
+    record: CalibrationRecord, loads: Table, check: Table | None, order: PlanOrder
+) -> FeasibleLoads:
+    """Return what can be loaded: by a file of fixtures, else by the machine's definition, else as before."""
+    from toolkit.calibration.registry.judgement import machine_of
     from toolkit.declared import read
-    from toolkit.planning.fixtures import LoadingFixtures, loads_of_fixtures, loads_of_record
-    from toolkit.planning.knowledge import Knowledge
+    from toolkit.machine.loading import LoadingFixtures
+    from toolkit.planning.fixtures import loads_of_fixtures, loads_of_record
 
-    knowledge = Knowledge.of(record, loads, check)
-    if order.fixtures is None:
-        return knowledge, loads_of_record(record, [loads] + ([] if check is None else [check]))
-    stated = read(LoadingFixtures, order.fixtures)
-    if stated.instrument != record.instrument:
+    machine = machine_of(record.instrument, order.machine)
+    rated = {} if machine is None else dict(machine.rated_loads)
+    if order.fixtures is not None:
+        stated = read(LoadingFixtures, order.fixtures)
+        if stated.instrument != record.instrument:
+            raise _wrong(
+                "the fixtures are another instrument's", order.fixtures, stated.instrument, record.instrument
+            )
+        return loads_of_fixtures(stated, record, order.fixtures, rated)
+    if machine is not None and machine.loading is not None:
+        where = order.machine or f"the machine definition {machine.name}"
+        return loads_of_fixtures(machine.loading, record, where, rated)
+    if order.machine is not None:
         raise _wrong(
-            "the fixtures are another instrument's", order.fixtures, stated.instrument, record.instrument
-        )
-    return knowledge, loads_of_fixtures(stated, record, order.fixtures)
+            "the machine definition states no fixtures", order.machine, "no [loading]",
+            "[loading] with one [[loading.fixture]] or more, as docs/formats/machine_definition.md has it",
+        )  # fmt: skip
+    return loads_of_record(record, [loads] + ([] if check is None else [check]))
 
 
-def _basis(registry: Registry, order: PlanOrder) -> tuple[CalibrationRecord, Table, Table | None, bytes]:
-    """Return record, reference loads, check loads and the session's text that a plan starts from."""
+def _basis(
+    registry: Registry, order: PlanOrder
+) -> tuple[CalibrationRecord, Table, Table | None, bytes, tuple[Finding, ...]]:
+    """Return record, reference and check loads, the session's text, and what is said against the record."""
     from toolkit.calibration.control.calibrate import rehearse
+    from toolkit.calibration.registry.standing import standing
     from toolkit.calibration.registry.stored import stored_check, stored_loads, stored_session
+    from toolkit.findings import Finding
 
+    if order.session is not None and order.calibration is not None:
+        raise _wrong(
+            "a plan starts from a session or from a record", "--session, --calibration",
+            f"{order.session}, {order.calibration}", "one of them",
+        )  # fmt: skip
     if order.session is not None:
         candidate = rehearse(order.session, registry)
         session = candidate.fit.session
@@ -135,8 +168,15 @@ def _basis(registry: Registry, order: PlanOrder) -> tuple[CalibrationRecord, Tab
             raise _wrong(
                 "the session is another instrument's", order.session, session.instrument, order.instrument
             )
-        return candidate.record, session.table, session.check, session.session_bytes
-    record = registry.in_force(order.instrument, on=order.on or registry.today(), known_at=order.known_at)
+        return candidate.record, session.table, session.check, session.session_bytes, ()
+    stands = standing(
+        registry, order.instrument, on=order.on or registry.today(), known_at=order.known_at,
+        named=order.calibration,
+    )  # fmt: skip
+    # A session is planned from a record that has expired too: that is when it is due.
+    reasons = () if order.calibration is None else stands.use(draft=order.draft).draft_reasons
+    record = stands.record
+    notes = tuple(Finding(rule="draft", where=record.id, level="note", message=text) for text in reasons)
     loads = stored_loads(registry.folder, record)
     if loads is None:
         raise ConfigError(
@@ -145,7 +185,7 @@ def _basis(registry: Registry, order: PlanOrder) -> tuple[CalibrationRecord, Tab
             next_step="plan from a session of its kind with --session", rule="plan-record",
         )  # fmt: skip
     session = stored_session(registry.folder, record)
-    return record, loads, stored_check(registry.folder, record), session.session_bytes
+    return record, loads, stored_check(registry.folder, record), session.session_bytes, notes
 
 
 def _demand(record: CalibrationRecord, text: str) -> tuple[str, float]:
