@@ -15,7 +15,7 @@ from toolkit.channels import signs
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
-from toolkit.tires.conditions import Selection, of_one_condition
+from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.global_data import CHANNELS, Measured, binned, cell, what_varies
 from toolkit.tires.global_model import (
     GlobalFit,
