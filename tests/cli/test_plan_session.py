@@ -194,6 +194,10 @@ def test_a_cell_of_one_load_is_planned_too(home: Path, tmp_path: Path, model: st
         (("m15-virtual", "--criterion", "A"), "usage"),
         (("m15",), "plan-record"),
         (("nobody",), None),
+        (("m15-virtual", "--machine", "m15-virtual"), "plan-demand"),
+        (("m15-virtual", "--machine", "m15"), "unknown-machine"),
+        (("m15-virtual", "--calibration", "m15-virtual-r1", "--session", "x.toml"), "plan-demand"),
+        (("m15-virtual", "--calibration", "m15-r1", "--draft"), "plan-record"),
     ],
 )
 def test_what_cannot_be_planned_is_an_error(
@@ -205,3 +209,67 @@ def test_what_cannot_be_planned_is_an_error(
     assert rule is None or error["rule"] == rule
     assert error["next_step"]
     assert not out.exists()
+
+
+LOADING = """name = "cell"
+extends = "m15"
+title = "cell"
+kind = "real"
+[loading]
+run_minutes = 5
+[[loading.fixture]]
+name = "lateral pull"
+per_newton = { FY = 1.0 }
+weights = { value = [250, 500, 750, 1000], unit = "N" }
+minutes = 1.5
+"""
+
+
+def candidate(folder: Path) -> Path:
+    """Return a home with a record of a cell that nobody has approved."""
+    rng = np.random.default_rng(5)
+    rows = [
+        f"{force / 500 + 1e-4 * rng.normal():.7f},{force},{run},{way}"
+        for run in (1, 2, 3)
+        for way, forces in (("up", range(0, 1001, 100)), ("down", range(900, -1, -100)))
+        for force in forces
+    ]
+    (folder / "loads.csv").write_text("\n".join(["S [mV/V],FY [N],run,direction", *rows]) + "\n")
+    (folder / "SESSION.toml").write_text(
+        'schema = 1\ninstrument = "cell"\ndate = 2026-01-05\noperator = "A"\nindications = ["S"]\n'
+        'loads = ["FY"]\ndata = "loads.csv"\n'
+    )
+    toolkit("init", folder / "lab")
+    toolkit("calibrate", folder / "SESSION.toml", "--home", folder / "lab", code=None)
+    return folder / "lab"
+
+
+def test_a_machine_definition_states_what_can_be_loaded(tmp_path: Path) -> None:
+    home, machine = candidate(tmp_path), tmp_path / "cell.toml"
+    machine.write_text(LOADING)
+    plan = ("plan", "session", "cell", "--calibration", "cell-r1", "--draft", "--home", home, "--json")
+    answer = json.loads(toolkit(*plan, "--machine", machine, code=None).stdout)
+    assert {row["mount"] for row in answer["rows"]} <= {"", "lateral pull, +", "lateral pull, -"}
+    assert {abs(row["loads"][0]) for row in answer["rows"]} <= {0, 250, 500, 750, 1000}
+    assert answer["minutes"] > answer["runs"] * 5
+    fixtures = tmp_path / "fixtures.toml"
+    fixtures.write_text('instrument = "cell"\n' + LOADING.split("[loading]")[1].replace("loading.", ""))
+    by_file = json.loads(toolkit(*plan, "--fixtures", fixtures, code=None).stdout)
+    assert by_file["rows"] == answer["rows"]
+
+
+def test_a_plan_from_a_candidate_is_a_draft_that_is_asked_for(tmp_path: Path) -> None:
+    home = candidate(tmp_path)
+    refused = toolkit("plan", "session", "cell", "--home", home, code=2)
+    assert "--calibration ID --draft" in refused.stderr
+    named = toolkit("plan", "session", "cell", "--calibration", "cell-r1", "--home", home, code=2)
+    assert "add --draft" in named.stderr
+    said = toolkit(
+        "plan", "session", "cell", "--calibration", "cell-r1", "--draft", "--home", home, "--json", code=None
+    )
+    findings = json.loads(said.stdout)["findings"]
+    assert next((finding["rule"], finding["level"]) for finding in findings) == ("draft", "note")
+    # What has no such option does not advise it.
+    due = toolkit("plan", "interval", "cell", "--home", home, code=2)
+    assert "approve" in due.stderr
+    assert "--draft" not in due.stderr

@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from toolkit.comparison.compare import DEFAULT_ANGLES
-from toolkit.comparison.maker_table import is_characteristics_table, maker_characteristics, maker_rows
+from toolkit.comparison.maker_table import (
+    is_characteristics_table,
+    maker_characteristics,
+    maker_conditions,
+    maker_rows,
+)
 from toolkit.errors import ToolkitError
 
 # A tire in SAE axes: FY = -D sin(C arctan(B SA)), MZ = Dm sin(Cm arctan(Bm SA)); D and Dm grow with the load.
@@ -217,3 +222,24 @@ def test_a_real_table_of_a_hundred_hertz_compares_with_a_thinned_copy_of_itself(
         assert abs(one.value - other.value) < math.hypot(U, V)
     values = [one.value for one in slopes[0]]
     assert values == sorted(values)  # the cornering stiffness grows with the load up to the rated one
+
+
+@pytest.mark.parametrize(("column", "value"), [("IA [deg]", "3"), ("KAPPA [1]", "0.05")])
+def test_a_table_of_another_condition_than_a_test_has_is_refused(
+    tmp_path: Path, column: str, value: str
+) -> None:
+    path = table(tmp_path / "m.csv", header=f"SA [deg],FZ [N],FY [N],MZ [N*m],{column}", more=f",{value}")
+    with pytest.raises(ToolkitError) as caught:
+        maker_rows(path, axes="SAE", angles_rad=DEFAULT_ANGLES, identity="m")
+    assert caught.value.exit_code == 2
+    assert caught.value.rule in ("table-varies", "no-pure-slip")
+
+
+def test_a_table_states_its_pressure_and_speed(tmp_path: Path) -> None:
+    header = "SA [deg],FZ [N],FY [N],MZ [N*m],P [bar],V [km/h]"
+    path = table(tmp_path / "m.csv", header=header, more=",2.6,60")
+    assert dict(maker_conditions(path, axes="SAE")) == {"pressure": "260.0 kPa", "speed": "60.00 km/h"}
+    assert dict(maker_conditions(table(tmp_path / "bare.csv"), axes="SAE")) == {
+        "pressure": None,
+        "speed": None,
+    }

@@ -9,8 +9,10 @@ import pytest
 
 from toolkit.declared import read
 from toolkit.errors import ConfigError
-from toolkit.planning.fixtures import FeasibleLoads, LoadingFixtures, loads_of_fixtures
+from toolkit.machine.loading import LoadingFixtures
+from toolkit.planning.fixtures import FeasibleLoads, loads_of_fixtures
 from toolkit.planning.knowledge import Knowledge
+from toolkit.units import to_si
 
 TEXT = """schema = 1
 instrument = "m15-virtual"
@@ -89,3 +91,20 @@ def test_an_empty_list_of_fixtures_is_refused(tmp_path: Path, knowledge: Knowled
     with pytest.raises(ConfigError) as refused:
         made(tmp_path, knowledge, 'schema = 1\ninstrument = "m15-virtual"\nfixture = []\n')
     assert "fixture" in str(refused.value)
+
+
+def test_a_load_far_beyond_what_was_put_on_is_left_out(tmp_path: Path, knowledge: Knowledge) -> None:
+    text = TEXT.replace('[limit]\nFY = { value = 4448.2216152605, unit = "N" }\n', "")
+    largest = knowledge.record.load("FY").largest
+    assert 1500 < 1.1 * largest < 20_000
+    feasible = made(tmp_path, knowledge, text.replace("1500]", "1500, 20000]"))
+    assert np.abs(feasible.loads[:, 0]).max() == pytest.approx(1500)
+    assert feasible.refused == 2
+    stated = read(LoadingFixtures, tmp_path / "fixtures.toml")
+    rated = loads_of_fixtures(stated, knowledge.record, "rig", {"FY": to_si(1000.0, "lbf")})
+    assert np.abs(rated.loads[:, 0]).max() == pytest.approx(1000)
+
+
+def test_a_load_of_zero_has_no_sign(tmp_path: Path, knowledge: Knowledge) -> None:
+    loads = made(tmp_path, knowledge).loads
+    assert not np.signbit(loads[loads == 0]).any()

@@ -39,7 +39,7 @@ def findings(
         lines += [",".join(f"{one:.6g}" for one in row) for row in rows]
     path.write_text("\n".join(lines))
     table = read_table(path)
-    found = fit_table(table, (MODEL,)).findings
+    found = fit_table(table, MODEL).findings
     return [(one.rule, one.where) for one in found if one.rule.startswith("implausible")]
 
 
@@ -76,7 +76,7 @@ def test_a_slope_that_the_data_do_not_determine_is_not_judged(tmp_path: Path) ->
     path = tmp_path / "t.csv"
     rows = [f"{one:.3f},1000,{-0.02 * one:.4f}" for one in np.linspace(4, 10, 30)]
     path.write_text("\n".join(["SA [deg],FZ [N],FY [N]", *rows]))
-    fits = fit_table(read_table(path), (MODEL,)).fits
+    fits = fit_table(read_table(path), MODEL).fits
     assert fits[0].slope_at_zero is None
     assert size_findings(fits, "t.csv") == ()
 

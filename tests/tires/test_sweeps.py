@@ -83,3 +83,18 @@ def test_axes_by_word_and_what_is_no_sweep(tmp_path: Path) -> None:
     with pytest.raises(ToolkitError) as caught:
         split(read_field_file(write_mat(tmp_path / "few.mat", few)))
     assert caught.value.rule == "no-curve"
+
+
+def test_speeds_are_conditions_of_their_own(tmp_path: Path) -> None:
+    slow, fast = belt_test(), belt_test()
+    fast["V"], fast["FY"], fast["ET"] = 2 * fast["V"], 0.9 * fast["FY"], fast["ET"] + 2 * fast["ET"][-1]
+    both = {name: np.concatenate([slow[name], fast[name]]) for name in slow}
+    sweeps = split_file(write_mat(tmp_path / "run.mat", both))
+    assert {round((s.speed_m_s or 0) * 3.6) for s in sweeps.sweeps} == {40, 80}
+    assert sum(s.direction == "up" for s in sweeps.sweeps) == 2 * len(CONDITIONS)
+    table = sweeps.table
+    near = np.abs(table["SA"]) < np.radians(1.0)
+    for speed, factor in ((40, 1.0), (80, 0.9)):
+        rows = near & (np.rint(table["V"] * 3.6) == speed)
+        expected = factor * truth(table["SA"], table["FZ"], table["IA"], table["P"])
+        assert abs(np.mean((table["FY"] - expected)[rows])) < 5.0

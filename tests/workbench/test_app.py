@@ -96,7 +96,7 @@ def test_a_record_is_approved_by_the_keyboard_alone(browser: BrowserContext, own
     page.keyboard.press("Enter")
     page.wait_for_url("**/record/cell-r7")
     settled(page)
-    assert page.locator(".chart canvas").count() == 2
+    assert page.locator(".curves canvas").count() == 2
     page.get_by_label("Checked by").focus()
     page.keyboard.type("B")
     page.keyboard.press("Enter")

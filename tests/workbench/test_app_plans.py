@@ -32,7 +32,7 @@ def test_an_interval_is_planned_by_the_keyboard(browser: BrowserContext, own: Se
     page.wait_for_url("**/plan/*")
     settled(page)
     expect(page.locator("[data-plan]")).to_contain_text("days")
-    assert page.locator(".chart canvas").count() == 1
+    assert page.locator(".curves canvas").count() == 1
     page.close()
 
 

@@ -19,8 +19,8 @@ from tests.workbench.test_jobs_page import done
 from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import ConfigError, UnreadableError
-from toolkit.lab.holdings import holding_id
-from toolkit.lab.kept_plans import plan_words, read_plan
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.kept_plans import fixtures_of, plan_words, read_plan
 
 ANSWER = holding_id("diagnoses/late")
 FORMS: dict[str, dict[str, str]] = {
@@ -139,10 +139,25 @@ def test_what_somebody_types_is_never_an_option_of_its_own(tmp_path: Path) -> No
         "plan", "session", "cell", "--minutes=--home", "--criterion=D", "--u=--out=/etc", "--u=FY=1 N",
         "--out", "plans/plan-1", "--home", ".",
     )  # fmt: skip
+    tread = {"sliding": "150", "rise": "20", "between_files": "45"}
+    assert plan_words(tmp_path, "test", tread, None, None)[2:5] == (
+        "--sliding=150", "--rise=20", "--between-files=45"
+    )  # fmt: skip
+    both = plan_words(tmp_path, "session", {"two_levels": "1"}, "cell", None, "fixtures/rig.toml")
+    assert both[3:6] == ("--fixtures", "./fixtures/rig.toml", "--two-levels")
+    assert "--two-levels" not in plan_words(tmp_path, "session", {"two_levels": ""}, "cell", None)
     (tmp_path / "plans" / "plan-7").mkdir(parents=True)
     assert "plans/plan-8" in plan_words(tmp_path, "test", {}, None, "plan.docx")
     with pytest.raises(ConfigError):
         plan_words(tmp_path, "interval", {}, None, None)
+
+
+def test_a_home_has_the_fixtures_that_can_be_read(tmp_path: Path) -> None:
+    text = 'instrument = "cell"\n[[fixture]]\nname = "pull"\nper_newton = { FY = 1.0 }\n'
+    (tmp_path / "fixtures").mkdir()
+    (tmp_path / "fixtures" / "rig.toml").write_text(text + 'weights = { value = [100], unit = "N" }\n')
+    (tmp_path / "half.toml").write_text(text)
+    assert fixtures_of(tmp_path) == {holding_id("fixtures/rig.toml"): "fixtures/rig.toml"}
 
 
 @pytest.mark.parametrize(

@@ -35,8 +35,10 @@ def test_the_fit_is_that_of_report(served: Served, capsys: Capture) -> None:
         for key in ("residual", "leverage", "cook", "external"):
             assert set(load["rows"][key]) <= set(values)
         assert load["press"] in values
-        drawn = json.loads(part.body.split('data-chart="')[1].split('"')[0].replace("&#34;", '"'))
-        assert len(drawn["data"]) == len(drawn["series"]) + 1
+        drawn = json.loads(part.body.split('data-curves="')[1].split('"')[0].replace("&#34;", '"'))
+        points = [(x, y) for series in drawn["series"] for x, y in zip(series["x"], series["y"], strict=True)]
+        own = next(load["rows"] for load in report["loads"].values())
+        assert sorted(points) == sorted(zip(own["reference"], own["residual"], strict=True))
 
 
 def test_the_budget_is_that_of_budget(served: Served, capsys: Capture) -> None:
@@ -176,7 +178,7 @@ def test_every_rule_that_a_gate_names_is_in_the_table() -> None:
     from pathlib import Path
 
     import toolkit.calibration.registry.gates as gates
-    from toolkit.lab.gates_answer import GATES
+    from toolkit.lab.records.gates_answer import GATES
 
     folder = Path(gates.__file__).parent
     named = {

@@ -17,7 +17,7 @@ import pytest
 from tests.workbench.conftest import ROOT, Answer, Served, plain, serving
 from tests.workbench.test_home_page import command
 from toolkit.estimate import plus_minus
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk.holdings import holding_id
 
 Capture = pytest.CaptureFixture[str]
 ONE, TWO = holding_id("tests/one"), holding_id("tests/two")
@@ -65,7 +65,7 @@ def test_points_are_those_of_process_with_U_of_the_whole_budget(tested: Served, 
         (x, y) for s in gough["series"] if not s.get("line") for x, y in zip(s["x"], s["y"], strict=True)
     ]
     assert sorted(points) == sorted((c["MZ_common_Nm"], c["FY_common_N"]) for c in used)
-    assert {(s["load"], s["rotation"]) for s in FY["series"]} == {
+    assert {(s["condition"]["load"], s["condition"]["rotation"]) for s in FY["series"]} == {
         (load, rotation) for load in range(5) for rotation in ("forward", "reverse")
     }
 
@@ -73,7 +73,7 @@ def test_points_are_those_of_process_with_U_of_the_whole_budget(tested: Served, 
 def test_a_fitted_curve_passes_where_process_says_it_does(tested: Served, capsys: Capture) -> None:
     answer = command(capsys, "process", tested.home / "tests" / "one", "--home", tested.home)
     FY = curves(tested.page(f"/test/{ONE}/part/results"))[0]
-    lines = {(s["load_N"], s["rotation"]): s for s in FY["series"] if s.get("line")}
+    lines = {(s["condition"]["load_N"], s["condition"]["rotation"]): s for s in FY["series"] if s.get("line")}
     for row in answer["characteristics"]["at_angles"]:
         line = lines[row["load_N"], row["rotation"]]
         angle = row["SA_rad"] * 57.29577951308232

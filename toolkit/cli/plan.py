@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import KnownAt, Output, RegistryOptions, day, into_folder
+from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_folder
 from toolkit.errors import ConfigError
 
 app = typer.Typer(help="Plans: what to measure next: sessions, tests, runs, intervals.", no_args_is_help=True)
@@ -27,7 +27,7 @@ SheetTemplate = Annotated[
 
 
 @app.command("session")
-@answers("toolkit.lab.plan_session:PlanSessionAnswer")
+@answers("toolkit.lab.plans.plan_session:PlanSessionAnswer")
 def session(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as rig: its record in force is the basis.")
@@ -35,12 +35,26 @@ def session(
     session_file: Annotated[
         Path | None, typer.Option("--session", metavar="FILE", help="SESSION.toml to plan from instead.")
     ] = None,
+    calibration: Annotated[
+        str | None,
+        typer.Option("--calibration", help="Record id to plan from; default: the one in force."),
+    ] = None,
+    draft: Draft = False,
     fixtures: Annotated[
         Path | None,
         typer.Option(
             "--fixtures",
             metavar="FILE",
-            help="Loading fixtures (.toml): weights, arms, minutes; default: the loads of the last session.",
+            help="Loading fixtures (.toml): weights, arms, minutes; default: the machine definition's, "
+            "else the loads of the last session.",
+        ),
+    ] = None,
+    machine: Annotated[
+        str | None,
+        typer.Option(
+            "--machine",
+            help="Machine definition whose [loading] states the fixtures; default: the packaged one of the "
+            "instrument's name.",
         ),
     ] = None,
     demands: Annotated[
@@ -90,7 +104,7 @@ def session(
     Example: toolkit plan session rig --u "FY=1.2 N" --out next
     """
     from toolkit.lab.home import document_template
-    from toolkit.lab.plan_session import PlanOrder, session_plan_answer
+    from toolkit.lab.plans.plan_session import PlanOrder, session_plan_answer
     from toolkit.planning.criteria import CRITERIA
 
     if criterion not in CRITERIA:
@@ -100,7 +114,8 @@ def session(
         )  # fmt: skip
     started = time.perf_counter()
     order = PlanOrder(
-        instrument=instrument, session=session_file, fixtures=fixtures, demands=tuple(demands or ()),
+        instrument=instrument, session=session_file, calibration=calibration, draft=draft,
+        fixtures=fixtures, machine=machine, demands=tuple(demands or ()),
         minutes=minutes, loads=loads, criterion=criterion, two_levels=two_levels, seed=seed, on=day(on),
         known_at=day(known_at), out=out, template=document_template(template, out),
     )  # fmt: skip
@@ -116,7 +131,7 @@ def sheet_code(payload: Mapping[str, Any]) -> int:
 
 
 @app.command("interval")
-@answers("toolkit.lab.plan_interval:PlanIntervalAnswer")
+@answers("toolkit.lab.plans.plan_interval:PlanIntervalAnswer")
 def interval(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as rig: by the history of its check loads.")
@@ -149,7 +164,7 @@ def interval(
     Example: toolkit plan interval rig --reliability 0.95 --tests 200
     """
     from toolkit.lab.home import document_template
-    from toolkit.lab.plan_interval import interval_plan_answer
+    from toolkit.lab.plans.plan_interval import interval_plan_answer
 
     started = time.perf_counter()
     payload, text, findings = interval_plan_answer(

@@ -188,11 +188,13 @@ def _findings(
     findings = []
     tests = [entry for entry in entries if entry.kind == "test"]
     for name in _WATCHED:
-        values = {entry.label: entry.condition(name) for entry in tests}
+        stating = [entry for entry in entries if entry.kind == "test" or entry.condition(name)]
+        values = {entry.label: entry.condition(name) for entry in stating}
         if name in _SUBJECT[mode] or len(set(values.values())) < 2:
             continue
         values_by_test = ", ".join(f"{label}: {value or 'not stated'}" for label, value in values.items())
-        message = f"the tests differ in {name} ({values_by_test}): a difference may come from it"
+        what = "tests" if len(stating) == len(tests) else "tests and tables"
+        message = f"the {what} differ in {name} ({values_by_test}): a difference may come from it"
         findings.append(Finding(rule="conditions-differ", where=name, message=message, level="note"))
     outliers: dict[str, list[str]] = {}
     for precision in repeats.precisions if repeats else ():

@@ -39,6 +39,7 @@ from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.machine import TypeB
 from toolkit.reduction.model import Condition
+from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
 from toolkit.tires.plausibility import demand_possible
@@ -221,10 +222,6 @@ def _refuse(path: Path, rule: str, problem: str, actual: str, expected: str) -> 
     )
 
 
-# What a table may vary that a free-rolling, upright test does not.
-_ONE_VALUE = {"IA": ("deg", 0.1), "P": ("kPa", 5.0), "V": ("km/h", 5.0), "KAPPA": ("1", 0.005)}
-
-
 def maker_rows(
     path: Path, *, axes: str, angles_rad: Sequence[float], identity: str
 ) -> tuple[tuple[Row, ...], tuple[Finding, ...]]:
@@ -233,7 +230,7 @@ def maker_rows(
     Raises
     ------
     FitError
-        not one curve of the table can be fitted, or the table varies camber, pressure or speed
+        not one curve of the table can be fitted, or the table has rows that a test has not
     CellError
         a value that no tire has, as of a wrong unit
     ToolkitError
@@ -355,17 +352,26 @@ def _check_possible(table: TireTable) -> None:
 
 
 def _check_one_condition(table: TireTable) -> None:
-    for symbol, (si_unit, room) in _ONE_VALUE.items():
-        values = table.get(symbol)
-        if values is None:
-            continue
-        printed = from_si(values, si_unit)
-        if float(np.ptp(printed)) > 2 * room:
-            raise FitError(
-                f"the table varies {symbol}; a test is compared at one value of it",
-                where=table.path,
-                got=f"{float(printed.min()):.4g} to {float(printed.max()):.4g} {si_unit}",
-                expected=f"one {symbol}, the test's",
-                next_step="keep the rows of the test's conditions in a table of their own",
-                rule="table-varies",
-            )
+    # A test rolls freely and upright, at one pressure and speed: no other rows can be held against it.
+    selection = of_one_condition(dict(table.columns), (), rows=len(table["SA"]))
+    if departs := (*selection.apart, *selection.stands):
+        raise FitError(
+            "the table has rows at other conditions than a test has",
+            where=table.path,
+            got="; ".join(departs),
+            expected="one condition, the test's: freely rolling, upright, one pressure and speed",
+            next_step="keep the rows of the test's conditions in a table of their own",
+            rule="table-varies",
+        )
+
+
+def maker_conditions(path: Path, *, axes: str) -> tuple[tuple[str, str | None], ...]:
+    """Return the pressure and the speed that a table of forces has, as a test states its own."""
+    table = read_table(path, axes=axes)
+    stated = (("pressure", "P", "kPa", 1), ("speed", "V", "km/h", 2))
+    medians = {name: None if (column := table.get(name)) is None else np.median(np.abs(column))
+               for _, name, _, _ in stated}  # fmt: skip
+    return tuple(
+        (what, None if (si := medians[name]) is None else f"{float(from_si(si, unit)):.{digits}f} {unit}")
+        for what, name, unit, digits in stated
+    )

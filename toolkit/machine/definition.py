@@ -33,6 +33,7 @@ from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine.correction import Correction
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.machine.hub import Hub
+from toolkit.machine.loading import Loading
 from toolkit.machine.protocol import Protocol
 from toolkit.units import unit
 
@@ -282,6 +283,9 @@ class Machine:
         tuple[tuple[str, float], ...], Keyed(), Unit("N", "N*m"), Above(0),
         Entry("rated value by load", key="rated_load", example={"FY": {"value": 6000, "unit": "N"}}),
     ] = ()  # fmt: skip
+    loading: Annotated[
+        Loading | None, Entry("fixtures that calibrate its cells: what `toolkit plan session` may load")
+    ] = None
     protocol: Annotated[Protocol, Entry("the machine's default; a test may name another one")]
     type_b: Annotated[
         tuple[TypeB, ...], Keyed("symbol"), Names(*_STATED),

@@ -1,14 +1,15 @@
-"""What a laboratory can load: its fixtures, declared once, and the loads that they make."""
+"""What a laboratory can load: the loads that its fixtures make, or those of the last session."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.declared import Above, AtLeast, Distinct, Entry, Fault, Format, Keyed, Quantity, Size, Unit
+from toolkit.declared import Quantity
 from toolkit.errors import ConfigError
 from toolkit.units import unit
 
@@ -19,55 +20,11 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.session.table import Table
+    from toolkit.machine.loading import Loading
 
+_NONE: Mapping[str, float] = MappingProxyType({})
+_BEYOND = 1.1  # of the largest load that was put on: further the record says nothing of the cells
 _SAME_DIRECTION = 0.02  # of a load that was put on before, in parts of the largest: as read, not as meant
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fixture:
-    """A way to hang weights: the loads that a newton makes, and the weights that can hang there."""
-
-    name: Annotated[str, Entry("as the operator knows it", example="lateral pull")]
-    per_newton: Annotated[
-        tuple[tuple[str, float], ...], Keyed(), Size(1),
-        Entry("load by newton of weight: 1 for a force, the lever arm in metres for a moment",
-              example={"FY": 1.0}),
-    ]  # fmt: skip
-    weights_N: Annotated[
-        tuple[float, ...], Unit("N"), Above(0), Size(1), Distinct(),
-        Entry("what can hang there, all that hangs counted", key="weights",
-              example={"value": [500, 1000], "unit": "N"}),
-    ]  # fmt: skip
-    both: Annotated[bool, Entry("whether it can be turned to pull the other way")] = True
-    minutes: Annotated[float, AtLeast(0), Entry("from one reading to the next")] = 2.0
-    setup_minutes: Annotated[float, AtLeast(0), Entry("to mount it, each time and each way")] = 10.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoadingFixtures:
-    """The fixtures of an instrument's calibration."""
-
-    FORMAT: ClassVar[Format] = Format(title="loading fixtures", schema=1)
-
-    instrument: Annotated[str, Entry("what they calibrate", example="rig")]
-    run_minutes: Annotated[float, AtLeast(0), Entry("before every run: preload, rest, zero")] = 10.0
-    limits: Annotated[
-        tuple[tuple[str, float], ...], Keyed(), Unit("N", "N*m"), Above(0),
-        Entry("largest load that may be put on, by load", key="limit",
-              example={"FY": {"value": 6000, "unit": "N"}}),
-    ] = ()  # fmt: skip
-    fixtures: Annotated[
-        tuple[Fixture, ...], Size(1), Distinct("name"), Entry("one entry a fixture", key="fixture")
-    ]
-
-    def faults(self) -> Iterator[Fault]:
-        """Yield a fixture that makes no load at all."""
-        for number, fixture in enumerate(self.fixtures):
-            if not any(arm for _, arm in fixture.per_newton):
-                yield Fault(
-                    key=("fixture", number, "per_newton"), got=dict(fixture.per_newton),
-                    expected="a load that is not zero", what="the fixture makes no load",
-                )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,7 +33,8 @@ class FeasibleLoads:
 
     ``loads`` (candidates, loads) in the record's units; ``mount`` (candidates,) names the fixture and its
     way, "" of the empty hub; ``amount`` (candidates,) orders the loads of a mount by size, ``label`` says
-    them. ``minutes`` (candidates,) and ``setup_minutes`` are None where nobody stated them.
+    them. ``minutes`` (candidates,) and ``setup_minutes`` are None where nobody stated them; ``refused``
+    loads of the fixtures were beyond a limit.
     """
 
     source: str
@@ -101,8 +59,13 @@ class FeasibleLoads:
         return np.flatnonzero(below)
 
 
-def loads_of_fixtures(stated: LoadingFixtures, record: CalibrationRecord, path: Path) -> FeasibleLoads:
+def loads_of_fixtures(
+    stated: Loading, record: CalibrationRecord, path: Path | str, rated: Mapping[str, float] = _NONE
+) -> FeasibleLoads:
     """Return the loads of declared fixtures in the record's units.
+
+    A load may be as large as its stated limit, else as the instrument's rated one [N, N*m], else a tenth
+    above the largest of the record.
 
     Raises
     ------
@@ -121,7 +84,11 @@ def loads_of_fixtures(stated: LoadingFixtures, record: CalibrationRecord, path: 
             expected=", ".join(names), next_step="name the record's loads; nothing was written",
             rule="plan-fixtures",
         )  # fmt: skip
-    limits = np.array([dict(stated.limits).get(name, np.inf) / scale[name] for name in names])
+    bounds = {**rated, **dict(stated.limits)}
+    limits = np.array(
+        [bounds[fit.load] / scale[fit.load] if fit.load in bounds else _BEYOND * fit.largest
+         for fit in record.loads]
+    )  # fmt: skip
     rows, mounts, labels, amounts, minutes = [np.zeros(len(names))], [""], ["no load"], [0.0], [0.0]
     setup: dict[str, float] = {}
     refused = 0
@@ -130,7 +97,7 @@ def loads_of_fixtures(stated: LoadingFixtures, record: CalibrationRecord, path: 
         for sign in (1.0, -1.0)[: 2 if fixture.both else 1]:
             mount = fixture.name + ("" if not fixture.both else ", +" if sign > 0 else ", -")
             for weight in sorted(fixture.weights_N):
-                load = sign * arms * weight
+                load = sign * arms * weight + 0.0  # no -0 in anything that is written
                 if (np.abs(load) > limits * (1 + 1e-9)).any():
                     refused += 1
                     continue
@@ -143,7 +110,11 @@ def loads_of_fixtures(stated: LoadingFixtures, record: CalibrationRecord, path: 
     if len(rows) == 1:
         raise ConfigError(
             "the limits leave no weight of any fixture", where=path,
-            got=f"{refused} loads, each beyond a limit", expected="lighter weights, or higher limits",
+            got=f"{refused} loads, each beyond a limit",
+            expected="loads of at most "
+            + ", ".join(
+                f"{fit.load} {limit:.4g} {fit.unit}" for fit, limit in zip(record.loads, limits, strict=True)
+            ),
             next_step="state weights that the instrument may bear; nothing was written", rule="plan-fixtures",
         )  # fmt: skip
     minutes[0] = float(np.mean(minutes[1:]))

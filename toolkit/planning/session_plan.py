@@ -229,6 +229,8 @@ class _Finished:
             lines.append(f"no misfit of the equation of {blind} can be seen: the loads have too few levels")
         if fewer > 0:
             lines.append(f"{fewer} readings fewer than {self.knowledge.record.id}: an outlier weighs more")
+        if self.feasible.refused:
+            lines.append(f"{self.feasible.refused} loads of the fixtures, each beyond a limit")
         if wider:
             lines.append(f"U is wider than by the last session's loads: {', '.join(wider)}")
         return tuple(lines)

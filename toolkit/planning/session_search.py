@@ -30,6 +30,7 @@ SLACK = 1.05
 """Today's U times this is asked for where nothing else is: a twentieth is no second digit of U."""
 _SEARCH_STARTS, _FINAL_STARTS = 1, 4
 _LARGE = 0.5  # of the largest load
+_SAME = 1e-9
 _SHARES = (1.0, 0.3, 0.1)  # of what a minute is worth: as few mounts as the runs' differences allow
 FEWEST_LEVELS, FEWEST_REPEATS = 3, 3
 _MISFITS = (1.0, 3.0, 10.0, 30.0)  # times the misfit that is allowed for, until it is seen
@@ -69,7 +70,7 @@ class Design:
     @property
     def text(self) -> str:
         """How many loads, runs and minutes it takes."""
-        time = "" if self.minutes is None else f", {self.minutes:.0f} minutes"
+        time = "" if self.minutes is None else f", {math.ceil(self.minutes - _SAME)} minutes"
         return f"{len(self.run)} loads in {self.runs} runs{time}"
 
 
@@ -309,7 +310,8 @@ class SessionSearch:
             budget.components, key=lambda component: 0.0 if component.name == "fit" else component.u
         )
         raise ConfigError(
-            "no number of loads reaches the uncertainty", where="--u", got=self._asked_text(),
+            "no number of loads reaches the uncertainty", where="--u",
+            got=self._asked_text() + ("" if self.demand.U else ": today's, within a twentieth"),
             expected=f"nearest: {self._U_text(best)} by {best.text}",
             next_step=f"allow that, or lower what more loads cannot: of {budget.load} it is the "
             f"{holding.name}, {100 * budget.share(holding):.0f} % of the variance",
@@ -384,8 +386,9 @@ class SessionSearch:
         return self.design(runs, low)
 
     def _U_text(self, design: Design) -> str:
+        """Return what a design reaches, rounded up: who asks for that has it."""
         return ", ".join(
-            f"{fit.load} {U:.3g} {fit.unit}"
+            f"{fit.load} {_up(U):.3g} {fit.unit}"
             for fit, U in zip(self.knowledge.record.loads, design.U.tolist(), strict=True)
         )
 
@@ -395,3 +398,13 @@ class SessionSearch:
             for fit, U in zip(self.knowledge.record.loads, self.asked.tolist(), strict=True)
             if math.isfinite(U)
         )
+
+
+def _up(U: float) -> float:
+    """Return an uncertainty rounded up to three digits.
+
+    >>> _up(0.30021), _up(0.3), _up(1234.0)
+    (0.301, 0.3, 1240.0)
+    """
+    step = 10.0 ** (math.floor(math.log10(U)) - 2)
+    return round(math.ceil(U / step - _SAME) * step, 12)

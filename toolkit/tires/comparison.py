@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.channels import signs
+from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import CHANNELS, Measured, cell
 from toolkit.tires.global_fit import undetermined
 from toolkit.tires.global_model import GlobalModel, ModelFit, make_rows, pooled_percent
 from toolkit.tires.model import CurveFit
+from toolkit.tires.models import model as find_curve_model
 from toolkit.tires.quality import scatter_floor_percent
 
 if TYPE_CHECKING:
@@ -94,21 +96,29 @@ def compare(
     rows = []
     for name in dict.fromkeys(curve.model for curve in curves):
         fitted_curves = [curve for curve in curves if curve.model == name]
+        read = rows_of_model(data, name)
         for channel in ("FY", "MZ"):
             if channel in data.channels and any(fitted.channel == channel for fitted in fitted_curves):
-                rows += _of_curves(data, [fitted for fitted in fitted_curves if fitted.channel == channel])
+                rows += _of_curves(read, [fitted for fitted in fitted_curves if fitted.channel == channel])
     for fit in models:
+        read = data.take(fit.selection.rows)
         for fitted in fit.fits:
-            y, model = data[fitted.channel], fit.at_rows(fitted.channel)
+            y, model = read[fitted.channel], fit.at_rows(fitted.channel)
             free = sum(p.name not in dict(fitted.fixed) for p in fitted.parameters)
             rows += _rows(
-                data, fitted.model, fitted.channel, y, model, np.isfinite(y), free,
+                read, fitted.model, fitted.channel, y, model, np.isfinite(y), free,
                 fitted.prediction_error_percent, fitted.converged, undetermined(fitted),
             )  # fmt: skip
     floors = {
         channel: scatter_floor_percent(data.rows.SA, data[channel], cell(data)) for channel in data.channels
     }
     return Comparison(rows=tuple(rows), floors=tuple(floors.items()), seconds=tuple((seconds or {}).items()))
+
+
+def rows_of_model(data: Measured, name: str) -> Measured:
+    """Return the rows that the fits of a model of one load are of."""
+    selection = of_one_condition(data.recorded, find_curve_model(name).reads, rows=len(data))
+    return data.take(selection.rows)
 
 
 def _of_curves(data: Measured, fits: Sequence[CurveFit]) -> list[ComparisonRow]:

@@ -46,6 +46,7 @@ __all__ = [
 ]
 
 MIN_POINTS = 7  # six parameters and one degree of freedom
+_ONE_LOAD = 0.10  # standard deviation over the mean: a curve of one load is no curve of a range of them
 _BATCH = 1024  # curves that are searched at once
 _SHIFT = np.deg2rad(10.0)
 _TINY_VARIANCE = 1e-24  # of max|y|^2: rounding of noise-free data
@@ -122,6 +123,15 @@ def why_not(curve: Curve) -> FitError | None:
             "sigma",
             "finite, >= 0",
             "mend it",
+        )
+    if curve.load_N is not None and curve.load_sd_N > _ONE_LOAD * curve.load_N:
+        return problem(
+            "load-varies",
+            "the load is not one load",
+            f"a mean of {curve.load_N:.0f} N with a standard deviation of {curve.load_sd_N:.0f} N, without "
+            "steps that part it",
+            f"loads held at steps, each within {_ONE_LOAD:.0%}",
+            "fit a model that reads the load (--model mf61), or measure at steps of load",
         )
     places = len(np.unique(np.rint(SA / np.deg2rad(0.05))))
     if places < MIN_POINTS:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.channels import Axes, signs
+from toolkit.reduction.selection import CONDITIONS, parted
 from toolkit.tires.global_model import Rows, make_rows
 
 if TYPE_CHECKING:
@@ -18,39 +20,48 @@ if TYPE_CHECKING:
 
 # Load blocks of a table: the gaps in the sorted loads, not a list of nominal ones.
 
-
-# Gaps are taken relative to the load above them: the spread within a block grows with the load.
-_SEPARATE = 0.04  # a smaller gap never parts two blocks
-_CONTRAST = 2.5  # between the smallest gap that parts blocks and the largest within one
+_SEPARATE = 0.06  # of the load above: a smaller gap, as of a load held to +-3 %, never parts two blocks
+_APART = 0.10  # a larger one always does; between them two loads are two where both have the same angles
+_SAME_ANGLE, _SHARED = np.radians(0.25), 0.5
 _RESOLVED = 0.008  # gaps below this are all alike
 
 
-def load_blocks(load: NDArray[np.float64]) -> tuple[NDArray[np.intp], ...]:
+def load_blocks(
+    load: NDArray[np.float64], SA: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.intp], ...]:
     """Return the rows of each load block, ascending in load, rows in their order.
 
     Parameters
     ----------
     load : (rows,) N, not negative
+    SA : (rows,) rad; a load that scatters from row to row falls on other angles each time, while loads that
+        were set are each measured at the angles of the others
 
-    The sorted loads' gaps fall into large ones (between blocks) and small ones (within); the cut is where
-    the ratio of neighbouring gaps is largest. Without a clear cut there is one block.
+    Gaps are taken relative to the load above them, for the spread within a block grows with the load.
 
     >>> [block.tolist() for block in load_blocks(np.array([1000.0, 2000.0, 1010.0, 1995.0]))]
     [[0, 2], [1, 3]]
     """
-    order = np.argsort(load, kind="stable")
-    rising = load[order]
-    if len(load) < 2 or rising[-1] <= 0:
-        return (np.arange(len(load)),)
-    gaps = np.diff(rising) / np.maximum(rising[1:], 1e-9 * rising[-1])
-    falling = np.sort(gaps)[::-1]
-    following = np.maximum(np.append(falling[1:], 0.0), _RESOLVED)
-    contrast = np.where(falling >= _SEPARATE, falling / following, 0.0)
-    best = int(np.argmax(contrast))
-    if contrast[best] < _CONTRAST:
-        return (np.arange(len(load)),)
-    cuts = np.flatnonzero(gaps >= falling[best]) + 1
-    return tuple(np.sort(rows) for rows in np.split(order, cuts))
+    blocks = parted(load, gap=_SEPARATE, resolved=_RESOLVED, relative=True)
+    joined = list(blocks[:1])
+    for block in blocks[1:]:
+        below = joined[-1]
+        near = load[block].min() - load[below].max() < _APART * load[block].min()
+        if SA is not None and near and not _share_angles(SA[below], SA[block]):
+            joined[-1] = np.sort(np.concatenate([below, block]))
+        else:
+            joined.append(block)
+    return tuple(joined)
+
+
+def _share_angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    few, many = sorted((np.unique(np.rint(angles / _SAME_ANGLE)) for angles in (one, other)), key=len)
+    return float(np.isin(few, many).mean()) >= _SHARED
+
+
+def loaded_blocks(load: NDArray[np.float64], SA: NDArray[np.float64]) -> tuple[NDArray[np.intp], ...]:
+    """Return the load blocks without those in the air, or whose load was not recorded."""
+    return tuple(block for block in load_blocks(load, SA) if load[block].mean() >= _NO_LOAD)
 
 
 CHANNELS = ("FX", "FY", "MZ")
@@ -67,15 +78,16 @@ class Measured:
     """Rows with what was measured at them, all in ``axes``.
 
     ``FX FY`` [N] ``MZ`` [N·m] (rows,), None where the table has no such column; ``block`` (rows,) numbers the
-    load blocks in ascending load and ``loads`` (blocks,) are their mean loads [N]. ``given`` names the
-    columns that the data had: pressure and speed that were not recorded hold a nominal value.
+    load blocks in ascending load and ``loads`` (blocks,) are their mean loads [N]. ``recorded`` are the
+    conditions that the data have a column of, as they stand there: in ``rows`` a speed has no sign, and
+    pressure and speed that were not recorded hold a nominal value.
     """
 
     rows: Rows
     axes: Axes
     block: NDArray[np.intp]
     loads: Array
-    given: frozenset[str]
+    recorded: Mapping[str, Array]
     FX: Array | None = None
     FY: Array | None = None
     MZ: Array | None = None
@@ -99,7 +111,8 @@ class Measured:
         """Return some of the rows; blocks and loads keep their numbers."""
         return Measured(
             rows=self.rows.take(index), axes=self.axes, block=self.block[index], loads=self.loads,
-            given=self.given, **{name: self[name][index] for name in self.channels},
+            recorded={name: column[index] for name, column in self.recorded.items()},
+            **{name: self[name][index] for name in self.channels},
         )  # fmt: skip
 
     def turned(self, axes: Axes) -> Measured:
@@ -111,7 +124,7 @@ class Measured:
             NOMPRES=r.NOMPRES, LONGVL=r.LONGVL, UNLOADED_RADIUS=r.UNLOADED_RADIUS,
         )  # fmt: skip
         return Measured(
-            rows=rows, axes=axes, block=self.block, loads=self.loads, given=self.given,
+            rows=rows, axes=axes, block=self.block, loads=self.loads, recorded=self.recorded,
             **{name: flip.get(name, 1) * self[name] for name in self.channels},
         )  # fmt: skip
 
@@ -129,7 +142,7 @@ def measured(
     and LONGVL are the medians of what was recorded.
     """
     FZ = columns["FZ"]
-    blocks = [load_block for load_block in load_blocks(FZ) if FZ[load_block].mean() >= _NO_LOAD]
+    blocks = loaded_blocks(FZ, columns["SA"])
     loaded = np.sort(np.concatenate(blocks)) if blocks else np.zeros(0, dtype=np.intp)
     number = np.zeros(len(FZ), dtype=np.intp)
     for index, block in enumerate(blocks):
@@ -151,7 +164,8 @@ def measured(
         UNLOADED_RADIUS=unloaded_radius_m,
     )
     return Measured(
-        rows=rows, axes=axes, block=number[loaded], loads=loads, given=frozenset(columns),
+        rows=rows, axes=axes, block=number[loaded], loads=loads,
+        recorded={name: columns[name][loaded] for name in CONDITIONS if name in columns},
         **{name: columns[name][loaded] for name in CHANNELS if name in columns},
     )  # fmt: skip
 
@@ -242,7 +256,8 @@ def binned(data: Measured, *, robust: bool = False, most: int | None = None) -> 
     )  # fmt: skip
     first = order[np.concatenate([[0], cuts])]
     means = Measured(
-        rows=rows, axes=data.axes, block=data.block[first], loads=data.loads, given=data.given,
+        rows=rows, axes=data.axes, block=data.block[first], loads=data.loads,
+        recorded={name: middle(column) for name, column in data.recorded.items()},
         **{name: middle(data[name]) for name in data.channels},
     )  # fmt: skip
     return means, count, width

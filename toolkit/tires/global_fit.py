@@ -15,6 +15,7 @@ from toolkit.channels import signs
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
+from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.global_data import CHANNELS, Measured, binned, cell, what_varies
 from toolkit.tires.global_model import (
     GlobalFit,
@@ -212,7 +213,7 @@ def fit_global(
     seeds: Seeds | None = None,
     predict: bool = True,
 ) -> ModelFit:
-    """Fit every measured channel that the model has.
+    """Fit every measured channel that the model has, to the rows alike in all that it does not read.
 
     Parameters
     ----------
@@ -233,11 +234,25 @@ def fit_global(
                 f"unknown {name} {choice!r}", where=f"--{name}", got=choice, expected=", ".join(choices),
                 next_step="name one of those expected", rule=f"unknown-{name}",
             )  # fmt: skip
+    selection = selection_of(data, model)
+    data = data.take(selection.rows)
     if (problem := why_not_global(data, model)) is not None:
         raise problem
     if seeds is None:
         seeds = seeds_of(data).seeds
-    return _Fitter(model, data, loss, weights, seeds).result(predict=predict)
+    return _Fitter(model, data, selection, loss, weights, seeds).result(predict=predict)
+
+
+def selection_of(data: Measured, model: GlobalModel) -> Selection:
+    """Return the rows that a fit of the model takes.
+
+    Raises
+    ------
+    FitError
+        ``no-pure-slip``
+    """
+    reads = model.variables(what_varies(data))
+    return of_one_condition(data.recorded, reads, rows=len(data))
 
 
 def global_findings(fit: ModelFit) -> list[Finding]:
@@ -280,8 +295,11 @@ def not_varied(fits: Sequence[ModelFit], where: str) -> list[Finding]:
 
 
 class _Fitter:
-    def __init__(self, model: GlobalModel, data: Measured, loss: Loss, weights: str, seeds: Seeds) -> None:
+    def __init__(
+        self, model: GlobalModel, data: Measured, selection: Selection, loss: Loss, weights: str, seeds: Seeds
+    ) -> None:
         self.model, self.given, self.loss, self.weights = model, data, loss, weights
+        self.selection = selection
         self.data = data.turned(model.axes)
         self.flip = signs(model.axes, data.axes)
         self.varies = what_varies(data)
@@ -321,7 +339,11 @@ class _Fitter:
         )  # fmt: skip
         fits = [report.fit(name, channels, stage) for channels, stage in stages.items() for name in channels]
         return ModelFit(
-            model=self.model.name, values=self.values, fits=tuple(fits), curves=tuple(curves.items())
+            model=self.model.name,
+            values=self.values,
+            fits=tuple(fits),
+            curves=tuple(curves.items()),
+            selection=self.selection,
         )
 
     def _free(self, channels: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[tuple[int, str], ...]]:

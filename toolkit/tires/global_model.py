@@ -37,7 +37,7 @@ angle and longitudinal slip together.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -45,6 +45,7 @@ import numpy as np
 
 from toolkit.channels import Axes
 from toolkit.estimate import Estimate
+from toolkit.reduction.selection import Selection
 from toolkit.tires.model import Parameter
 
 if TYPE_CHECKING:
@@ -73,6 +74,11 @@ Need = Literal[
     "two_loads", "three_loads", "camber", "pressure", "three_pressures", "speed", "both_signs",
     "kappa", "both_kappas", "alpha_and_kappa",
 ]  # fmt: skip
+
+_READ_BY: dict[Need, str] = {
+    "camber": "IA", "pressure": "P", "three_pressures": "P", "speed": "V", "kappa": "KAPPA",
+    "both_kappas": "KAPPA", "alpha_and_kappa": "KAPPA",
+}  # fmt: skip
 
 
 def parameters(
@@ -264,6 +270,8 @@ class GlobalModel:
     ``valid`` states in words where the model holds; ``axes`` are those of its parameters and forces.
     ``grid`` is how many inner points (bristles) a row costs: it bounds how much is asked at once.
     ``moment_alone`` says that MZ does not use what FY's rows determine, so that MZ can be fitted without.
+    ``reads`` names what the equations read beside slip angle and load whatever the parameters are: KAPPA, V,
+    IA; what they read by parameters alone follows from those (`variables`).
     """
 
     name: str
@@ -279,11 +287,26 @@ class GlobalModel:
     grid: int = 1
     moment_alone: bool = False
     per_load: bool = False
+    reads: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
         """Parameter names in their order."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    def variables(self, varies: Collection[str]) -> frozenset[str]:
+        """Return what the model reads beside slip angle and load, fitted to rows in which so much varies.
+
+        A parameter that cannot be fitted stands at its default, where it reads nothing.
+        """
+        by_parameters = {
+            _READ_BY[need]
+            for parameter in self.parameters
+            if set(parameter.needs) <= set(varies)
+            for need in parameter.needs
+            if need in _READ_BY
+        }
+        return frozenset({*self.reads, *by_parameters})
 
     def values(self, given: Mapping[str, float]) -> Array:
         """Return a parameter set from names and values, defaults for the rest.
@@ -365,16 +388,18 @@ class GlobalFit:
 class ModelFit:
     """A model fitted to a table: ``values`` of all its parameters, and one `GlobalFit` a channel.
 
-    ``curves`` (channel, model at every row of the data, in the table's axes).
+    ``selection`` are the rows of the data that were fitted, those that differ in nothing which the model does
+    not read; ``curves`` (channel, model at every one of them, in the table's axes).
     """
 
     model: str
     values: Array
     fits: tuple[GlobalFit, ...]
     curves: tuple[tuple[str, Array], ...]
+    selection: Selection
 
     def at_rows(self, channel: str) -> Array:
-        """Return the model at every row of the data [N or N·m], in the table's axes."""
+        """Return the model at every row that was fitted [N or N·m], in the table's axes."""
         return dict(self.curves)[channel]
 
     def fit(self, channel: str) -> GlobalFit | None:

@@ -22,7 +22,8 @@ class Curve:
     """One channel against slip angle at one load, rows in the order in which they were recorded.
 
     ``SA`` [rad] and ``y`` [N or N·m] have one length; ``sigma`` are known standard uncertainties of y
-    [its unit], None where nothing is known (every row then has the same weight).
+    [its unit], None where nothing is known (every row then has the same weight). ``load_sd_N`` is by how much
+    the load scatters about ``load_N`` from row to row.
     """
 
     SA: NDArray[np.float64]
@@ -31,6 +32,7 @@ class Curve:
     load_N: float | None
     axes: Axes = "SAE"
     sigma: NDArray[np.float64] | None = None
+    load_sd_N: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +105,8 @@ class CurveFit:
 class TireModel(Protocol):
     """What a model file offers. Derivatives are stacked in front: (parameters, points).
 
-    ``fitter`` names the module whose ``fit_curves`` fits it: an equation does not know its fit.
+    ``fitter`` names the module whose ``fit_curves`` fits it: an equation does not know its fit. ``reads``
+    names what it reads beside the slip angle, of one load.
     """
 
     name: str
@@ -111,6 +114,7 @@ class TireModel(Protocol):
     reference: str
     per_load: bool
     fitter: str
+    reads: tuple[str, ...]
     channels: tuple[str, ...]
     parameters: tuple[ParameterSpec, ...]
 

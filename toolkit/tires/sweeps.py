@@ -17,6 +17,7 @@ import numpy as np
 from toolkit.channels import AXES, Axes
 from toolkit.errors import ConfigError, FitError
 from toolkit.tires.field_file import FieldFile, read_field_file
+from toolkit.tires.plausibility import load_of
 from toolkit.tires.table import TireTable
 
 if TYPE_CHECKING:
@@ -32,15 +33,21 @@ _SMOOTH_S = 0.3  # over which the rate of a sweep is taken
 _FEW = 3  # samples of a bin
 _DRIVEN = 0.05  # a slip ratio beyond it, in a hundredth of the samples: driven and braked
 _ROLLING = 0.5  # of the usual speed: slower is the way to it
+_SPEED_WIDTH = 0.05  # of the usual speed: what varies by less is one speed
+_TAIL = 0.02  # of the samples at either end
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """One condition: inclination [rad], pressure [Pa] (None where unknown), load [N], and the direction."""
+    """One condition: inclination [rad], pressure [Pa], load [N], speed [m/s], and the direction.
+
+    Inclination and pressure are None where unknown, the speed where the test has one alone.
+    """
 
     inclination_rad: float | None
     pressure_Pa: float | None
     load_N: float
+    speed_m_s: float | None
     direction: str
     samples: int
 
@@ -126,7 +133,7 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
         ``no-curve``: nothing of it is a sweep
     """
     columns = dict(file.columns)
-    load = np.abs(columns["FZ"])
+    load = load_of(columns["FZ"], where=f"{file.path}, channel FZ", spikes=_LEAST)
     slip = columns.get("KAPPA")
     driven = slip is not None and float(np.quantile(np.abs(slip), 0.99)) > _DRIVEN
     swept = "KAPPA" if driven else "SA"
@@ -136,7 +143,11 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
     direction = _direction(columns[swept], columns["t"], float(_RATES[swept]))
     usable = np.all([at >= 0 for at, _ in marks.values()], axis=0)
     if "V" in columns:
-        usable &= columns["V"] > _ROLLING * float(np.median(columns["V"]))
+        rolling = columns["V"] > _ROLLING * float(np.median(columns["V"]))
+        usable &= rolling
+        if _several_speeds(columns["V"][rolling]):
+            marks["V"] = levels(columns["V"], _SPEED_WIDTH * float(np.median(columns["V"])))
+            usable &= marks["V"][0] >= 0
     names = [name for name in columns if name not in ("t", "KAPPA") or (name == "KAPPA" and driven)]
     data = np.column_stack([load if name == "FZ" else columns[name] for name in names])
     key = np.column_stack([
@@ -165,6 +176,11 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
     )
 
 
+def _several_speeds(rolling: NDArray[np.float64]) -> bool:
+    low, high = np.quantile(rolling, [_TAIL, 1 - _TAIL])
+    return bool(high - low > 2 * _SPEED_WIDTH * float(np.median(rolling)))
+
+
 def _direction(values: NDArray[np.float64], t: NDArray[np.float64], rate: float) -> NDArray[np.intp]:
     """Return 1 where the slip is swept up, -1 down, 0 where it is held (rows,)."""
     interval = max(float(np.median(np.diff(t))), 1e-6) if len(t) > 1 else 1.0
@@ -189,7 +205,8 @@ def _sweeps(
     return tuple(
         Sweep(
             inclination_rad=value("IA", condition), pressure_Pa=value("P", condition),
-            load_N=value("FZ", condition) or 0.0, direction=words[int(condition[-1])], samples=int(number),
+            load_N=value("FZ", condition) or 0.0, speed_m_s=value("V", condition),
+            direction=words[int(condition[-1])], samples=int(number),
         )
         for condition, number in zip(conditions, samples, strict=True)
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +13,10 @@ from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.reduction.physics import departures, of_sizes
+from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.evaluate import slope_estimate_at, value_at
 from toolkit.tires.fit import Curve, fit_curves, why_not
-from toolkit.tires.global_data import load_blocks
+from toolkit.tires.global_data import load_blocks, loaded_blocks
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit, Loss, TireModel
 from toolkit.tires.models import fit_model
 from toolkit.tires.plausibility import size_findings
@@ -115,7 +116,7 @@ def slope_sign(axes: Axes, channel: str) -> int:
 def table_curves(table: TireTable) -> tuple[Curve, ...]:
     """Return the curves of a table: every load block, FY and MZ; ``load_N`` is the block's mean load."""
     curves = []
-    for rows in load_blocks(table["FZ"]):
+    for rows in load_blocks(table["FZ"], table["SA"]):
         for channel in ("FY", "MZ"):
             y = table.get(channel)
             if y is not None:
@@ -125,36 +126,40 @@ def table_curves(table: TireTable) -> tuple[Curve, ...]:
                         y=y[rows],
                         channel="FY" if channel == "FY" else "MZ",
                         load_N=float(table["FZ"][rows].mean()),
+                        load_sd_N=float(table["FZ"][rows].std()),
                         axes=table.axes,
                     )
                 )
     return tuple(curves)
 
 
-def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "linear") -> TableFits:
-    """Fit models to every load block and channel of a table.
+def fit_table(table: TireTable, model: TireModel, *, loss: Loss = "linear") -> TableFits:
+    """Fit a model to every load block and channel of a table, to the rows of one condition.
 
     Raises
     ------
     FitError
-        not one curve of the table can be fitted; where only some cannot, that is a finding
+        not one curve of the table can be fitted; where only some cannot, that is a finding; ``no-pure-slip``
     """
-    curves = table_curves(table)
+    selection = _selection(table, model)
+    curves = table_curves(table.take(selection.rows))
     problems = [_no_load(curve) or why_not(curve) for curve in curves]
     good = [curve for curve, problem in zip(curves, problems, strict=True) if problem is None]
     refused = [problem for problem in problems if problem is not None]
     if not good:
         first = refused[0]
+        apart = f" of one condition: {'; '.join(selection.apart)}" if selection.left_out else ""
         raise FitError(
             first.what,
             where=f"{table.path}, {first.where}",
-            got=first.got,
+            got=f"{first.got}{apart}",
             expected=first.expected,
             next_step=first.next_step,
             rule=first.rule,
         )
-    fits = [fit for model in models for fit in fit_model(model, good, loss=loss)]
-    findings = [
+    fits = list(fit_model(model, good, loss=loss))
+    findings = list(selection.findings(models=[model.name], where=table.path.name))
+    findings += [
         Finding(
             rule=refusal.rule or "not-fitted",
             where=refusal.where or str(table.path),
@@ -163,10 +168,23 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
         for refusal in refused
     ]
     findings += fit_findings(fits)
-    if own := [fit for fit in fits if fit.model == "magic_formula"]:
-        findings += gross_outliers(good, own)
+    if model.name == "magic_formula":
+        findings += gross_outliers(good, fits)
     findings += (*row_findings(table), *axes_findings(table, fits), *size_findings(fits, table.path.name))
     return TableFits(fits=tuple(fits), findings=tuple(findings))
+
+
+def _selection(table: TireTable, model: TireModel) -> Selection:
+    # Of the loaded rows, as the models over all loads see them; blocks without load are told apart below.
+    blocks = loaded_blocks(table["FZ"], table["SA"])
+    if not blocks:
+        return Selection(rows=np.ones(len(table["FZ"]), dtype=np.bool_))
+    loaded = np.sort(np.concatenate(blocks))
+    recorded = {symbol: column[loaded] for symbol, column in table.columns}
+    selection = of_one_condition(recorded, model.reads, rows=len(loaded))
+    rows = np.ones(len(table["FZ"]), dtype=np.bool_)
+    rows[loaded] = selection.rows
+    return replace(selection, rows=rows)
 
 
 def _no_load(curve: Curve) -> FitError | None:

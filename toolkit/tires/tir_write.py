@@ -96,9 +96,9 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
         FZ_range=_range(turned.FZ),
         IA_range=_range(turned.IA),
         KAPPA_range=_range(turned.KAPPA) if slips else None,
-        P_range=_range(turned.P) if "P" in data.given else None,
-        NOMPRES=turned.NOMPRES if "P" in data.given else None,
-        LONGVL=turned.LONGVL if "V" in data.given else None,
+        P_range=_range(turned.P) if "P" in data.recorded else None,
+        NOMPRES=turned.NOMPRES if "P" in data.recorded else None,
+        LONGVL=turned.LONGVL if "V" in data.recorded else None,
         TYRESIDE=side,
     )
 

@@ -8,9 +8,10 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.inputs import RESULT_FILE, read_regular
-from toolkit.lab.jobs import start_job
-from toolkit.lab.kept_plans import KINDS, plan_words, read_plan, titles_of
-from toolkit.lab.previews import templates_of
+from toolkit.lab.desk.chart import Chart, Series
+from toolkit.lab.desk.jobs import start_job
+from toolkit.lab.desk.kept_plans import KINDS, fixtures_of, plan_words, read_plan, titles_of
+from toolkit.lab.desk.previews import templates_of
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
-    from toolkit.lab.kept_plans import PlanKind
+    from toolkit.lab.desk.kept_plans import PlanKind
     from toolkit.workbench.bench import Bench
     from toolkit.workbench.page import Routes
 
@@ -43,7 +44,7 @@ def plan_list(request: Request) -> Response:
     return page(
         request, "part_plans", plans=holdings.places["plan"], instruments=bench.registry.instruments(),
         tests=holdings.places["test"], answers=holdings.places["diagnosis"],
-        templates=templates_of(bench.home),
+        templates=templates_of(bench.home), fixtures=fixtures_of(bench.home),
     )  # fmt: skip
 
 
@@ -81,7 +82,8 @@ def start(request: Request) -> Response:
     form = request.state.form
     subject = _subject(bench, kind, form)
     template = templates_of(bench.home).get(form.get("template", ""))
-    words = plan_words(bench.home, kind, form, subject, template)
+    fixtures = fixtures_of(bench.home).get(form.get("fixtures", ""))
+    words = plan_words(bench.home, kind, form, subject, template, fixtures)
     job = start_job(bench.home, kind="plan", title=" ".join(filter(None, (kind, subject))), words=words)
     return RedirectResponse(f"{bench.keys.place}/job/{job}", 303)
 
@@ -101,16 +103,14 @@ def _subject(bench: Bench, kind: PlanKind, form: Mapping[str, str]) -> str | Non
     return basis
 
 
-def _risk_chart(answer: Mapping[str, Any]) -> dict[str, Any]:
+def _risk_chart(answer: Mapping[str, Any]) -> Chart:
     """Return the risk over the days of an interval, and what is allowed."""
     points = {risk["days"]: 100 * risk["beyond"] for risk in (*answer["risks"], answer["chosen"])}
     days = sorted(points)
-    return {
-        "x_label": "interval [days]",
-        "y_label": "beyond [%]",
-        "series": [{"label": "risk", "line": True}, {"label": "allowed", "line": True, "dash": True}],
-        "data": [days, [points[day] for day in days], [100 * (1 - answer["reliability"])] * len(days)],
-    }
+    risk: Series = {"label": "risk", "x": days, "y": [points[day] for day in days], "line": True}
+    level = [100 * (1 - answer["reliability"])] * len(days)
+    allowed: Series = {"label": "allowed", "x": days, "y": level, "line": True, "dash": True}
+    return {"x_label": "interval [days]", "y_label": "beyond [%]", "series": [risk, allowed]}
 
 
 def _requested(request: Request) -> tuple[Bench, str, Path]:

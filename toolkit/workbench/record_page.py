@@ -14,8 +14,9 @@ from starlette.responses import RedirectResponse
 
 from toolkit.calibration.registry.registry import ID
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.lab.decisions import Order
-from toolkit.lab.pending import decide as settle_decision
+from toolkit.lab.desk.chart import Chart, Series
+from toolkit.lab.desk.pending import decide as settle_decision
+from toolkit.lab.records.decisions import Order
 from toolkit.trust.requested import Requested
 from toolkit.workbench.bench import waiting
 from toolkit.workbench.page import page
@@ -65,7 +66,7 @@ def record_page(
     refused: ToolkitError | None = None,
 ) -> Response:
     """Return the page of a record that a ledger knows; ``refused`` is told at the form of its decision."""
-    from toolkit.lab.registry_answer import history, shown
+    from toolkit.lab.records.registry_answer import history, shown
 
     bench: Bench = request.app.state.bench
     instrument = ID.match(record_id)["instrument"]  # type: ignore[index]
@@ -93,14 +94,14 @@ def part(request: Request) -> Response:
 
 
 def _gates(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.gates_answer import gates_answer
+    from toolkit.lab.records.gates_answer import gates_answer
     from toolkit.lab.rules import rules_catalogue
 
     return {"judged": gates_answer(bench.registry, record_id), "rules": rules_catalogue()}
 
 
 def _responses(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.gates_answer import responses_answer
+    from toolkit.lab.records.gates_answer import responses_answer
 
     return {"compared": responses_answer(bench.registry, record_id)}
 
@@ -109,7 +110,7 @@ def _fit(bench: Bench, record_id: str) -> dict[str, Any]:
     from toolkit.calibration.fit.findings import session_findings
     from toolkit.calibration.fit.session_fit import fit_session
     from toolkit.calibration.registry.stored import stored_session
-    from toolkit.lab.session_answer import fit_report
+    from toolkit.lab.records.session_answer import fit_report
 
     stored = bench.registry.load(record_id)
     fit = fit_session(stored_session(bench.registry.folder, stored))
@@ -124,7 +125,7 @@ def _fit(bench: Bench, record_id: str) -> dict[str, Any]:
 
 
 def _budget(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.budget import BudgetOrder, budget_answer
+    from toolkit.lab.records.budget import BudgetOrder, budget_answer
 
     payload, _, _ = budget_answer(bench.registry, record_id, BudgetOrder())
     charts = {name: budget_chart(name, budget) for name, budget in payload["loads"].items()}
@@ -132,7 +133,7 @@ def _budget(bench: Bench, record_id: str) -> dict[str, Any]:
 
 
 def _as_found(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.gates_answer import as_found_answer
+    from toolkit.lab.records.gates_answer import as_found_answer
 
     return {"found": as_found_answer(bench.registry, record_id)}
 
@@ -214,33 +215,25 @@ ROUTES: Routes = (
 )
 
 
-def residual_chart(rows: Mapping[str, Any], unit: str) -> dict[str, Any]:
+def residual_chart(rows: Mapping[str, Any], unit: str) -> Chart:
     """Return residuals over the reference load, by direction where the session states it.
 
-    >>> rows = {"reference": [2.0, 1.0], "residual": [0.1, -0.1], "direction": ["up", "down"]}
-    >>> residual_chart(rows, "N")["data"]
-    [[1.0, 2.0], [None, 0.1], [-0.1, None]]
+    >>> rows = {"reference": [2.0, 1.0, 0.0], "residual": [0.1, -0.1, 0.2], "direction": ["up", "down", "up"]}
+    >>> [(series["label"], series["x"], series["y"]) for series in residual_chart(rows, "N")["series"]]
+    [('up', [0.0, 2.0], [0.2, 0.1]), ('down', [1.0], [-0.1])]
     """
-    senses = rows["direction"] or [""] * len(rows["reference"])
-    names = list(dict.fromkeys(sorted(senses, reverse=True)))
-    order = sorted(range(len(senses)), key=lambda at: float(rows["reference"][at]))
-    return {
-        "x_label": f"reference [{unit}]",
-        "y_label": f"residual [{unit}]",
-        "series": [{"label": f"residual {name}".strip()} for name in names],
-        "data": [
-            [rows["reference"][at] for at in order],
-            *([rows["residual"][at] if senses[at] == name else None for at in order] for name in names),
-        ],
-    }
+    senses = rows["direction"] or ["residual"] * len(rows["reference"])
+    points = sorted(zip(rows["reference"], rows["residual"], senses, strict=True))
+    series: list[Series] = [
+        {"label": name, "x": [x for x, _, sense in points if sense == name],
+         "y": [y for _, y, sense in points if sense == name]}
+        for name in sorted(set(senses), reverse=True)
+    ]  # fmt: skip
+    return {"x_label": f"reference [{unit}]", "y_label": f"residual [{unit}]", "series": series}
 
 
-def budget_chart(load: str, budget: Mapping[str, Any]) -> dict[str, Any]:
+def budget_chart(load: str, budget: Mapping[str, Any]) -> Chart:
     """Return U over the range of a load."""
-    unit = budget["unit"]
-    return {
-        "x_label": f"{load} [{unit}]",
-        "y_label": f"U [{unit}]",
-        "series": [{"label": "U", "line": True}],
-        "data": [[point["value"] for point in budget["range"]], [point["U"] for point in budget["range"]]],
-    }
+    unit, points = budget["unit"], budget["range"]
+    U: Series = {"label": "U", "x": [p["value"] for p in points], "y": [p["U"] for p in points], "line": True}
+    return {"x_label": f"{load} [{unit}]", "y_label": f"U [{unit}]", "series": [U]}

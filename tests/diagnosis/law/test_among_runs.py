@@ -13,10 +13,13 @@ TWO_NUMBERS = SimpleNamespace(cost=2, looked=1)
 
 
 def runs(count, law, rng, *, zero=0.5, gain=0.0, left=0.4):
-    """Return runs with zeros and gains of their own; ``law`` of the simulated output is taken away, ``left`` stays."""
+    """Return runs with zeros and gains of their own; a law is taken away, and but ``left`` of these."""
     made = []
     # What all have alike is no difference: about their means.
-    zeros, gains = (size * (each - each.mean()) for size, each in zip((zero, gain), rng.normal(size=(2, count)), strict=True))
+    zeros, gains = (
+        size * (each - each.mean())
+        for size, each in zip((zero, gain), rng.normal(size=(2, count)), strict=True)
+    )
     for one_zero, one_gain in zip(zeros, gains, strict=True):
         simulated = np.sin(np.linspace(0, 12, 200) + rng.uniform(0, 6))
         own = one_zero + one_gain * simulated

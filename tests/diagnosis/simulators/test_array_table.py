@@ -58,7 +58,7 @@ def function(folder, body):
 
 
 def seen(called):
-    return called._function.__globals__["SEEN"]  # noqa: SLF001
+    return called._function.__globals__["SEEN"]
 
 
 @pytest.mark.parametrize(("body", "expected"), ARRAYS_DO.values(), ids=ARRAYS_DO)

@@ -134,11 +134,14 @@ print("left:", input())
 
 
 def test_the_same_question_is_asked_once(tmp_path):
-    text = START + "asked.append(p['mass'])\n    return pd.DataFrame({'F': inputs['v'] * p['mass']})\nasked = []\n"
+    text = (
+        START
+        + "asked.append(p['mass'])\n    return pd.DataFrame({'F': inputs['v'] * p['mass']})\nasked = []\n"
+    )
     case = read_case(write_case(tmp_path, simulator=text))
     model = model_of(case, None)
     assert isinstance(model, PythonModel)
-    asked = model._called.__self__._function.__globals__["asked"]  # noqa: SLF001
+    asked = model._called.__self__._function.__globals__["asked"]
     first = model.simulate(case.runs[0], {"mass": 1.0}, ())["F"]
     before = len(asked)
     again = model.simulate(case.runs[0], {"mass": 1.0}, ())["F"]

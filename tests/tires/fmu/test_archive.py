@@ -14,6 +14,7 @@ import toolkit
 from tests.conftest import SHARED_DATA
 from tests.tires.fmu.fmu_factory import grid, outputs_of
 from toolkit.errors import ConfigError
+from toolkit.reduction.selection import Selection
 from toolkit.tires.fmu import archive
 from toolkit.tires.fmu.archive import fmu_of
 from toolkit.tires.fmu.equations import equations_of_file, equations_of_fit
@@ -23,6 +24,7 @@ from toolkit.tires.models import find
 from toolkit.tires.tir import parse_tir, read_tir
 from toolkit.tires.tir_evaluate import evaluate_tir
 
+WHOLE = Selection(rows=np.ones(12, dtype=np.bool_))
 # A tire with every kind of term: combined slip, camber, pressure, friction that falls with speed.
 FULL = """
 [MODEL]
@@ -150,7 +152,9 @@ def test_an_fmu_of_a_fitted_model_gives_its_forces_in_iso_axes(tmp_path: Path, n
     values = model.values({})
     # Every parameter at a place of its own within its bounds, so that none is neutral.
     moved = np.clip(values + 0.7 * np.array([entry.size for entry in model.parameters]), *_bounds(model))
-    fit = ModelFit(model=name, values=moved, fits=tuple(map(_Channel, model.channels)), curves=())
+    fit = ModelFit(
+        model=name, values=moved, fits=tuple(map(_Channel, model.channels)), curves=(), selection=WHOLE
+    )
     equations = equations_of_fit(model, fit, data)
     path = tmp_path / "tire.fmu"
     path.write_bytes(fmu_of(equations, name=name).content)
@@ -210,7 +214,9 @@ def test_an_iteration_is_refused_with_what_can_be_written(tmp_path: Path) -> Non
         {"SA": np.tile([-0.1, 0.1], 6), "FZ": np.repeat([2000.0, 4000.0, 6000.0], 4), "FY": np.ones(12)},
         axes="SAE",
     )
-    fit = ModelFit(model="treadsim", values=model.values({}), fits=(_Channel("FY"),), curves=())
+    fit = ModelFit(
+        model="treadsim", values=model.values({}), fits=(_Channel("FY"),), curves=(), selection=WHOLE
+    )
     with pytest.raises(ConfigError, match="cannot be written as C") as caught:
         equations_of_fit(model, fit, data)
     assert "brush" in str(caught.value)

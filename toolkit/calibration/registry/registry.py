@@ -249,13 +249,16 @@ class Registry:
             record_id: status_of(record_id, ledger.of(record_id), known_on) for record_id in ledger.entered()
         }
 
-    def in_force(self, instrument: str, *, on: date, known_at: date | None = None) -> CalibrationRecord:
+    def in_force(
+        self, instrument: str, *, on: date, known_at: date | None = None, drafts: bool = False
+    ) -> CalibrationRecord:
         """Return the record in force on a test's day, as known on another day (default: today).
 
         The newest ``in_force_from`` not after ``on`` wins, among equals the one approved last. A record
         that is void on ``on``, by a withdrawal known at ``known_at``, does not count. An approval that was
         entered after ``known_at`` serves only where no earlier one does: a report of that time could not
-        know it, but a ledger may begin later than the calibrations that it tells of.
+        know it, but a ledger may begin later than the calibrations that it tells of. ``drafts``: who asks can
+        make a draft of another record, and the error says so.
 
         Raises
         ------
@@ -277,8 +280,8 @@ class Registry:
                 got="; ".join(standings) or "no record",
                 expected=f"an approved record in force on {on.isoformat()}, "
                 f"as known on {known_on.isoformat()}",
-                next_step="approve one with 'toolkit calibration approve ID --in-force-from DATE', "
-                "or make a draft with --calibration ID --draft",
+                next_step="approve one with 'toolkit calibration approve ID --in-force-from DATE'"
+                + ", or make a draft with --calibration ID --draft" * drafts,
                 rule="no-record-in-force",
             )
         return load_checked(self.folder / instrument, best, ledger)
@@ -327,11 +330,11 @@ def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRec
         data = read_regular(path)
     except OSError as error:
         raise RecordError(
-            f"record {record_id} is missing",
+            f"record {record_id} is missing" if entered else f"the registry has no record {record_id}",
             where=path,
-            got=error.strerror,
-            expected="the record's file" if entered else "a record that the registry has",
-            next_step="restore it from a backup, or see 'toolkit calibration list'",
+            got=error.strerror if entered else record_id,
+            expected="the record's file" if entered else ", ".join(ledger.entered()) or "a record",
+            next_step="restore it from a backup" if entered else "see 'toolkit calibration list'",
             rule="missing",
         ) from error
     record = from_bytes(data, where=path)

@@ -1,8 +1,8 @@
-"""Laws that only tell runs apart: what stands still within a run explains its zero and its gain, nothing else.
+"""Laws that only tell runs apart: what stands still within a run explains its zero and its gain alone.
 
-Runs of the same thing differ a little, and any signal that has another level in every run (a load, a date, a
-temperature) follows such differences as well as the few runs let it. Hundreds of rows are then no evidence: of
-a run's zero there is one value a run. A law that mends nothing beside zeros and gains of runs has to be
+Runs of the same thing differ a little, and any signal that has another level in every run (a load, a
+temperature) follows such differences as well as the few runs let it. Hundreds of rows are then no evidence:
+of a run's zero there is one value a run. A law that mends nothing beside zeros and gains of runs has to be
 significant among the runs alone.
 """
 
@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-def tells_runs_apart_alone(
-    trial: Trial, looked: int, runs: Sequence[tuple[Array, Array, Array]]
-) -> bool:
+def tells_runs_apart_alone(trial: Trial, looked: int, runs: Sequence[tuple[Array, Array, Array]]) -> bool:
     """Tell whether a law takes only what differs from run to run, and no more of it than chance gives.
 
     Parameters

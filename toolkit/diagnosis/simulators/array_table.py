@@ -2,9 +2,9 @@
 
 A simulator of a few hundred rows is called many thousand times, and nearly all its time goes into pandas'
 bookkeeping: a sum of two columns takes fifty times as long as that of two arrays. Most simulators ask a table
-for nothing but its columns; these get it as arrays. Whether the outputs are the same is tried on the first call
-of every run, and again on ever fewer of the later ones; a simulator that asks for more of a table (a shifted
-column, a position by label), or to which arrays mean something else, gets a DataFrame as ever.
+for nothing but its columns; these get them as arrays. Whether the outputs are the same is tried on the first
+call of every run, and again on ever fewer of the later ones; a simulator that asks for more of a table (a
+shifted column, a position by label), or to which arrays mean something else, gets a DataFrame as ever.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from toolkit.report.figures import draw, draw_svg
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
 from toolkit.report.test.content import REPORT, ReportedTest
-from toolkit.tires.comparison import Comparison, model_curve
+from toolkit.tires.comparison import Comparison, model_curve, rows_of_model
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import Measured, binned
 
@@ -59,9 +59,9 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
     from toolkit.tires.global_model import GlobalModel
     from toolkit.tires.models import find
 
-    shown, _, _ = binned(data)
     plots = []
     for name in dict.fromkeys(curve.model for curve in curves):
+        shown, _, _ = binned(rows_of_model(data, name))
         for channel in ("FY", "MZ"):
             curves_of_model = [curve for curve in curves if curve.model == name and curve.channel == channel]
             if curves_of_model and channel in data.channels:
@@ -69,6 +69,7 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
     for fit in models:
         model = find(fit.model)
         assert isinstance(model, GlobalModel)  # noqa: S101  only such a model has a ModelFit
+        shown, _, _ = binned(data.take(fit.selection.rows))
         for channel_fit in fit.fits:
             if channel_fit.channel == "FX":
                 continue
@@ -172,7 +173,8 @@ def models(report: ReportedTest, _style: Style) -> Rows:
     {
         "models_fy": "error of each tire model in lateral force, fitted and with each load left out",
         "models_mz": "error of each tire model in aligning moment, fitted and with each load left out",
-    }
+    },
+    charts=False,
 )
 def error_charts(report: ReportedTest, style: Style) -> Iterable[Plot]:
     """Return the errors of the models in both channels."""

@@ -21,6 +21,7 @@ RULES = {
     "unknown-tag": "a tag is not in the catalogue",
     "malformed-tag": "a literal tag is not closed or has no path",
     "missing-required": "a required tag is not in the template",
+    "not-as-chart": "a figure cannot be a chart of Word's own",
     "doubled-tag": "a figure or table stands twice in the body",
     "bad-format": "the format after the bar does not fit the tag",
     "wrong-place": "a tag stands where it cannot be filled",

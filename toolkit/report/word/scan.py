@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from toolkit.report.tags import Tag, parse_tag
+from toolkit.report.tags import DRAWN, Tag, parse_tag
 from toolkit.report.word.xml import (
     SDT_CONTENT,
     SDT_PR,
@@ -80,7 +80,7 @@ def filled_by(element: Element) -> Element | None:
     """Return the control around an element whose content will be replaced, None where there is none."""
     for sdt in element.iterancestors(W_SDT):
         tag = control_tag(sdt)
-        if tag is not None and tag.family in ("value", "figure", "row"):
+        if tag is not None and tag.family in ("value", "row", *DRAWN):
             return sdt
     return None
 

@@ -68,6 +68,7 @@ MODEL = GlobalModel(
     axes="SAE",
     channels=("FY", "MZ"),
     parameters=parameters(_TABLE + SHIFT + CAMBER + OFFSETS),
+    reads=("KAPPA",),
     forces=forces,
     starts=starts,
 )

@@ -125,6 +125,7 @@ MODEL = GlobalModel(
     joint=True,
     grid=3 * _NODES,
     parameters=parameters(_TABLE + SHIFT + CAMBER + OFFSETS),
+    reads=("KAPPA", "V"),
     forces=forces,
     starts=starts,
 )

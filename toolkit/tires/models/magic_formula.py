@@ -30,6 +30,7 @@ class MagicFormula:
     reference = "Bakker, Nyborg, Pacejka, SAE 870421 (1987); Pacejka (2012) eq. 4.6-4.8"
     per_load = True
     fitter = "toolkit.tires.fit"
+    reads = ()
     channels = ("FY", "MZ")
     parameters = (
         ParameterSpec(name="B", unit="1/rad", bounds="B x span 0.05 to 50", text="stiffness factor"),

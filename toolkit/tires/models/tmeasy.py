@@ -158,6 +158,7 @@ MODEL = GlobalModel(
     axes="SAE",
     channels=("FX", "FY", "MZ"),
     parameters=parameters(_with_changes(_TABLE) + SHIFT + _CAMBER + OFFSETS),
+    reads=("KAPPA",),
     forces=forces,
     starts=starts,
 )

@@ -184,6 +184,7 @@ MODEL = GlobalModel(
     joint=True,
     grid=BRISTLES,
     parameters=parameters(_TABLE + SHIFT + OFFSETS),
+    reads=("IA", "KAPPA", "V"),
     forces=forces,
     starts=starts,
 )

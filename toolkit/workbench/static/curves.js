@@ -8,21 +8,19 @@ const ink = (name) => getComputedStyle(document.documentElement).getPropertyValu
 const figures = new Intl.NumberFormat(document.documentElement.lang, { maximumSignificantDigits: 6, useGrouping: false });
 const uncertain = new Intl.NumberFormat(document.documentElement.lang, { maximumSignificantDigits: 2, useGrouping: false });
 
-function stroke(series) {
-  if (series.label) return ink({ file: "--file", nominal: "--file", refitted: "--load-4" }[series.label] || "--right");
-  return ink("--load-" + (series.load % 7));
-}
+const TONES = { file: "--file", nominal: "--file", refitted: "--load-4", record: "--right", augmented: "--right" };
+function stroke(series, at) { return ink(TONES[series.label] || "--load-" + (series.condition ? series.condition.load : at) % 7); }
 // Draws one series of uPlot's mode in which each has its own x: a line, or symbols with their U.
 function paths(content, element) {
   return (plot, at) => {
-    const series = content.series[at - 1], pixels = devicePixelRatio;
+    const series = content.series[at - 1], pixels = devicePixelRatio, reverse = series.condition?.rotation === "reverse";
     uPlot.orient(plot, at, (_, xs, ys, scaleX, scaleY, toX, toY, left, top, width, height) => {
       const ctx = plot.ctx, X = (value) => toX(value, scaleX, width, left), Y = (value) => toY(value, scaleY, height, top);
       ctx.save();
       ctx.beginPath(); ctx.rect(left, top, width, height); ctx.clip();
-      ctx.strokeStyle = ctx.fillStyle = stroke(series);
+      ctx.strokeStyle = ctx.fillStyle = stroke(series, at - 1);
       ctx.lineWidth = (series.label === "file" ? 2.4 : 1.4) * pixels;
-      ctx.setLineDash(series.line && series.rotation === "reverse" ? [5 * pixels, 4 * pixels] : []);
+      ctx.setLineDash(series.dash || series.line && reverse ? [5 * pixels, 4 * pixels] : []);
       const [x, y] = plot.data[at];
       if (series.line) {
         ctx.beginPath();
@@ -33,7 +31,7 @@ function paths(content, element) {
         if (series.U) { ctx.moveTo(X(value), Y(y[i] - series.U[i])); ctx.lineTo(X(value), Y(y[i] + series.U[i])); ctx.stroke(); }
         if (series.U_x) { ctx.beginPath(); ctx.moveTo(X(value - series.U_x[i]), Y(y[i])); ctx.lineTo(X(value + series.U_x[i]), Y(y[i])); ctx.stroke(); }
         ctx.beginPath(); ctx.arc(X(value), Y(y[i]), 3.2 * pixels, 0, 2 * Math.PI);
-        if (series.rotation === "reverse") { ctx.save(); ctx.fillStyle = ink("--paper"); ctx.fill(); ctx.restore(); ctx.stroke(); } else ctx.fill();
+        if (reverse) { ctx.save(); ctx.fillStyle = ink("--paper"); ctx.fill(); ctx.restore(); ctx.stroke(); } else ctx.fill();
       });
       const told = element.told;
       if (told && told[0] === at - 1) {
@@ -61,8 +59,8 @@ function draw(element) {
     mode: 2, width: Math.max(element.clientWidth, 160), height: small ? 130 : 300, legend: { show: false },
     scales: { x: { time: false, range: range(content.x_range) }, y: { range: range(content.y_range) } },
     cursor: { points: { show: false }, dataIdx: () => null, drag: { x: true, y: true, uni: 20 } },
-    axes: [axis(content.x_label), Object.assign(axis(content.y_label), { size: small ? 50 : 62 })],
-    series: [{}, ...content.series.map((series) => ({ stroke: () => stroke(series), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: paths(content, element) }))],
+    axes: [Object.assign(axis(content.x_label), { size: 34 }), Object.assign(axis(content.y_label), { size: (_, ticks) => 18 + 6.2 * Math.max(4, ...(ticks || []).map((tick) => tick.length)) })],
+    series: [{}, ...content.series.map((series, at) => ({ stroke: () => stroke(series, at), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: paths(content, element) }))],
   }, [null, ...content.series.map((series) => [series.x, series.y])], element);
   drawn.set(element, { plot, content });
   plot.over.addEventListener("mousemove", (event) => tell(element, nearest(element, event)));
@@ -101,7 +99,7 @@ function tell(element, at) {
   if (!at) return;
   const series = content.series[at[0]], i = at[1], unit = (label) => label.replace(/^.*\[(.*)\]$/, "$1"), name = (label) => label.replace(/ \[.*$/, "");
   const value = (label, number, U) => name(label) + " = " + figures.format(number) + (U ? " ± " + uncertain.format(U) : "") + (label.includes("[") ? "\u00a0" + unit(label) : "");
-  const who = series.label ? words[series.label] : figures.format(Math.round(series.load_N)) + "\u00a0N, " + words[series.rotation] + (series.line ? ", " + words.fitted : "");
+  const who = series.label ? words[series.label] || series.label : figures.format(Math.round(series.condition.load_N)) + "\u00a0N, " + words[series.condition.rotation] + (series.line ? ", " + words.fitted : "");
   output.textContent = who + ": " + value(content.x_label, series.x[i], series.U_x && series.U_x[i]) + ", " + value(content.y_label, series.y[i], series.U && series.U[i]);
   output.dataset.value = series.y[i];
 }
@@ -123,7 +121,7 @@ function shown(element) {
   const on = (name) => new Set([...form.querySelectorAll(`input[name=${name}]:checked`)].map((input) => input.value));
   const loads = on("load"), rotations = on("rotation"), { plot, content } = drawn.get(element);
   plot.batch(() => content.series.forEach((series, at) => {
-    const show = loads.has(String(series.load)) && rotations.has(series.rotation);
+    const show = !series.condition || loads.has(String(series.condition.load)) && rotations.has(series.condition.rotation);
     if (plot.series[at + 1].show !== show) plot.setSeries(at + 1, { show });
   }));
 }
