@@ -37,7 +37,7 @@ def _check(payload: Mapping[str, Any], *, whole: bool) -> None:
     context = typer._click.globals.get_current_context(silent=True)
     declared = None if context is None else getattr(context.command.callback, "answer", None)
     if context is None and "requested" in payload:  # a request is answered after its command has ended
-        declared = "toolkit.lab.signing:RequestedAnswer"
+        declared = "toolkit.lab.signatures.signing:RequestedAnswer"
     if declared is not None:
         document = {key: value for key, value in json_value(payload).items() if key != "schema"}
         departs = [

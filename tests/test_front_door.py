@@ -214,7 +214,7 @@ def test_a_recording_is_read_in_the_units_of_its_file() -> None:
 
 
 def test_a_test_is_processed_as_the_command_does(processed: toolkit.ProcessedTest) -> None:
-    from toolkit.lab.process_answer import process_payload
+    from toolkit.lab.tire_tests.process_answer import process_payload
 
     conditions = process_payload(processed.result)["conditions"]
     assert processed.to_dataframe()["FY_N"].tolist() == [condition["FY_N"] for condition in conditions]

@@ -11,7 +11,7 @@ from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.session.settings import quantity
 from toolkit.errors import ToolkitError
-from toolkit.lab.protocol_plan import _quantity
+from toolkit.lab.plans.protocol_plan import _quantity
 from toolkit.machine import load_machine, read_protocol
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import read_test_folder

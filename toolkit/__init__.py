@@ -34,11 +34,11 @@ from toolkit.version import __version__ as __version__
 if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.estimate import Estimate
-    from toolkit.lab.archive import Audit, audit_archive
-    from toolkit.lab.cases import Diagnosis, Simulation, diagnose, simulate
+    from toolkit.lab.archives.archive import Audit, audit_archive
     from toolkit.lab.laboratory import Laboratory, example, open_laboratory
-    from toolkit.lab.record import Loads, Record
-    from toolkit.lab.test import (
+    from toolkit.lab.records.record import Loads, Record
+    from toolkit.lab.studies.cases import Diagnosis, Simulation, diagnose, simulate
+    from toolkit.lab.tire_tests.test import (
         ProcessedTest,
         Recording,
         Report,
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
         read_test,
         write_report,
     )
-    from toolkit.lab.tires import Tire, TireFit, fit_tire, read_tire
+    from toolkit.lab.tire_tests.tires import Tire, TireFit, fit_tire, read_tire
     from toolkit.machine import Machine, load_machine
 
 __all__ = [

@@ -20,7 +20,7 @@ TEMPLATES = Path(__file__).resolve().parents[2] / "report_templates"
 
 def content(test: Path, home: Path) -> Any:
     """Return the content of a test with its figures and tables repeated."""
-    from toolkit.lab.resolve import resolve_test
+    from toolkit.lab.tire_tests.resolve import resolve_test
     from toolkit.report.style import Style
     from toolkit.report.test.content import REPORT, build_content
     from toolkit.report.vocabulary import TableEntry

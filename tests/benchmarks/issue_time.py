@@ -20,9 +20,9 @@ from tests.calibration.registry.test_signatures import KEYS, RECORD, _found, _re
 from tests.trust.seal.seal_factory import authority, key, plain_pdf, trust
 from toolkit.calibration.registry.issuing import issue
 from toolkit.lab.home import packaged_home
-from toolkit.lab.people import checkpoint_of, lines_of
-from toolkit.lab.proofs import registry_ledger
-from toolkit.lab.verification import verify_file
+from toolkit.lab.signatures.people import checkpoint_of, lines_of
+from toolkit.lab.signatures.proofs import registry_ledger
+from toolkit.lab.signatures.verification import verify_file
 from toolkit.trust.anchor import anchor_of
 from toolkit.trust.people import NAMESPACE
 from toolkit.trust.seal.authority import to_pem

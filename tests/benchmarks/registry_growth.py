@@ -43,7 +43,7 @@ def run(folder: Path, count: int) -> list[dict[str, object]]:
 
 
 def _list(registry: Registry) -> object:
-    from toolkit.lab.registry_answer import listed
+    from toolkit.lab.records.registry_answer import listed
 
     return listed(registry, None, known_at=None, everything=False)
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from toolkit.cli.main import _register, app
 from toolkit.examples.fig4_4 import write_fig4_4
-from toolkit.lab.audit_headline import headline_of
+from toolkit.lab.archives.audit_headline import headline_of
 
 HOME = Path(__file__).resolve().parents[2]
 CALIBRATIONS = ("--calibrations", str(HOME / "calibrations"))

@@ -13,7 +13,7 @@ import typer
 
 from toolkit.cli import calibration_results
 from toolkit.errors import ToolkitError
-from toolkit.lab.proofs import anchor_in
+from toolkit.lab.signatures.proofs import anchor_in
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 TEMPLATE = CHECKOUT / "report_templates" / "certificate.docx"

@@ -10,7 +10,7 @@ import pytest
 
 from tests.tires.test_field_file import CONDITIONS, belt_test, truth, write_dat
 from toolkit.cli.main import run
-from toolkit.lab.tires import read_tire
+from toolkit.lab.tire_tests.tires import read_tire
 
 
 def test_a_belt_test_becomes_a_tire_file_with_intervals(

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from toolkit.cli import fit
 from toolkit.errors import ToolkitError
-from toolkit.lab.fit_models import model_choice
+from toolkit.lab.tire_tests.fit_models import model_choice
 from toolkit.simulation.tire import aligning_moment, lateral_force
 from toolkit.tires.models import model_names
 

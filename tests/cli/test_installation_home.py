@@ -9,8 +9,8 @@ import pytest
 
 from toolkit.cli.main import run
 from toolkit.errors import ConfigError
-from toolkit.lab import installation
 from toolkit.lab.home import calibrations_folder, find_home
+from toolkit.lab.upkeep import installation
 
 
 def code_of(*words: object) -> int:

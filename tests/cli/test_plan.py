@@ -16,7 +16,7 @@ from tests.planning.planning_factory import earlier
 from toolkit.cli.main import _register, app
 from toolkit.diagnosis.answer.serial import as_json
 from toolkit.errors import ConfigError
-from toolkit.lab import protocol_plan
+from toolkit.lab.plans import protocol_plan
 
 ROOT = Path(toolkit.__file__).resolve().parents[1]
 CALIBRATIONS = ROOT / "calibrations"

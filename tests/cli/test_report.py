@@ -20,9 +20,9 @@ from toolkit.cli.report import command
 from toolkit.cli.template import check, new, tags
 from toolkit.errors import ConfigError, OutputError, TemplateError
 from toolkit.findings import Finding
-from toolkit.lab import resolve
-from toolkit.lab.handover import details_of
 from toolkit.lab.home import home_template
+from toolkit.lab.tire_tests import resolve
+from toolkit.lab.tire_tests.handover import details_of
 from toolkit.recording.marks import is_own_output
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tydex import read_tydex

@@ -16,9 +16,9 @@ from toolkit.cli.report import command
 from toolkit.diagnosis.answer.answer import Diagnosis, Recorded
 from toolkit.diagnosis.answer.serial import as_json
 from toolkit.errors import ConfigError
-from toolkit.lab import resolve
-from toolkit.lab.handover import diagnosis_findings
-from toolkit.lab.resolve import Resolved
+from toolkit.lab.tire_tests import resolve
+from toolkit.lab.tire_tests.handover import diagnosis_findings
+from toolkit.lab.tire_tests.resolve import Resolved
 
 office_needed = pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")),

@@ -22,12 +22,12 @@ from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.approval import withdraw
 from toolkit.calibration.registry.ledger import head_bytes
 from toolkit.errors import ToolkitError
-from toolkit.lab.certificate import deliver_certificate
 from toolkit.lab.home import packaged_home
-from toolkit.lab.people import check_against
-from toolkit.lab.proofs import anchor_in, registry_ledger
-from toolkit.lab.sealing import Sealing
-from toolkit.lab.verification import Verdict, verify_file
+from toolkit.lab.records.certificate import deliver_certificate
+from toolkit.lab.signatures.people import check_against
+from toolkit.lab.signatures.proofs import anchor_in, registry_ledger
+from toolkit.lab.signatures.sealing import Sealing
+from toolkit.lab.signatures.verification import Verdict, verify_file
 from toolkit.report.word.package import read_template
 from toolkit.trust.people import NAMESPACE
 from toolkit.trust.seal.pdf import carried_by, proved_pdf

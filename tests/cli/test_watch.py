@@ -29,9 +29,9 @@ from toolkit.errors import (
 )
 from toolkit.findings import Finding
 from toolkit.lab.home import packaged_home
-from toolkit.lab.reports import MadeReport
-from toolkit.lab.watch import alone
-from toolkit.lab.watching import BATCH, SET_ASIDE, STATE, Round, Watcher
+from toolkit.lab.tire_tests.reports import MadeReport
+from toolkit.lab.tire_tests.watch import alone
+from toolkit.lab.tire_tests.watching import BATCH, SET_ASIDE, STATE, Round, Watcher
 from toolkit.recording.marks import is_own_output
 
 office_needed = pytest.mark.skipif(

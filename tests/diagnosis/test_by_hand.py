@@ -85,7 +85,7 @@ def model(tmp_path: Path) -> ModelFile:
 
 
 def trial(model: ModelFile, *sized: Sized, budget_s: float = 60.0) -> Trial:
-    from toolkit.lab.diagnosis import worker_limits
+    from toolkit.lab.studies.diagnosis import worker_limits
 
     assert model.case is not None
     limits = worker_limits(isolated=True)

@@ -38,7 +38,7 @@ ALLOWED = {
     ("toolkit.report.pages.kit", "read_text"): "data of the package",
     ("toolkit.lab.rules", "read_text"): "data of the package",
     ("toolkit.lab.home", "copyfile"): "data of the package",
-    ("toolkit.lab.kept_files", "read_bytes"): "data of the package",
+    ("toolkit.lab.upkeep.kept_files", "read_bytes"): "data of the package",
     ("toolkit.cli.demo", "copytree"): "data of the package",
     ("toolkit.cli.template", "read_bytes"): "data of the package",
     ("toolkit.cli.template", "read_text"): "data of the package",

@@ -11,8 +11,8 @@ import pytest
 from toolkit.errors import RecordingError
 from toolkit.files import sha256_file
 from toolkit.lab.home import TEMPLATES, packaged_home
-from toolkit.lab.kept_files import MIGRATIONS
-from toolkit.lab.migrate import migrate, undo
+from toolkit.lab.upkeep.kept_files import MIGRATIONS
+from toolkit.lab.upkeep.migrate import migrate, undo
 from toolkit.testfile import read_test_file
 
 RELEASES = sorted(Path(__file__).parent.glob("*.zip"))

@@ -12,7 +12,7 @@ import pytest
 from tests.trust.forgeries.laboratory import KEYS, RIG, laboratory
 from tests.trust.seal.seal_factory import authority, sealed_pdf, sealed_xml
 from toolkit.calibration.registry.registry import Registry
-from toolkit.lab.people import anchor_document, checkpoint_of
+from toolkit.lab.signatures.people import anchor_document, checkpoint_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "assessor.md"
 

@@ -16,7 +16,7 @@ from tests.workbench.conftest import Served, filled, serving
 from tests.workbench.test_home_page import command
 from tests.workbench.test_page import ANSWER
 from toolkit.cli.main import run
-from toolkit.lab.archive import audit_archive
+from toolkit.lab.archives.archive import audit_archive
 from toolkit.lab.laboratory import example
 
 Capture = pytest.CaptureFixture[str]

@@ -16,7 +16,7 @@ from tests.workbench.conftest import Served, serving
 from tests.workbench.test_app import DARK_PHONE, LIGHT, browser, objections, opened, settled
 from toolkit.calibration.registry.registry import Registry
 from toolkit.lab.home import make_home
-from toolkit.lab.people import enrol_person, set_demand
+from toolkit.lab.signatures.people import enrol_person, set_demand
 from toolkit.trust.keys import open_signer
 from toolkit.trust.people import Role
 from toolkit.trust.requests import read_request
@@ -131,7 +131,7 @@ def test_see_what_limits_U(browser: BrowserContext, empty: Served, tmp_path: Pat
         for at in range(shares.count())
     )
     # What limits U stands in the budget with its share; it is what `calibration budget` says.
-    from toolkit.lab.budget import BudgetOrder, budget_answer
+    from toolkit.lab.records.budget import BudgetOrder, budget_answer
 
     answer, _, _ = budget_answer(empty.registry, "cell-r1", BudgetOrder())
     components = [c for c in answer["loads"]["FY"]["components"] if c["stated"]]

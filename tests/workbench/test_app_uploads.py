@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.lab.test_uploads import CASE, ORG, contents
+from tests.lab.desk.test_uploads import CASE, ORG, contents
 from tests.workbench.conftest import Answer, Served, serving
-from toolkit.lab.holdings import holding_id
-from toolkit.lab.previews import template_findings
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.previews import template_findings
 from toolkit.trust.people import Person
 from toolkit.workbench.app import application
 from toolkit.workbench.guard import Keys

@@ -16,7 +16,7 @@ from tests.workbench.test_app import browser, opened, settled
 from tests.workbench.test_app_tasks import looked_at, photographed
 from tests.workbench.test_diagnosis_page import CASE_FILES
 from toolkit.files import sha256_file
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.home import make_home
 from toolkit.lab.laboratory import example
 

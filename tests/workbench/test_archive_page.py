@@ -11,8 +11,8 @@ import pytest
 
 from tests.benchmarks.archive_factory import KNOWN_AT, make_archive
 from tests.workbench.conftest import Served, plain, serving
-from toolkit.lab.archive import audit_archive
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.archives.archive import audit_archive
+from toolkit.lab.desk.holdings import holding_id
 
 ALL = holding_id("audits/all")
 

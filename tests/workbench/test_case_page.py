@@ -8,7 +8,7 @@ import pytest
 
 from tests.workbench.conftest import Answer, Served, serving
 from tests.workbench.test_diagnosis_page import CASE_FILES
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.home import make_home
 
 CASE = f"/case/{holding_id('cases/case-1')}"

@@ -13,8 +13,8 @@ import pytest
 from tests.workbench.conftest import ROOT, Served, plain, serving
 from tests.workbench.test_jobs_page import done
 from toolkit.errors import UnreadableError
-from toolkit.lab.holdings import holding_id
-from toolkit.lab.seen_diagnosis import read_diagnosis
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.seen_diagnosis import read_diagnosis
 
 CASE, ANSWER = holding_id("cases/cell"), holding_id("diagnoses/cases/cell")
 TOML = """schema = 1
@@ -121,7 +121,7 @@ def test_its_figures_are_those_of_its_own_page_and_its_predictions_can_be_zoomed
 
 
 def test_from_the_workbench_a_case_runs_isolated(answered: Path) -> None:
-    from toolkit.lab.jobs import jobs_of
+    from toolkit.lab.desk.jobs import jobs_of
 
     (job,) = jobs_of(answered)
     assert "--isolated" in job.job.words

@@ -12,7 +12,7 @@ import pytest
 
 from tests.workbench.conftest import serving
 from tests.workbench.test_diagnosis_page import ANSWER, answered, home
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk.holdings import holding_id
 from toolkit.simulation.model_file import read_model
 
 __all__ = ["answered", "home"]

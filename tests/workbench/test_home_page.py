@@ -11,7 +11,7 @@ import pytest
 
 from tests.workbench.conftest import Served, plain
 from toolkit.cli.main import run
-from toolkit.lab.agenda import work_of
+from toolkit.lab.desk.agenda import work_of
 
 
 def command(capsys: pytest.CaptureFixture[str], *words: object) -> dict[str, Any]:
@@ -107,7 +107,7 @@ def test_an_empty_home_says_what_comes_first(tmp_path: Path) -> None:
 
 
 def test_a_witness_is_named_with_what_it_has_seen(own: Served) -> None:
-    from toolkit.lab.people import checkpoint_of
+    from toolkit.lab.signatures.people import checkpoint_of
 
     folder = own.home / "trust" / "witnessed"
     folder.mkdir(parents=True)

@@ -11,7 +11,7 @@ import pytest
 
 from tests.workbench.conftest import ROOT, Answer, Served, plain, serving
 from toolkit.files import sha256_file
-from toolkit.lab.holdings import archives_of, holding_id
+from toolkit.lab.desk.holdings import archives_of, holding_id
 from toolkit.lab.laboratory import example
 
 ARCHIVE = holding_id("archive")
@@ -63,7 +63,7 @@ def test_an_archive_is_audited_seen_and_repaired_with_consent(home: Path) -> Non
 
 
 def test_a_second_job_is_told_what_runs_and_a_cancelled_one_says_so(home: Path) -> None:
-    from toolkit.lab.jobs import start_job
+    from toolkit.lab.desk.jobs import start_job
 
     with serving(home) as bench:
         job = start_job(home, kind="audit", title="waits", words=("open", ".", "--no-browser"))
@@ -87,7 +87,7 @@ def test_only_folders_of_the_home_are_audited_and_only_jobs_have_pages(home: Pat
 
 
 def test_a_job_that_was_interrupted_is_told_after_the_server_is_another_one(home: Path) -> None:
-    from toolkit.lab.jobs import FOLDER, Job, write_job
+    from toolkit.lab.desk.jobs import FOLDER, Job, write_job
 
     place = home / FOLDER / "20260101T000000-00000001"
     place.mkdir(parents=True)

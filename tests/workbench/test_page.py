@@ -12,9 +12,9 @@ from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.workbench.conftest import ROOT, Served, serving
 from tests.workbench.test_app import DARK_PHONE, LIGHT, browser, objections, opened, settled
-from toolkit.lab.archive import audit_archive
-from toolkit.lab.holdings import holding_id
-from toolkit.lab.jobs import Job, write_job
+from toolkit.lab.archives.archive import audit_archive
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.jobs import Job, write_job
 from toolkit.lab.laboratory import example
 
 __all__ = ["browser"]

@@ -19,8 +19,8 @@ from tests.workbench.test_jobs_page import done
 from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import ConfigError, UnreadableError
-from toolkit.lab.holdings import holding_id
-from toolkit.lab.kept_plans import fixtures_of, plan_words, read_plan
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.kept_plans import fixtures_of, plan_words, read_plan
 
 ANSWER = holding_id("diagnoses/late")
 FORMS: dict[str, dict[str, str]] = {

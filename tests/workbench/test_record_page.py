@@ -178,7 +178,7 @@ def test_every_rule_that_a_gate_names_is_in_the_table() -> None:
     from pathlib import Path
 
     import toolkit.calibration.registry.gates as gates
-    from toolkit.lab.gates_answer import GATES
+    from toolkit.lab.records.gates_answer import GATES
 
     folder = Path(gates.__file__).parent
     named = {

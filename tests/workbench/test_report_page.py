@@ -14,7 +14,7 @@ import pytest
 from tests.workbench.conftest import ROOT, Served, plain, serving
 from tests.workbench.test_home_page import command
 from tests.workbench.test_jobs_page import done
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.laboratory import example
 
 TEST = holding_id("tests/few")

@@ -28,7 +28,7 @@ from cryptography.x509.oid import NameOID
 
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError
-from toolkit.lab.people import enrol_person, revoke_key
+from toolkit.lab.signatures.people import enrol_person, revoke_key
 from toolkit.trust.keys import open_signer
 from toolkit.workbench.server import Listening, check_listening
 

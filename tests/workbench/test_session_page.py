@@ -16,7 +16,7 @@ from tests.workbench.test_signing_page import People, people
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import run as run_toolkit
 from toolkit.errors import ConfigError
-from toolkit.lab.drafts import open_draft
+from toolkit.lab.desk.drafts import open_draft
 
 __all__ = ["people"]
 Capture = pytest.CaptureFixture[str]

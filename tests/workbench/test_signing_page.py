@@ -14,7 +14,7 @@ import pytest
 
 from tests.workbench.conftest import Answer, Served, plain
 from toolkit.calibration.registry.registry import Registry
-from toolkit.lab.people import enrol_person, set_demand
+from toolkit.lab.signatures.people import enrol_person, set_demand
 from toolkit.trust.keys import open_signer
 from toolkit.trust.people import Role
 from toolkit.trust.requests import read_request

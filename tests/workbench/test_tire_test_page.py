@@ -17,7 +17,7 @@ import pytest
 from tests.workbench.conftest import ROOT, Answer, Served, plain, serving
 from tests.workbench.test_home_page import command
 from toolkit.estimate import plus_minus
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk.holdings import holding_id
 
 Capture = pytest.CaptureFixture[str]
 ONE, TWO = holding_id("tests/one"), holding_id("tests/two")

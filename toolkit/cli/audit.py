@@ -15,7 +15,7 @@ from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, in
 NAME = "audit"
 
 
-@answers("toolkit.lab.audit_answer:AuditAnswer")
+@answers("toolkit.lab.archives.audit_answer:AuditAnswer")
 def command(
     archive: Annotated[Path, typer.Argument(help="A folder of recordings, in any depth.")],
     workers: Annotated[
@@ -84,8 +84,8 @@ def command(
     """
     from functools import partial
 
-    from toolkit.lab.audit import AuditOrder, audit
-    from toolkit.lab.audit_answer import payload_of, text_of
+    from toolkit.lab.archives.audit import AuditOrder, audit
+    from toolkit.lab.archives.audit_answer import payload_of, text_of
 
     if workers is not None and scheduler is not None:
         raise typer.BadParameter("either workers here or those of a cluster", param_hint="--scheduler")

@@ -24,7 +24,7 @@ Figures = Annotated[
 ]
 
 
-@answers("toolkit.lab.session_answer:CalibrateAnswer")
+@answers("toolkit.lab.records.session_answer:CalibrateAnswer")
 def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
     out: Annotated[
@@ -54,14 +54,14 @@ def command(
     from toolkit.calibration.control.calibrate import calibrate, rehearse
     from toolkit.calibration.records.use import UNSIGNED
     from toolkit.lab.answers import refuse_unwritable
-    from toolkit.lab.sealing import standards_of
-    from toolkit.lab.session_answer import (
+    from toolkit.lab.records.session_answer import (
         NOT_ENTERED,
         candidate_payload,
         candidate_text,
         fit_report,
         next_step,
     )
+    from toolkit.lab.signatures.sealing import standards_of
 
     calibrations = entering.calibrations
     if calibrations is not None and out is not None and calibrations != out:

@@ -30,7 +30,7 @@ KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known 
 
 
 @app.command("list")
-@answers("toolkit.lab.registry_answer:ListAnswer")
+@answers("toolkit.lab.records.registry_answer:ListAnswer")
 def list_records(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     everything: Annotated[bool, typer.Option("--all", help="Discarded candidates too.")] = False,
@@ -43,7 +43,7 @@ def list_records(
 
     Example: toolkit calibration list rig --known-at 2026-03-02
     """
-    from toolkit.lab.registry_answer import listed
+    from toolkit.lab.records.registry_answer import listed
 
     payload, text, sound = listed(
         place.registry(), instrument, known_at=_day_or_none(known_at, "--known-at"),
@@ -54,7 +54,7 @@ def list_records(
 
 
 @app.command()
-@answers("toolkit.lab.registry_answer:ShowAnswer")
+@answers("toolkit.lab.records.registry_answer:ShowAnswer")
 def show(
     record_id: Id,
     known_at: KnownAt = None,
@@ -69,8 +69,8 @@ def show(
 
     Example: toolkit calibration show rig-r2
     """
-    from toolkit.lab.gates_answer import full_record
-    from toolkit.lab.registry_answer import shown
+    from toolkit.lab.records.gates_answer import full_record
+    from toolkit.lab.records.registry_answer import shown
 
     registry = place.registry()
     payload, text = shown(registry, record_id, known_at=_day_or_none(known_at, "--known-at"))
@@ -82,7 +82,7 @@ def show(
 
 
 @app.command()
-@answers("toolkit.lab.decisions:VerifyRegistryAnswer")
+@answers("toolkit.lab.records.decisions:VerifyRegistryAnswer")
 def verify(
     head: Annotated[str | None, typer.Option("--head", help="A ledger hash printed earlier.")] = None,
     *,
@@ -93,7 +93,7 @@ def verify(
 
     Example: toolkit calibration verify --head HASH
     """
-    from toolkit.lab.decisions import verified_answer
+    from toolkit.lab.records.decisions import verified_answer
 
     payload, text = verified_answer(place.registry(), head)
     output.answer(payload, text)
@@ -101,7 +101,7 @@ def verify(
 
 
 @app.command()
-@answers("toolkit.lab.registry_answer:HistoryAnswer")
+@answers("toolkit.lab.records.registry_answer:HistoryAnswer")
 def history(
     name: Annotated[str, typer.Argument(help="An instrument, or a record id.")],
     *,
@@ -112,7 +112,7 @@ def history(
 
     Example: toolkit calibration history rig
     """
-    from toolkit.lab.registry_answer import history as told
+    from toolkit.lab.records.registry_answer import history as told
 
     registry = place.registry()
     instrument = name if name in registry.instruments() else _instrument_of(name)
@@ -123,7 +123,7 @@ def history(
 
 
 @app.command("import")
-@answers("toolkit.lab.decisions:ImportAnswer")
+@answers("toolkit.lab.records.decisions:ImportAnswer")
 def import_record(
     file: Annotated[Path, typer.Argument(help="TOML with the coefficients and the source that names them.")],
     again: Annotated[
@@ -137,14 +137,14 @@ def import_record(
 
     Example: toolkit calibration import coefficients-2004.toml
     """
-    from toolkit.lab.decisions import import_answer
+    from toolkit.lab.records.decisions import import_answer
 
     output.answer(*import_answer(entering.registry(), file, again=again))
     return 0
 
 
 @app.command()
-@answers("toolkit.lab.decisions:ApproveAnswer")
+@answers("toolkit.lab.records.decisions:ApproveAnswer")
 def approve(
     record_id: Id,
     in_force_from: Annotated[str, typer.Option("--in-force-from", help=IN_FORCE)],
@@ -178,7 +178,7 @@ def approve(
     Example: toolkit calibration approve rig-r2 --in-force-from 2026-03-02 --checked-by "second person"
     """
     from toolkit.calibration.registry.approval import approve as put_in_force
-    from toolkit.lab.decisions import approval_answer
+    from toolkit.lab.records.decisions import approval_answer
 
     registry, since = entering.registry(), _day(in_force_from, "--in-force-from")
     decision = put_in_force(
@@ -190,7 +190,7 @@ def approve(
 
 
 @app.command()
-@answers("toolkit.lab.decisions:WithdrawAnswer")
+@answers("toolkit.lab.records.decisions:WithdrawAnswer")
 def withdraw(
     record_id: Id,
     on: Annotated[
@@ -212,7 +212,7 @@ def withdraw(
     Example: toolkit calibration withdraw rig-r2 --on 2026-04-01 --by "first person" --reason "dropped"
     """
     from toolkit.calibration.registry.approval import withdraw as void
-    from toolkit.lab.decisions import withdrawal_answer
+    from toolkit.lab.records.decisions import withdrawal_answer
 
     registry = entering.registry()
     status = void(
@@ -223,7 +223,7 @@ def withdraw(
     return 0
 
 
-@answers("toolkit.lab.registry_answer:DifferenceAnswer")
+@answers("toolkit.lab.records.registry_answer:DifferenceAnswer")
 def diff(
     one: Id,
     other: Id,
@@ -235,14 +235,14 @@ def diff(
 
     Example: toolkit calibration diff rig-r1 rig-r2
     """
-    from toolkit.lab.registry_answer import difference
+    from toolkit.lab.records.registry_answer import difference
 
     payload, text, differs = difference(place.registry(), one, other)
     output.answer(payload, text)
     return 1 if differs else 0
 
 
-@answers("toolkit.lab.decisions:DiscardAnswer")
+@answers("toolkit.lab.records.decisions:DiscardAnswer")
 def discard(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
     reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
@@ -259,7 +259,7 @@ def discard(
     Example: toolkit calibration discard rig-r3 --reason "cable of D52 was loose" --by "first person"
     """
     from toolkit.calibration.registry.approval import discard as put_aside
-    from toolkit.lab.decisions import discarded_answer
+    from toolkit.lab.records.decisions import discarded_answer
 
     registry = entering.registry()
     status = put_aside(registry, record_id, reason=reason, by=by)
@@ -267,7 +267,7 @@ def discard(
     return 0
 
 
-@answers("toolkit.lab.session_answer:RecordReportAnswer")
+@answers("toolkit.lab.records.session_answer:RecordReportAnswer")
 def report(
     record_id: Id,
     figures: Figures = None,
@@ -279,7 +279,7 @@ def report(
 
     Example: toolkit calibration report rig-r2 --figures fit
     """
-    from toolkit.lab.session_answer import record_report
+    from toolkit.lab.records.session_answer import record_report
 
     payload, text, findings = record_report(place.registry(), record_id, figures)
     output.answer(payload, text)

@@ -25,7 +25,7 @@ from toolkit.cli.options import (
 CERTIFICATE = "certificate"
 
 
-@answers("toolkit.lab.budget:BudgetAnswer")
+@answers("toolkit.lab.records.budget:BudgetAnswer")
 def budget(
     record_id: Id,
     load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
@@ -67,7 +67,7 @@ def budget(
 
     Example: toolkit calibration budget rig-r2 --load FY --at 4000N
     """
-    from toolkit.lab.budget import BudgetOrder, budget_answer, temperature_of
+    from toolkit.lab.records.budget import BudgetOrder, budget_answer, temperature_of
 
     order = BudgetOrder(
         load=load, at=at, indications=indications, trials=trials, seed=seed, digits=digits, figure=figure,
@@ -78,7 +78,7 @@ def budget(
     return exit_code(findings)
 
 
-@answers("toolkit.lab.applied:ApplyAnswer")
+@answers("toolkit.lab.records.applied:ApplyAnswer")
 def apply(
     record_id: Id,
     data: Annotated[
@@ -106,9 +106,9 @@ def apply(
 
     Example: toolkit calibration apply rig-r1 data.csv --out loads.csv
     """
-    from toolkit.lab.applied import apply_answer
-    from toolkit.lab.budget import values_of
-    from toolkit.lab.record import Record
+    from toolkit.lab.records.applied import apply_answer
+    from toolkit.lab.records.budget import values_of
+    from toolkit.lab.records.record import Record
 
     registry = place.registry()
     record = Record(result=registry.load(record_id), registry=registry, on=day(on), known_at=day(known_at))
@@ -118,7 +118,7 @@ def apply(
     return exit_code(loads.findings)
 
 
-@answers("toolkit.lab.certificate:CertificateAnswer")
+@answers("toolkit.lab.records.certificate:CertificateAnswer")
 def certificate(
     record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
     template: Annotated[
@@ -163,8 +163,8 @@ def certificate(
 
     Example: toolkit calibration certificate rig-r3 --out certificates --dcc
     """
-    from toolkit.lab.certificate import certificate_payload, certificate_text, deliver_certificate
     from toolkit.lab.home import home_template
+    from toolkit.lab.records.certificate import certificate_payload, certificate_text, deliver_certificate
     from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
@@ -183,7 +183,7 @@ def certificate(
     return 1 if delivered.warnings else exit_code(issued.findings)
 
 
-@answers("toolkit.lab.control_answer:StandardAnswer")
+@answers("toolkit.lab.records.control_answer:StandardAnswer")
 def standard(
     record_id: Id,
     name: Annotated[str, typer.Option("--standard", help="e74 or iso376.")],
@@ -211,7 +211,7 @@ def standard(
     """
     from toolkit.calibration.control.standard import evaluate_record
     from toolkit.errors import ConfigError
-    from toolkit.lab.control_answer import evaluation_text
+    from toolkit.lab.records.control_answer import evaluation_text
 
     if name not in ("e74", "iso376"):
         raise ConfigError(
@@ -232,7 +232,7 @@ def standard(
     return 0
 
 
-@answers("toolkit.lab.control_answer:ChartAnswer")
+@answers("toolkit.lab.records.control_answer:ChartAnswer")
 def chart(
     instrument: Annotated[str, typer.Argument(help="The instrument.")],
     out: Annotated[
@@ -253,7 +253,7 @@ def chart(
 
     Example: toolkit calibration chart rig --out chart.png
     """
-    from toolkit.lab.control_answer import chart_answer
+    from toolkit.lab.records.control_answer import chart_answer
 
     payload, text, findings = chart_answer(
         place.registry(), instrument, load=load, baseline=baseline, out=out
@@ -262,7 +262,7 @@ def chart(
     return exit_code(findings)
 
 
-@answers("toolkit.lab.control_answer:DueAnswer")
+@answers("toolkit.lab.records.control_answer:DueAnswer")
 def due(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     on: Annotated[
@@ -277,7 +277,7 @@ def due(
     Example: toolkit calibration due --on 2026-12-01
     """
     from toolkit.calibration.registry.clock import today
-    from toolkit.lab.control_answer import due_answer
+    from toolkit.lab.records.control_answer import due_answer
 
     registry = place.registry()
     payload, text, findings = due_answer(registry, instrument, day(on) or today())

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 NAME = "compare"
 
 
-@answers("toolkit.lab.compare_answer:CompareForms")
+@answers("toolkit.lab.tire_tests.compare_answer:CompareForms")
 def command(
     sources: Annotated[
         list[Path] | None,
@@ -132,9 +132,9 @@ def command(
     """
     from toolkit.comparison.compare import compare
     from toolkit.lab.answers import delivered_keys, unit_choice
-    from toolkit.lab.compare import read_entries, write_comparison
-    from toolkit.lab.compare_answer import comparison_payload, comparison_text
     from toolkit.lab.home import document_template
+    from toolkit.lab.tire_tests.compare import read_entries, write_comparison
+    from toolkit.lab.tire_tests.compare_answer import comparison_payload, comparison_text
 
     if laboratories is not None:
         if sources:
@@ -198,7 +198,7 @@ def _laboratories(
 ) -> int:
     from datetime import date as calendar
 
-    from toolkit.lab.laboratories import laboratories_answer
+    from toolkit.lab.tire_tests.laboratories import laboratories_answer
 
     started = time.perf_counter()
     payload, text, findings = laboratories_answer(

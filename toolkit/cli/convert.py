@@ -59,8 +59,8 @@ def command(
     from functools import partial
 
     from toolkit.lab.answers import draft_keys, findings_text
-    from toolkit.lab.convert import convert
-    from toolkit.lab.resolve import resolve_test
+    from toolkit.lab.tire_tests.convert import convert
+    from toolkit.lab.tire_tests.resolve import resolve_test
 
     started = time.perf_counter()
     resolve = partial(

@@ -20,7 +20,7 @@ from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import Timing
 
 if TYPE_CHECKING:
-    from toolkit.lab.resolve import Resolved
+    from toolkit.lab.tire_tests.resolve import Resolved
 
 
 class DemoStep(TypedDict):
@@ -291,14 +291,14 @@ def _told_fit(payload: Payload) -> str:
 
 
 def _resolved(stage: Path) -> Resolved:
-    from toolkit.lab.resolve import resolve_test
+    from toolkit.lab.tire_tests.resolve import resolve_test
 
     return resolve_test(stage / "test.xlsx", home=stage / "home")
 
 
 def _tire_file(resolved: Resolved, path: Path) -> str:
     """Write MF 6.1 over all loads of the forward run, and tell how well it fits."""
-    from toolkit.lab.tire_files import write_test_tir
+    from toolkit.lab.tire_tests.tire_files import write_test_tir
 
     fit = write_test_tir(path, resolved.result.reduced, comments=[resolved.result.reduced.machine_title])
     errors = ", ".join(f"{channel.channel} {channel.error_percent:.2f} %" for channel in fit.fits)

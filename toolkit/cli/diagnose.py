@@ -14,7 +14,7 @@ from toolkit.cli.options import Output, RegistryOptions, WorkerOptions, into_fol
 NAME = "diagnose"
 
 
-@answers("toolkit.lab.diagnosis:DiagnoseAnswer")
+@answers("toolkit.lab.studies.diagnosis:DiagnoseAnswer")
 def command(
     case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Simulation and recordings.")],
     out: Annotated[
@@ -68,8 +68,8 @@ def command(
     Example: toolkit diagnose case.toml --out answer
     """
     _one_thread()
-    from toolkit.lab.diagnosis import diagnose_case, diagnosis_text, write_diagnosis
     from toolkit.lab.home import home_template
+    from toolkit.lab.studies.diagnosis import diagnose_case, diagnosis_text, write_diagnosis
     from toolkit.report.word.office import find_soffice
     from toolkit.report.word.package import read_template
 

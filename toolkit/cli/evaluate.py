@@ -57,7 +57,7 @@ def command(
     Example: toolkit evaluate tire.tir grid.csv --axes SAE --out forces.csv
     """
     from toolkit.lab.answers import findings_text
-    from toolkit.lab.evaluate import evaluate_grid, grid_rows, grid_text, grid_units, refuse_output
+    from toolkit.lab.tire_tests.evaluate import evaluate_grid, grid_rows, grid_text, grid_units, refuse_output
     from toolkit.publication import write_result
     from toolkit.tires.table import read_table
     from toolkit.tires.tir import read_tir

@@ -24,7 +24,7 @@ from toolkit.cli.options import (
 NAME = "fit"
 
 
-@answers("toolkit.lab.fit_answer:FitAnswer")
+@answers("toolkit.lab.tire_tests.fit_answer:FitAnswer")
 def command(
     source: Annotated[
         Path,
@@ -95,16 +95,16 @@ def command(
     Example: toolkit fit tire.csv --model magic_formula --model mf61 --model brush --figures figures
     """
     from toolkit.lab.answers import refuse_unwritable
-    from toolkit.lab.fit_answer import fit_payload, fit_text
-    from toolkit.lab.fit_models import (
+    from toolkit.lab.tire_tests.fit_answer import fit_payload, fit_text
+    from toolkit.lab.tire_tests.fit_models import (
         fit_options,
         fit_table_models,
         fit_test_models,
         model_choice,
         write_figures,
     )
-    from toolkit.lab.fmu_files import check_fmu, write_fit_fmu
-    from toolkit.lab.tire_files import check_tir, write_fit
+    from toolkit.lab.tire_tests.fmu_files import check_fmu, write_fit_fmu
+    from toolkit.lab.tire_tests.tire_files import check_tir, write_fit
     from toolkit.publication import publication
     from toolkit.tires.field_file import is_field_file
 

@@ -12,12 +12,12 @@ from toolkit.cli.options import KnownAt, Output, RegistryOptions, day
 
 if TYPE_CHECKING:
     from toolkit.findings import Finding
-    from toolkit.lab.inspection_answer import Inspected, UnreadFile
+    from toolkit.lab.tire_tests.inspection_answer import Inspected, UnreadFile
 
 NAME = "inspect"
 
 
-@answers("toolkit.lab.inspection_answer:InspectForms")
+@answers("toolkit.lab.tire_tests.inspection_answer:InspectForms")
 def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, under any name.")],
     machine: Annotated[
@@ -44,7 +44,7 @@ def command(
     from toolkit.audit.inspection import inspect_file
     from toolkit.errors import ToolkitError
     from toolkit.lab.home import registry_if_any
-    from toolkit.lab.inspection_answer import inspection_payload, inspection_text, intervals_of
+    from toolkit.lab.tire_tests.inspection_answer import inspection_payload, inspection_text, intervals_of
 
     registry = registry_if_any(place.calibrations, place.home)
     payloads: list[Inspected | UnreadFile] = []

@@ -52,7 +52,7 @@ def init(
     return 0
 
 
-@answers("toolkit.lab.migrate:MigrateAnswer")
+@answers("toolkit.lab.upkeep.migrate:MigrateAnswer")
 def migrate(
     home: Annotated[Path, typer.Argument(metavar="HOME", help="The home, as an older version left it.")],
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Check and tell; write nothing.")] = False,
@@ -68,20 +68,20 @@ def migrate(
 
     Example: toolkit migrate lab --dry-run
     """
-    from toolkit.lab import migrate as migration
+    from toolkit.lab.upkeep import migrate as migration
 
     payload, text = migration.undo(home) if undo else migration.migrate(home, dry_run=dry_run)
     output.answer(payload, text)
     return int(any(file["state"] == "refused" for file in payload["files"]))
 
 
-@answers("toolkit.lab.installation:DoctorAnswer")
+@answers("toolkit.lab.upkeep.installation:DoctorAnswer")
 def doctor(*, output: Output) -> int:
     """Report what this computer lacks, and how to install it.
 
     Example: toolkit doctor
     """
-    from toolkit.lab.installation import doctor_answer
+    from toolkit.lab.upkeep.installation import doctor_answer
 
     payload, text = doctor_answer()
     output.answer(payload, text)
@@ -110,7 +110,7 @@ def docs(
     return 0
 
 
-@answers("toolkit.lab.installation:QualifyAnswer")
+@answers("toolkit.lab.upkeep.installation:QualifyAnswer")
 def qualify(
     out: Annotated[
         Path | None,
@@ -125,7 +125,7 @@ def qualify(
     """
     from toolkit.declared import json_value
     from toolkit.lab.home import packaged_home
-    from toolkit.lab.installation import qualification_payload, qualification_text
+    from toolkit.lab.upkeep.installation import qualification_payload, qualification_text
     from toolkit.publication import write_result
     from toolkit.qualification.run import qualify as run
 

@@ -142,7 +142,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
     try:
         code = command_tree()(args=arguments, prog_name="toolkit", standalone_mode=False)
     except Requested as outcome:
-        from toolkit.lab.signing import requested
+        from toolkit.lab.signatures.signing import requested
 
         quiet = not {"--quiet", "-q"}.isdisjoint(arguments)
         answer(*requested(outcome), as_json=as_json, quiet=quiet)

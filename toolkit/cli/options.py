@@ -19,7 +19,7 @@ from toolkit.cli import console
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.lab.sealing import Sealing
+    from toolkit.lab.signatures.sealing import Sealing
     from toolkit.trust.keys import Signer
     from toolkit.trust.signing import Travel
     from toolkit.worker.posix import Limits
@@ -289,7 +289,7 @@ class IssueOptions(DecisionOptions):
 
     def sealing(self, registry: Registry, *, draft: bool) -> Sealing | None:
         """Return the seal of what is issued; None without one."""
-        from toolkit.lab.sealing import open_sealing
+        from toolkit.lab.signatures.sealing import open_sealing
 
         home = registry.folder.parent
         return open_sealing(self.seal, home, ask=console.ask_passphrase, stamps=self.time_stamp, draft=draft)
@@ -305,7 +305,7 @@ class WorkerOptions:
 
     def limits(self) -> Limits:
         """Return them, as the worker takes them."""
-        from toolkit.lab.diagnosis import worker_limits
+        from toolkit.lab.studies.diagnosis import worker_limits
 
         return worker_limits(isolated=self.isolated, memory_GB=self.memory, processes=self.processes)
 

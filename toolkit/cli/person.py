@@ -63,7 +63,7 @@ def key(
 
 
 @person.command()
-@answers("toolkit.lab.people:PeopleAnswer")
+@answers("toolkit.lab.signatures.people:PeopleAnswer")
 def enrol(
     person_id: Annotated[str, typer.Argument(metavar="ID", help="Short name of the person.")],
     name: Annotated[str, typer.Option("--name", help="As documents print it.")],
@@ -82,7 +82,7 @@ def enrol(
 
     Example: toolkit person enrol anna --name "Anna E." --role head --key a.pub --sign a --recovery safe
     """
-    from toolkit.lab.people import enrol_person, people_answer
+    from toolkit.lab.signatures.people import enrol_person, people_answer
 
     registry = entering.registry()
     recovered = open_signers([recovery])[0] if recovery is not None else None
@@ -95,20 +95,20 @@ def enrol(
 
 
 @person.command("list")
-@answers("toolkit.lab.people:PeopleAnswer")
+@answers("toolkit.lab.signatures.people:PeopleAnswer")
 def list_people(*, place: RegistryOptions, output: Output) -> int:
     """List who is enrolled, with roles and keys.
 
     Example: toolkit person list
     """
-    from toolkit.lab.people import people_answer
+    from toolkit.lab.signatures.people import people_answer
 
     output.answer(*people_answer(place.registry().people()))
     return 0
 
 
 @person.command()
-@answers("toolkit.lab.people:PeopleAnswer")
+@answers("toolkit.lab.signatures.people:PeopleAnswer")
 def revoke(
     person_id: Annotated[str, typer.Argument(metavar="ID", help="Whose key.")],
     since: Annotated[
@@ -125,7 +125,7 @@ def revoke(
 
     Example: toolkit person revoke anna --from 2026-11-22T00:00:00Z --reason "laptop stolen" --sign ben
     """
-    from toolkit.lab.people import people_answer, revoke_key
+    from toolkit.lab.signatures.people import people_answer, revoke_key
 
     registry = entering.registry()
     log = revoke_key(registry, person_id, fingerprint=key, since=since, reason=reason, by=by)
@@ -134,7 +134,7 @@ def revoke(
 
 
 @person.command()
-@answers("toolkit.lab.people:PeopleAnswer")
+@answers("toolkit.lab.signatures.people:PeopleAnswer")
 def policy(
     action: Annotated[str, typer.Argument(help="enter, approve, withdraw, discard, import, issue or enrol.")],
     role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
@@ -153,7 +153,7 @@ def policy(
     """
     from typing import get_args
 
-    from toolkit.lab.people import people_answer, set_demand
+    from toolkit.lab.signatures.people import people_answer, set_demand
     from toolkit.trust.people import Action
 
     if action not in get_args(Action):
@@ -183,12 +183,12 @@ def prove(
 
     Example: toolkit ledger prove rig
     """
-    from toolkit.lab.people import anchor_document, checkpoint_of
+    from toolkit.lab.signatures.people import anchor_document, checkpoint_of
 
     registry = place.registry(sign)
     document = anchor_document(registry, instrument, entry, checkpoint_of(registry, instrument))
     if time_stamp is not None:
-        from toolkit.lab.sealing import stamped
+        from toolkit.lab.signatures.sealing import stamped
 
         document = stamped(document, time_stamp)
     typer.echo(document, nl=False)
@@ -196,7 +196,7 @@ def prove(
 
 
 @ledger.command()
-@answers("toolkit.lab.people:CheckLedgerAnswer")
+@answers("toolkit.lab.signatures.people:CheckLedgerAnswer")
 def check(
     against: Annotated[
         Path,
@@ -215,8 +215,8 @@ def check(
 
     Example: toolkit ledger check --against certificate.pdf
     """
-    from toolkit.lab.people import check_against
-    from toolkit.lab.sealing import TRUST, stamp_of, trusted
+    from toolkit.lab.signatures.people import check_against
+    from toolkit.lab.signatures.sealing import TRUST, stamp_of, trusted
 
     registry = place.registry()
     concerned, comparison = check_against(registry, instrument, against)
@@ -232,7 +232,7 @@ def check(
 
 
 @ledger.command()
-@answers("toolkit.lab.people:WitnessAnswer")
+@answers("toolkit.lab.signatures.people:WitnessAnswer")
 def witness(
     instrument: Instrument,
     folder: Annotated[
@@ -249,7 +249,7 @@ def witness(
 
     Example: toolkit ledger witness rig /mnt/north --name north --key north.key
     """
-    from toolkit.lab.people import witness as countersigned
+    from toolkit.lab.signatures.people import witness as countersigned
 
     registry = place.registry(sign)
     signer = open_signers([key])[0]

@@ -27,7 +27,7 @@ SheetTemplate = Annotated[
 
 
 @app.command("session")
-@answers("toolkit.lab.plan_session:PlanSessionAnswer")
+@answers("toolkit.lab.plans.plan_session:PlanSessionAnswer")
 def session(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as rig: its record in force is the basis.")
@@ -104,7 +104,7 @@ def session(
     Example: toolkit plan session rig --u "FY=1.2 N" --out next
     """
     from toolkit.lab.home import document_template
-    from toolkit.lab.plan_session import PlanOrder, session_plan_answer
+    from toolkit.lab.plans.plan_session import PlanOrder, session_plan_answer
     from toolkit.planning.criteria import CRITERIA
 
     if criterion not in CRITERIA:
@@ -131,7 +131,7 @@ def sheet_code(payload: Mapping[str, Any]) -> int:
 
 
 @app.command("interval")
-@answers("toolkit.lab.plan_interval:PlanIntervalAnswer")
+@answers("toolkit.lab.plans.plan_interval:PlanIntervalAnswer")
 def interval(
     instrument: Annotated[
         str, typer.Argument(help="Instrument, such as rig: by the history of its check loads.")
@@ -164,7 +164,7 @@ def interval(
     Example: toolkit plan interval rig --reliability 0.95 --tests 200
     """
     from toolkit.lab.home import document_template
-    from toolkit.lab.plan_interval import interval_plan_answer
+    from toolkit.lab.plans.plan_interval import interval_plan_answer
 
     started = time.perf_counter()
     payload, text, findings = interval_plan_answer(

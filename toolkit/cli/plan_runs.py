@@ -15,7 +15,7 @@ from toolkit.cli.plan import SheetTemplate, app, sheet_code
 
 
 @app.command("test")
-@answers("toolkit.lab.protocol_plan:PlanTestAnswer")
+@answers("toolkit.lab.plans.protocol_plan:PlanTestAnswer")
 def protocol(
     like: Annotated[
         Path | None,
@@ -77,7 +77,7 @@ def protocol(
     Example: toolkit plan test --like tests/2019-06-04 --u "conicity=2 N" --load "833 lbf" --out plan
     """
     from toolkit.lab.home import document_template
-    from toolkit.lab.protocol_plan import ProtocolOrder, plan_test
+    from toolkit.lab.plans.protocol_plan import ProtocolOrder, plan_test
 
     started = time.perf_counter()
     order = ProtocolOrder(
@@ -95,7 +95,7 @@ def protocol(
 
 
 @app.command("next")
-@answers("toolkit.lab.next_run:PlanNextAnswer")
+@answers("toolkit.lab.plans.next_run:PlanNextAnswer")
 def following(
     source: Annotated[
         Path,
@@ -136,7 +136,7 @@ def following(
     Example: toolkit plan next answer --out next
     """
     from toolkit.lab.home import document_template
-    from toolkit.lab.next_run import plan_next
+    from toolkit.lab.plans.next_run import plan_next
 
     started = time.perf_counter()
     opened = document_template(template, out)

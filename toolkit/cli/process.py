@@ -24,12 +24,12 @@ from toolkit.cli.options import (
 from toolkit.cli.options import reader as choose_reader
 
 if TYPE_CHECKING:
-    from toolkit.lab.process_answer import ProcessAnswer
+    from toolkit.lab.tire_tests.process_answer import ProcessAnswer
 
 NAME = "process"
 
 
-@answers("toolkit.lab.process_answer:ProcessAnswer")
+@answers("toolkit.lab.tire_tests.process_answer:ProcessAnswer")
 def command(
     test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
     calibration: CalibrationId = None,
@@ -55,8 +55,8 @@ def command(
     Example: toolkit process tests/2019-06-04 --out test.xlsx
     """
     from toolkit.lab.answers import unit_choice
-    from toolkit.lab.process_answer import process_payload, process_text
-    from toolkit.lab.resolve import resolve_test
+    from toolkit.lab.tire_tests.process_answer import process_payload, process_text
+    from toolkit.lab.tire_tests.resolve import resolve_test
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 

@@ -25,7 +25,7 @@ from toolkit.cli.options import reader as choose_reader
 NAME = "report"
 
 
-@answers("toolkit.lab.reports:ReportForms")
+@answers("toolkit.lab.tire_tests.reports:ReportForms")
 def command(
     tests: Annotated[
         list[Path],
@@ -124,7 +124,7 @@ def command(
     started = time.perf_counter()
     issued = None
     if issue or issuing.asked:
-        from toolkit.lab.issuing import open_issuing
+        from toolkit.lab.signatures.issuing import open_issuing
 
         registry = issuing.registry()
         issued = open_issuing(
@@ -134,11 +134,17 @@ def command(
     # LibreOffice and matplotlib take a second to start: beside all that is imported and read here.
     with Office() as office, Drawer() as drawer, output.progress("report") as step:
         from toolkit.lab.answers import unit_choice
-        from toolkit.lab.fit_models import model_choice
-        from toolkit.lab.handover import diagnosis_of
         from toolkit.lab.home import home_template
-        from toolkit.lab.reports import Options, attention, make_reports, report_text, reports_payload
-        from toolkit.lab.resolve import resolve_test
+        from toolkit.lab.tire_tests.fit_models import model_choice
+        from toolkit.lab.tire_tests.handover import diagnosis_of
+        from toolkit.lab.tire_tests.reports import (
+            Options,
+            attention,
+            make_reports,
+            report_text,
+            reports_payload,
+        )
+        from toolkit.lab.tire_tests.resolve import resolve_test
         from toolkit.report.word.package import read_template
 
         compared = model_choice(models) if models else ()

@@ -52,7 +52,7 @@ def command(
 
     Example: toolkit sign request.json --key ~/.ssh/anna
     """
-    from toolkit.lab.signing import agent_signer_of, passphrase_of, request_text, sign_request
+    from toolkit.lab.signatures.signing import agent_signer_of, passphrase_of, request_text, sign_request
     from toolkit.trust.keys import open_signer
     from toolkit.trust.requests import read_request
 

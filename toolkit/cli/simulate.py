@@ -13,7 +13,7 @@ from toolkit.cli.options import Output, RegistryOptions, WorkerOptions, into_fol
 NAME = "simulate"
 
 
-@answers("toolkit.lab.simulate:SimulateForms")
+@answers("toolkit.lab.studies.simulate:SimulateForms")
 def command(
     plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="What the machine does, and what it is.")],
     out: Annotated[
@@ -84,7 +84,7 @@ def command(
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
     from toolkit.lab.answers import finding_lines
-    from toolkit.lab.simulate import is_model_file, model_answer, simulate_plan
+    from toolkit.lab.studies.simulate import is_model_file, model_answer, simulate_plan
     from toolkit.simulation.plan import read_plan, with_effects
 
     if inputs or condition or is_model_file(plan):

@@ -153,7 +153,7 @@ def tags(
     style = read_style(None if template is None else style_file(read_template(template).path))
     content = None
     if test is not None:
-        from toolkit.lab.resolve import resolve_test
+        from toolkit.lab.tire_tests.resolve import resolve_test
 
         resolved = resolve_test(
             test, calibration=calibration, calibrations=place.calibrations, home=place.home, draft=draft

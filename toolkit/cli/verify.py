@@ -13,7 +13,7 @@ from toolkit.cli.options import Output, RegistryOptions
 NAME = "verify"
 
 
-@answers("toolkit.lab.verification:VerifyForms")
+@answers("toolkit.lab.signatures.verification:VerifyForms")
 def command(
     files: Annotated[
         list[Path],
@@ -39,9 +39,9 @@ def command(
 
     from toolkit.declared import json_value
     from toolkit.lab.home import registry_if_any
-    from toolkit.lab.proofs import registry_ledger
-    from toolkit.lab.sealing import home_trust
-    from toolkit.lab.verification import verify_file
+    from toolkit.lab.signatures.proofs import registry_ledger
+    from toolkit.lab.signatures.sealing import home_trust
+    from toolkit.lab.signatures.verification import verify_file
     from toolkit.trust.seal.x509 import with_files
 
     trust = with_files(home_trust(place.home), trusted or [])

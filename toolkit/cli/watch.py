@@ -17,7 +17,7 @@ from toolkit.cli.options import Output, RegistryOptions, into_folder
 NAME = "watch"
 
 
-@answers("toolkit.lab.watch:WatchAnswer")
+@answers("toolkit.lab.tire_tests.watch:WatchAnswer")
 def command(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", help="Folder in which tests arrive, each with test.toml.")
@@ -77,9 +77,9 @@ def command(
     from toolkit.errors import ConfigError
     from toolkit.lab.answers import unit_choice
     from toolkit.lab.home import home_template
-    from toolkit.lab.reports import Options
-    from toolkit.lab.resolve import resolve_test
-    from toolkit.lab.watch import WatchLog, alone, watcher_of
+    from toolkit.lab.tire_tests.reports import Options
+    from toolkit.lab.tire_tests.resolve import resolve_test
+    from toolkit.lab.tire_tests.watch import WatchLog, alone, watcher_of
     from toolkit.report.word.office import find_soffice
     from toolkit.report.word.package import read_template
 

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.lab.faces import Face, Facts
 from toolkit.lab.home import calibrations_folder, find_home, home_template, open_registry
-from toolkit.lab.record import Record, Records
+from toolkit.lab.records.record import Record, Records
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.verify import VerifyRow
-    from toolkit.lab.archive import Audit
-    from toolkit.lab.test import ProcessedTest, Report, Test
+    from toolkit.lab.archives.archive import Audit
+    from toolkit.lab.tire_tests.test import ProcessedTest, Report, Test
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -92,7 +92,7 @@ class Laboratory(Face):
 
     def read_test(self, path: str | Path) -> Test:
         """Return `toolkit.read_test` of a test that this laboratory's records compute."""
-        from toolkit.lab.test import read_test
+        from toolkit.lab.tire_tests.test import read_test
 
         return read_test(path, calibrations=self.calibrations)
 
@@ -100,13 +100,13 @@ class Laboratory(Face):
         self, test: ProcessedTest, out: str | Path, *, template: str | Path | None = None, **options: Any
     ) -> Report:
         """Return `toolkit.write_report` by a template of this laboratory; default ``org.docx``."""
-        from toolkit.lab.test import write_report
+        from toolkit.lab.tire_tests.test import write_report
 
         return write_report(test, out, template=template or self.template("org.docx"), **options)
 
     def audit_archive(self, archive: str | Path, **options: Any) -> Audit:
         """Return `toolkit.audit_archive` by the records of this laboratory."""
-        from toolkit.lab.archive import audit_archive
+        from toolkit.lab.archives.archive import audit_archive
 
         return audit_archive(archive, calibrations=self.calibrations, **options)
 

@@ -9,15 +9,15 @@ from starlette.exceptions import HTTPException
 
 from toolkit.audit.model import GRADES
 from toolkit.errors import ToolkitError
-from toolkit.lab.agenda import unfinished_audits
-from toolkit.lab.audited import ORDERS, Audited, stamp
+from toolkit.lab.desk.agenda import unfinished_audits
+from toolkit.lab.desk.audited import ORDERS, Audited, stamp
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
 
-    from toolkit.lab.audited import Order
+    from toolkit.lab.desk.audited import Order
     from toolkit.workbench.bench import Bench
     from toolkit.workbench.page import Routes
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from toolkit.calibration.registry.clock import today
 from toolkit.errors import ToolkitError
-from toolkit.lab.pending import agent_people, pending_request
+from toolkit.lab.desk.pending import agent_people, pending_request
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.lab.audited import Audited
-    from toolkit.lab.holdings import Holdings, Kind
+    from toolkit.lab.desk.audited import Audited
+    from toolkit.lab.desk.holdings import Holdings, Kind
     from toolkit.trust.people import Person
     from toolkit.workbench.guard import Keys
 
@@ -53,7 +53,7 @@ class Bench:
 
     def holdings(self, *, again: bool = False) -> Holdings:
         """Return what the home holds, as it was when it was last looked through; ``again`` looks now."""
-        from toolkit.lab.holdings import holdings_of
+        from toolkit.lab.desk.holdings import holdings_of
 
         if self._holdings is None or again:
             self._holdings = holdings_of(self.home)
@@ -66,7 +66,7 @@ class Bench:
 
     def reported(self) -> frozenset[str]:
         """Return the hashes that the reports of the home rest on, read once for each look through it."""
-        from toolkit.lab.holdings import reported_inputs
+        from toolkit.lab.desk.holdings import reported_inputs
 
         holdings = self.holdings()
         if self._reported is None or self._reported[0] is not holdings:
@@ -75,7 +75,7 @@ class Bench:
 
     def audited(self, audit_id: str) -> Audited | None:
         """Return the answer of an audit, read again once it is another; None where none has this id."""
-        from toolkit.lab.audited import read_audited, stamp
+        from toolkit.lab.desk.audited import read_audited, stamp
 
         folder = self.path_of("audit", audit_id)
         if folder is None:

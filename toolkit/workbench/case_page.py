@@ -13,8 +13,8 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.errors import ToolkitError
-from toolkit.lab import built_case
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk import built_case
+from toolkit.lab.desk.holdings import holding_id
 from toolkit.workbench.diagnosis_page import diagnoses_page
 from toolkit.workbench.page import page
 

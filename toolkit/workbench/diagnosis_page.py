@@ -13,12 +13,12 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse
 
 from toolkit.errors import ToolkitError
-from toolkit.lab.built_case import is_open, kinds
-from toolkit.lab.holdings import ANSWER, CASE, holding_id
-from toolkit.lab.jobs import start_job
-from toolkit.lab.seen_diagnosis import read_diagnosis
-from toolkit.lab.sized_model import MODELS, keep_model, sizable_model, sized_from, trial_answer
-from toolkit.lab.uploads import hand_in_case
+from toolkit.lab.desk.built_case import is_open, kinds
+from toolkit.lab.desk.holdings import ANSWER, CASE, holding_id
+from toolkit.lab.desk.jobs import start_job
+from toolkit.lab.desk.seen_diagnosis import read_diagnosis
+from toolkit.lab.desk.sized_model import MODELS, keep_model, sizable_model, sized_from, trial_answer
+from toolkit.lab.desk.uploads import hand_in_case
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
 
-    from toolkit.lab.sized_model import SizableModel
+    from toolkit.lab.desk.sized_model import SizableModel
     from toolkit.workbench.bench import Bench
     from toolkit.workbench.page import Routes
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.exceptions import HTTPException
 
-from toolkit.lab import agenda as questions
+from toolkit.lab.desk import agenda as questions
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -45,13 +45,13 @@ def _instruments(bench: Bench) -> dict[str, Any]:
 
 
 def _requests(bench: Bench) -> dict[str, Any]:
-    from toolkit.lab.pending import pending_requests
+    from toolkit.lab.desk.pending import pending_requests
 
     return {"rows": pending_requests(bench.home, bench.registry)}
 
 
 def _drafts(bench: Bench) -> dict[str, Any]:
-    from toolkit.lab.drafts import drafts
+    from toolkit.lab.desk.drafts import drafts
 
     return {"rows": drafts(bench.home)}
 

@@ -9,9 +9,9 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse
 
 from toolkit.errors import ConfigError
-from toolkit.lab.holdings import archives_of, holding_id
-from toolkit.lab.jobs import Kind as JobKind
-from toolkit.lab.jobs import SeenJob, cancel_job, job_of, jobs_of, log_of, start_job
+from toolkit.lab.desk.holdings import archives_of, holding_id
+from toolkit.lab.desk.jobs import Kind as JobKind
+from toolkit.lab.desk.jobs import SeenJob, cancel_job, job_of, jobs_of, log_of, start_job
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:

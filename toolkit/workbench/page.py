@@ -20,7 +20,7 @@ from starlette.responses import HTMLResponse
 
 from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import one_line
-from toolkit.lab.holdings import holding_id
+from toolkit.lab.desk.holdings import holding_id
 from toolkit.report.pages.kit import data, drawn, environment
 from toolkit.words import phrasebook as words
 from toolkit.words.phrasebook import SOURCE, decimal_sign, phrasebook

@@ -8,10 +8,10 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.inputs import RESULT_FILE, read_regular
-from toolkit.lab.chart import Chart, Series
-from toolkit.lab.jobs import start_job
-from toolkit.lab.kept_plans import KINDS, fixtures_of, plan_words, read_plan, titles_of
-from toolkit.lab.previews import templates_of
+from toolkit.lab.desk.chart import Chart, Series
+from toolkit.lab.desk.jobs import start_job
+from toolkit.lab.desk.kept_plans import KINDS, fixtures_of, plan_words, read_plan, titles_of
+from toolkit.lab.desk.previews import templates_of
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
-    from toolkit.lab.kept_plans import PlanKind
+    from toolkit.lab.desk.kept_plans import PlanKind
     from toolkit.workbench.bench import Bench
     from toolkit.workbench.page import Routes
 

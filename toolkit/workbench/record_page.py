@@ -14,9 +14,9 @@ from starlette.responses import RedirectResponse
 
 from toolkit.calibration.registry.registry import ID
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.lab.chart import Chart, Series
-from toolkit.lab.decisions import Order
-from toolkit.lab.pending import decide as settle_decision
+from toolkit.lab.desk.chart import Chart, Series
+from toolkit.lab.desk.pending import decide as settle_decision
+from toolkit.lab.records.decisions import Order
 from toolkit.trust.requested import Requested
 from toolkit.workbench.bench import waiting
 from toolkit.workbench.page import page
@@ -66,7 +66,7 @@ def record_page(
     refused: ToolkitError | None = None,
 ) -> Response:
     """Return the page of a record that a ledger knows; ``refused`` is told at the form of its decision."""
-    from toolkit.lab.registry_answer import history, shown
+    from toolkit.lab.records.registry_answer import history, shown
 
     bench: Bench = request.app.state.bench
     instrument = ID.match(record_id)["instrument"]  # type: ignore[index]
@@ -94,14 +94,14 @@ def part(request: Request) -> Response:
 
 
 def _gates(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.gates_answer import gates_answer
+    from toolkit.lab.records.gates_answer import gates_answer
     from toolkit.lab.rules import rules_catalogue
 
     return {"judged": gates_answer(bench.registry, record_id), "rules": rules_catalogue()}
 
 
 def _responses(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.gates_answer import responses_answer
+    from toolkit.lab.records.gates_answer import responses_answer
 
     return {"compared": responses_answer(bench.registry, record_id)}
 
@@ -110,7 +110,7 @@ def _fit(bench: Bench, record_id: str) -> dict[str, Any]:
     from toolkit.calibration.fit.findings import session_findings
     from toolkit.calibration.fit.session_fit import fit_session
     from toolkit.calibration.registry.stored import stored_session
-    from toolkit.lab.session_answer import fit_report
+    from toolkit.lab.records.session_answer import fit_report
 
     stored = bench.registry.load(record_id)
     fit = fit_session(stored_session(bench.registry.folder, stored))
@@ -125,7 +125,7 @@ def _fit(bench: Bench, record_id: str) -> dict[str, Any]:
 
 
 def _budget(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.budget import BudgetOrder, budget_answer
+    from toolkit.lab.records.budget import BudgetOrder, budget_answer
 
     payload, _, _ = budget_answer(bench.registry, record_id, BudgetOrder())
     charts = {name: budget_chart(name, budget) for name, budget in payload["loads"].items()}
@@ -133,7 +133,7 @@ def _budget(bench: Bench, record_id: str) -> dict[str, Any]:
 
 
 def _as_found(bench: Bench, record_id: str) -> dict[str, Any]:
-    from toolkit.lab.gates_answer import as_found_answer
+    from toolkit.lab.records.gates_answer import as_found_answer
 
     return {"found": as_found_answer(bench.registry, record_id)}
 

@@ -9,10 +9,9 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.lab.holdings import holding_id
-from toolkit.lab.home import TEMPLATES
-from toolkit.lab.jobs import start_job
-from toolkit.lab.previews import (
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.jobs import start_job
+from toolkit.lab.desk.previews import (
     preview_pdf,
     preview_words,
     read_preview,
@@ -22,7 +21,8 @@ from toolkit.lab.previews import (
     template_print,
     templates_of,
 )
-from toolkit.lab.uploads import hand_in_template
+from toolkit.lab.desk.uploads import hand_in_template
+from toolkit.lab.home import TEMPLATES
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:

@@ -14,10 +14,10 @@ from starlette.responses import RedirectResponse, Response
 
 from toolkit.calibration.session.session_file import SessionFile
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.lab import drafts
-from toolkit.lab.decisions import Order
-from toolkit.lab.pending import decide
-from toolkit.lab.statements import statement_groups, with_statement
+from toolkit.lab.desk import drafts
+from toolkit.lab.desk.pending import decide
+from toolkit.lab.desk.statements import statement_groups, with_statement
+from toolkit.lab.records.decisions import Order
 from toolkit.trust.requested import Requested
 from toolkit.workbench.bench import Bench, waiting
 from toolkit.workbench.page import fragment, page
@@ -135,8 +135,8 @@ def rehearse(request: Request) -> Response:
     """Save what was typed and try it: what `calibrate --dry-run` says, and every part of a record's page."""
     from toolkit.calibration.control.calibrate import rehearsed
     from toolkit.calibration.records.use import UNSIGNED
-    from toolkit.lab.sealing import standards_of
-    from toolkit.lab.session_answer import NOT_ENTERED, candidate_payload
+    from toolkit.lab.records.session_answer import NOT_ENTERED, candidate_payload
+    from toolkit.lab.signatures.sealing import standards_of
 
     bench, draft_id = _requested(request)
     if request.headers.get("hx-request") != "true":

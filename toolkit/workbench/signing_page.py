@@ -13,7 +13,7 @@ from starlette.responses import RedirectResponse, Response
 
 from toolkit.calibration.registry.registry import ID
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.lab.pending import Pending, add_answer, drop_request, pending_request, sign_by_agent
+from toolkit.lab.desk.pending import Pending, add_answer, drop_request, pending_request, sign_by_agent
 from toolkit.workbench.bench import waiting
 from toolkit.workbench.record_page import record_page
 from toolkit.workbench.session_page import session_page

@@ -11,9 +11,9 @@ from urllib.parse import urlencode
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
-from toolkit.lab.chart import common_ranges
-from toolkit.lab.holdings import rows_of_tests
-from toolkit.lab.seen_test import recordings_answer, results_answer, shown_conditions
+from toolkit.lab.desk.chart import common_ranges
+from toolkit.lab.desk.holdings import rows_of_tests
+from toolkit.lab.desk.seen_test import recordings_answer, results_answer, shown_conditions
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
-    from toolkit.lab.resolve import Resolved
+    from toolkit.lab.tire_tests.resolve import Resolved
     from toolkit.workbench.bench import Bench
     from toolkit.workbench.page import Routes
 
@@ -193,7 +193,7 @@ def _remembered_results(bench: Bench, test_id: str, folder: Path, record: str | 
 
 
 def _resolve(bench: Bench, folder: Path, record: str | None) -> Resolved:
-    from toolkit.lab.resolve import resolve_test
+    from toolkit.lab.tire_tests.resolve import resolve_test
 
     # A record that somebody chose to look at may not be in force: the result then says that it is a draft.
     return resolve_test(

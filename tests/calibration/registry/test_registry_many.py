@@ -15,7 +15,7 @@ from toolkit.calibration.registry import candidate, settled
 from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.registry import Registry, load_checked
-from toolkit.lab.registry_answer import listed
+from toolkit.lab.records.registry_answer import listed
 
 
 @pytest.fixture

@@ -25,8 +25,8 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.lab.home import packaged_home
-from toolkit.lab.proofs import registry_ledger
-from toolkit.lab.verification import verify_file
+from toolkit.lab.signatures.proofs import registry_ledger
+from toolkit.lab.signatures.verification import verify_file
 from toolkit.trust.keys import Signer
 from toolkit.trust.people import NAMESPACE, Demand, Key, People, Person, Policy, Role
 from toolkit.trust.seal.x509 import Trust

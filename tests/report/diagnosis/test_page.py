@@ -12,7 +12,7 @@ from tests.diagnosis.cases import carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.findings import Finding
-from toolkit.lab.diagnosis import diagnosis_text
+from toolkit.lab.studies.diagnosis import diagnosis_text
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.maps import size_maps, variables
 from toolkit.report.diagnosis.numbers import chance, few, over

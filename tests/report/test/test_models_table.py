@@ -12,9 +12,9 @@ from tests.report.report_factory import COMPARISON, LOADS_N, entry, make_record,
 from tests.report.template_factory import FOLDER, make, p, tbl
 from toolkit.cli.report import command
 from toolkit.errors import FitError, TemplateError
-from toolkit.lab import resolve
-from toolkit.lab.reports import Options, _compared, _job
-from toolkit.lab.resolve import Resolved
+from toolkit.lab.tire_tests import resolve
+from toolkit.lab.tire_tests.reports import Options, _compared, _job
+from toolkit.lab.tire_tests.resolve import Resolved
 from toolkit.report.content import ReportContent
 from toolkit.report.figures import draw, draw_svg
 from toolkit.report.handover import content_hash

@@ -20,8 +20,8 @@ from tests.trust.forgeries.laboratory import (
 )
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
-from toolkit.lab.people import anchor_document, check_against, checkpoint_of
-from toolkit.lab.people import lines_of as texts_of
+from toolkit.lab.signatures.people import anchor_document, check_against, checkpoint_of
+from toolkit.lab.signatures.people import lines_of as texts_of
 from toolkit.trust.anchor import parse_anchor
 from toolkit.trust.checkpoint import parse_checkpoint
 from toolkit.trust.witness import countersign

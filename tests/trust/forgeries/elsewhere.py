@@ -35,7 +35,7 @@ from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
-from toolkit.lab.people import anchor_document, check_against, checkpoint_of
+from toolkit.lab.signatures.people import anchor_document, check_against, checkpoint_of
 from toolkit.trust.decisions import unsigned
 from toolkit.trust.people import Key, People, Person, parse_people
 from toolkit.trust.requests import parse_request

@@ -22,7 +22,7 @@ from tests.trust.seal.seal_factory import key, plain_pdf
 from toolkit.cli.main import run
 from toolkit.errors import TrustError
 from toolkit.lab.home import packaged_home
-from toolkit.lab.sealing import Sealing
+from toolkit.lab.signatures.sealing import Sealing
 from toolkit.trust.seal.authority import Authority, make_authority
 from toolkit.trust.seal.key import SealKey
 from toolkit.trust.seal.pdf import check_pdf

@@ -1,0 +1,1 @@
+"""Archives: an audit of old tests, its answer, and the reports that it amends."""

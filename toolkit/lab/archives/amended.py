@@ -1,0 +1,116 @@
+"""Amended reports of an audit: a test replayed with the record in force, naming the report it replaces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from toolkit.audit.linked import Linked, PastReport
+    from toolkit.errors import ToolkitError
+    from toolkit.lab.tire_tests.resolve import Resolved
+    from toolkit.report.deliver import Delivered, Job
+
+FOLDER = "reports"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Amended:
+    """A report that replaces another one, or why there is none."""
+
+    replaces: str
+    test: str
+    outcome: Delivered | ToolkitError
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report under the keys of the answer."""
+        from toolkit.errors import ToolkitError
+
+        outcome = self.outcome
+        keys: dict[str, Any] = {"replaces": self.replaces, "test": self.test}
+        if isinstance(outcome, ToolkitError):
+            return keys | {"docx": None, "pdf": None, "error": outcome.as_dict()}
+        return keys | {"docx": outcome.docx, "pdf": outcome.pdf, "error": None}
+
+
+def amend(
+    linked: Linked,
+    archive: Path,
+    target: Path,
+    *,
+    calibrations: Path | None,
+    home: Path | None,
+    known_at: date | None,
+    draft: bool = False,
+    step: Callable[[str], None],
+) -> tuple[Amended, ...]:
+    """Make the amended report of each report with a manifest that rests on another record than that in force.
+
+    They are written to ``reports/`` of the folder, each in a folder named after the report that it replaces.
+
+    Raises
+    ------
+    TemplateError, RenderError
+        the template cannot be used, or LibreOffice is missing
+    """
+    from toolkit.errors import ToolkitError
+    from toolkit.lab.answers import file_name
+    from toolkit.lab.home import home_template
+    from toolkit.lab.tire_tests.resolve import resolve_test
+    from toolkit.report.deliver import deliver_all
+    from toolkit.report.word.package import read_template
+
+    pairs = list(_wanted(linked))
+    if not pairs:
+        return ()
+    template = read_template(home_template("org.docx", home))
+    jobs: list[Job] = []
+    failed: dict[int, ToolkitError] = {}
+    for index, (past, test) in enumerate(pairs):
+        try:
+            resolved = resolve_test(
+                archive / test, calibrations=calibrations, home=home, known_at=known_at, draft=draft
+            )
+            out = target / FOLDER / file_name(f"{past.id}-{test}", otherwise=f"report-{index + 1}")
+            jobs.append(_job(past, resolved, archive / test, template, out))
+        except ToolkitError as error:
+            failed[index] = error
+        step(past.report)
+    # A test of past years may lack what today's template asks for: it prints a visible mark.
+    outcomes = iter(deliver_all(jobs, allow_missing=True))
+    return tuple(
+        Amended(
+            replaces=past.id or past.report, test=test, outcome=failed[i] if i in failed else next(outcomes)
+        )
+        for i, (past, test) in enumerate(pairs)
+    )
+
+
+def _wanted(linked: Linked) -> Iterator[tuple[PastReport, str]]:
+    for past in linked.reports:
+        if past.id is not None and past.to_amend:
+            yield from ((past, test) for test in sorted(past.tests))
+
+
+def _job(past: PastReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
+    from toolkit.lab.tire_tests.handover import details_of, provenance
+    from toolkit.report.deliver import Job
+    from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
+
+    use = resolved.result.reduced.calibration
+    why = (
+        f"computed again with {use.id}, the calibration in force on the day of the test; the report that "
+        f"this one replaces rests on {', '.join(past.calibrations) or 'another one'}"
+    )
+    content = build_content(
+        resolved.result,
+        resolved.record,
+        findings=resolved.findings,
+        style=read_style(style_file(template.path)),
+        details=replace(details_of(test, None), amends=past.id, amendment=why),
+    )
+    return Job(template=template, content=content, out=out, provenance=provenance(resolved, test))

@@ -1,0 +1,436 @@
+"""What an audit says: the JSON document, whose long lists are iterators, and the text for people."""
+
+from __future__ import annotations
+
+import textwrap
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+
+from toolkit.audit.model import CLEAN
+from toolkit.findings import FindingEntry
+from toolkit.lab.answers import ErrorEntry, one_line, table
+from toolkit.lab.archives.audit_headline import headline
+from toolkit.lab.tire_tests.inspection_answer import RefusedRecord, Repair, Segment, SkippedRecord
+
+if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
+    from toolkit.audit.corrected import Copy
+    from toolkit.audit.linked import Linked
+    from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+    from toolkit.lab.archives.amended import Amended
+
+
+class CauseCount(TypedDict):
+    """A cause of wrong values, and in how many files."""
+
+    cause: str
+    files: int
+
+
+Headline = TypedDict(
+    "Headline",
+    {
+        "sentence": str,
+        "files": int,
+        "wrong": Annotated[int, "files with values that the record in force changes"],
+        "FY_max_abs_N": Annotated[float, "largest change"],
+        "MZ_max_abs_Nm": Annotated[float, "largest change"],
+        "causes": list[CauseCount],
+        "from": Annotated[str | None, "first month with a wrong file"],
+        "to": Annotated[str | None, "last one"],
+        "unjudged": Annotated[int, "files whose change cannot be computed"],
+        "without_values": NotRequired[Annotated[int, "files that hold no Fy and no Mz of their own"]],
+        "unreadable": int,
+        "impossible": Annotated[int, "files besides the wrong ones with an Fy or Mz that no tire has"],
+    },
+)
+Headline.__doc__ = "What an archive holds, in a sentence and in numbers."
+
+
+class ArchivedCondition(TypedDict):
+    """The mean of a load block of a file, and what the record in force changes."""
+
+    first_row: int
+    last_row: int
+    SA_deg: float | None
+    FZ_N: float | None
+    FY_N: float | None
+    MZ_Nm: float | None
+    FY_change_N: float | None
+    MZ_change_Nm: float | None
+    step_SA_deg: Annotated[float | None, "slip angle of the protocol's step"]
+    step_FZ_N: Annotated[float | None, "load of the protocol's step"]
+
+
+class ArchivedNote(TypedDict):
+    """What a person should know of a file."""
+
+    rule: str
+    message: str
+
+
+class ArchivedFile(TypedDict):
+    """A file of an archive: which calibration computed it, and what the right one changes."""
+
+    path: Annotated[str, "relative to the archive"]
+    sha256: str | None
+    size: int | None
+    instrument: str | None
+    date: str | None
+    test: Annotated[str | None, "folder of its test.toml"]
+    rotation: str | None
+    to_SAE: Annotated[Mapping[str, int] | None, "sign of each channel on the way to SAE axes"]
+    own_protocol: bool
+    rows: int | None
+    grade: Annotated[str, "exact, rounding, stale, sign_variant, column_swap, ambiguous, unknown, ..."]
+    record: str | None
+    variant: Annotated[str | None, "how the record was changed: E5 negative in FY, MZ"]
+    issued: Annotated[bool | None, "whether the coefficients were those of the certificate"]
+    candidates: Annotated[list[str], "of an ambiguous file"]
+    segments: list[Segment]
+    in_force: Annotated[str | None, "the record in force on the date of the test"]
+    repair: Repair | None
+    conditions: list[ArchivedCondition]
+    estimate: Annotated[Mapping[str, Any] | None, "of an unknown calibration: what the digits prove of it"]
+    skipped: list[SkippedRecord]
+    reason: Annotated[str | None, "why it cannot be read or judged"]
+    test_toml: Annotated[str | None, "what is wrong with its test.toml"]
+    units: Annotated[Mapping[str, str] | None, "of its channels"]
+    values_sha256: str | None
+    modified: Annotated[str | None, "day on which a file without a date was last written"]
+    notes: list[ArchivedNote]
+    reports: NotRequired[Annotated[list[str], "that rest on its test"]]
+
+
+class Grades(TypedDict):
+    """How many files of an archive have each grade."""
+
+    files: int
+    grades: Mapping[str, int]
+    undated: int
+
+
+class ChangedCharacteristic(TypedDict):
+    """What the right calibration makes of a characteristic."""
+
+    load_N: float
+    name: str
+    rotation: str | None
+    unit: str
+    old: float | None
+    new: float | None
+    change: float | None
+
+
+class ArchivedTest(TypedDict):
+    """A test of an archive."""
+
+    test: str
+    instrument: str | None
+    date: str | None
+    files: int
+    not_clean: Annotated[int, "files that are neither exact nor within rounding"]
+    FY_max_abs_N: float | None
+    MZ_max_abs_Nm: float | None
+    effects: list[ChangedCharacteristic]
+    reports: NotRequired[Annotated[list[str], "that rest on it"]]
+
+
+class RestingReport(TypedDict):
+    """A report that rests on files of the archive."""
+
+    report: str
+    id: Annotated[str | None, "of its manifest"]
+    linked_by: list[str]
+    calibrations: Annotated[list[str], "that it names"]
+    tests: list[str]
+    files: int
+    not_clean: int
+    in_force: Annotated[list[str], "records in force on the days of its tests"]
+    to_amend: bool
+
+
+class FailedLoad(TypedDict):
+    """A load that failed its check."""
+
+    load: str
+    unit: str
+    max_error: float
+    tolerance: float
+
+
+class DriftedConditions(TypedDict):
+    """The share of the change in a load block."""
+
+    first_row: int
+    last_row: int
+    FY_N: float
+    MZ_Nm: float
+
+
+class DriftedFileEntry(TypedDict):
+    """A recording since the last good check: its share of the days, and its share of the change."""
+
+    path: str
+    date: str
+    share: float
+    FY_max_abs_N: float | None
+    MZ_max_abs_Nm: float | None
+    conditions: list[DriftedConditions]
+    reason: Annotated[str | None, "why nothing could be computed"]
+
+
+class DriftedTestEntry(TypedDict):
+    """A test since the last good check."""
+
+    test: str
+    date: str
+    share: float
+    files: int
+    left_out: Annotated[int, "files of which nothing could be computed"]
+    FY_max_abs_N: float | None
+    MZ_max_abs_Nm: float | None
+
+
+class SinceGood(TypedDict):
+    """What was measured since the last good check."""
+
+    instrument: str
+    good: Annotated[str, "record of the last good check"]
+    good_date: str
+    failed: Annotated[str, "session that failed"]
+    failed_date: str
+    record_in_use: str
+    later_good: list[str]
+    loads: list[FailedLoad]
+    tests: list[DriftedTestEntry]
+    files: list[DriftedFileEntry]
+
+
+class CorrectedCopy(TypedDict):
+    """A corrected copy of a file."""
+
+    path: str
+    replaces_sha256: str
+    sha256: str | None
+    record: str | None
+    record_sha256: str | None
+    reason: Annotated[str | None, "why there is none"]
+    unverified: bool
+    draft: bool
+    draft_reasons: list[str]
+
+
+class AmendedReport(TypedDict):
+    """A report that replaces another one, or why there is none."""
+
+    replaces: str
+    test: str
+    docx: Path | None
+    pdf: Path | None
+    error: ErrorEntry | None
+
+
+class AuditTiming(TypedDict):
+    """How long the audit took."""
+
+    seconds: float
+    files_per_second: float | None
+    reused: Annotated[int, "files whose answer an earlier audit had"]
+
+
+class AuditAnswer(TypedDict):
+    """Which calibration computed the files of an archive."""
+
+    archive: Path
+    known_at: str
+    headline: Headline
+    files: list[ArchivedFile]
+    summary: Grades
+    tests: list[ArchivedTest]
+    refused_records: list[RefusedRecord]
+    heads: Annotated[Mapping[str, str], "of each instrument's ledger"]
+    findings: list[FindingEntry]
+    reports: NotRequired[Annotated[list[RestingReport], "with --reports"]]
+    report_unknown: NotRequired[Annotated[list[str], "tests that no report rests on"]]
+    since_good: NotRequired[Annotated[SinceGood, "with --since-good"]]
+    repaired: NotRequired[Annotated[list[CorrectedCopy], "with --repair"]]
+    amended: NotRequired[Annotated[list[AmendedReport], "with --repair and --reports"]]
+    written: Annotated[list[str], "files"]
+    timing: AuditTiming
+
+
+_SHOWN, _SETTINGS = 40, 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AuditOutcome:
+    """An audit and what was asked for besides; None where it was not."""
+
+    made: ArchiveAudit
+    linked: Linked | None
+    drift: Drift | None
+    drifted: tuple[DriftedFile, ...]
+    drifted_tests: tuple[DriftedTest, ...]
+    copies: tuple[Copy, ...] | None
+    amended: tuple[Amended, ...] = ()
+
+
+def payload_of(answer: AuditOutcome) -> dict[str, Any]:
+    """Return the JSON document; what there may be many of are iterators."""
+    audit = answer.made
+    payload: dict[str, Any] = {
+        "archive": audit.archive,
+        "known_at": audit.known_at.isoformat(),
+        "headline": headline(audit).as_dict(),
+        "files": files_of(answer),
+        "summary": {"files": len(audit.files), "grades": dict(audit.grades), "undated": audit.undated},
+        "tests": _tests(answer),
+        "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in audit.refused],
+        "heads": dict(audit.heads),
+        "findings": (finding.as_dict() for finding in audit.findings),
+    }
+    if answer.linked is not None:
+        payload["reports"] = [report.as_dict() for report in answer.linked.reports]
+        payload["report_unknown"] = list(answer.linked.unknown)
+    if answer.drift is not None:
+        payload["since_good"] = {
+            **answer.drift.as_dict(),
+            "tests": [test.as_dict() for test in answer.drifted_tests],
+            "files": [file.as_dict() for file in answer.drifted],
+        }
+    if answer.copies is not None:
+        payload["repaired"] = [copy.as_dict() for copy in answer.copies]
+        payload["amended"] = [report.as_dict() for report in answer.amended]
+    return payload
+
+
+def files_of(answer: AuditOutcome) -> Iterator[dict[str, Any]]:
+    """Yield every file's result; with the reports of its test where reports were asked about."""
+    for file in answer.made.files.plain():
+        if answer.linked is not None:
+            file["reports"] = answer.linked.of_test(file["test"])
+        yield file
+
+
+def _tests(answer: AuditOutcome) -> Iterator[dict[str, Any]]:
+    for test in answer.made.tests:
+        if answer.linked is not None:
+            test["reports"] = answer.linked.of_test(test["test"])
+        yield test
+
+
+def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
+    """Return the answer for people, the headline first; tables fit ``width`` characters."""
+    from toolkit.reduction.physics import RULES
+
+    audit = answer.made
+    rows = list(_rows(audit))
+    bad = len(audit.files) - audit.grades["exact"] - audit.grades["rounding"]
+    lines = [*textwrap.wrap(headline(audit).sentence + ".", width), ""]
+    lines += _table(rows, width) if rows else []
+    if bad > len(rows):
+        lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
+    counted = ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count)
+    lines += ["", f"{len(audit.files)} files: {counted or 'none'}; known at {audit.known_at.isoformat()}"]
+    notes = Counter(finding.rule for finding in audit.findings if finding.level == "note")
+    if notes:
+        lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))
+    impossible = {finding.where for finding in audit.findings if finding.rule in RULES}
+    if impossible:
+        places = one_line(", ".join(sorted(impossible)[:3])) + (", ..." if len(impossible) > 3 else "")
+        text = f"Fy or Mz that no tire has, in files: {len(impossible)} ({places}); --json tells why"
+        lines += textwrap.wrap(text, width)
+    settings = Counter(finding.message for finding in audit.findings if finding.rule == "test-toml")
+    lines += [one_line(f"{count} files: {message}") for message, count in settings.most_common(_SETTINGS)]
+    if len(settings) > _SETTINGS:
+        lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
+    lines += [f"refused record {record.id}: {record.reason}" for record in audit.refused]
+    lines += [f"head of {name}: {head}" for name, head in audit.heads]
+    return "\n".join([*lines, *_asked(answer, width)])
+
+
+def _table(rows: list[list[str]], width: int) -> list[str]:
+    """Return the table of files; what is the same for all of them stands below it."""
+    header, align = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"], "<<<<<>>"
+    constant = [
+        len(rows) > 1 and side == "<" and len({row[at] for row in rows}) == 1 for at, side in enumerate(align)
+    ]
+    columns = [at for at, alone in enumerate(constant) if not alone]
+    cells = [[row[at] for at in columns] for row in rows]
+    lines = [
+        table([header[at] for at in columns], cells, align="".join(align[at] for at in columns), width=width)
+    ]
+    common = [f"{header[at]} {rows[0][at]}" for at, alone in enumerate(constant) if alone and rows[0][at]]
+    return [*lines, *textwrap.wrap(f"all of them: {', '.join(common)}", width)] if common else lines
+
+
+def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
+    if answer.linked is not None:
+        yield ""
+        for report in answer.linked.reports:
+            why = f"to be amended, {report.not_clean} of {report.files} files are not right"
+            why = why if report.to_amend else "stands"
+            tests = ", ".join(sorted(report.tests))
+            yield one_line(
+                f"report {report.report} ({tests}): {why}"
+                if report.files
+                else f"report unknown: {report.report}"
+            )
+        if answer.linked.unknown:
+            unknown = answer.linked.unknown
+            yield one_line(f"report unknown: {len(unknown)} tests, {', '.join(unknown[:10])}")
+    if answer.drift is not None:
+        drift = answer.drift
+        yield ""
+        yield drift.statement
+        yield (
+            f"since {drift.good} ({drift.good_date}) {len(answer.drifted)} files were recorded; an estimate "
+            "of the effect, interpolated by days:"
+        )
+        rows = [
+            [t.test, t.date.isoformat(), f"{t.share:.0%}", str(t.files),
+             "" if t.FY_N is None else f"{t.FY_N:.2f}", "" if t.MZ_Nm is None else f"{t.MZ_Nm:.3f}",
+             f"without {t.left_out} files, see --json" if t.left_out else ""]
+            for t in answer.drifted_tests[:_SHOWN]
+        ]  # fmt: skip
+        yield table(
+            ["test", "date", "share", "files", "dFY [N]", "dMZ [N·m]", ""], rows, align="<<>>>><", width=width
+        )
+        if len(answer.drifted_tests) > len(rows):
+            yield f"... and {len(answer.drifted_tests) - len(rows)} more; --json tells all of them"
+    if answer.copies is not None:
+        written = [copy for copy in answer.copies if copy.sha256 is not None]
+        yield f"{len(written)} corrected copies"
+        yield from (
+            one_line(f"no copy of {copy.path}: {copy.reason}")
+            for copy in answer.copies
+            if copy.sha256 is None
+        )
+        for amended in answer.amended:
+            pdf = amended.as_dict()["pdf"]
+            yield f"{pdf or 'NO REPORT: ' + str(amended.outcome)} replaces {amended.replaces}"
+
+
+def _rows(audit: ArchiveAudit) -> Iterator[list[str]]:
+    listed = 0
+    for file in audit.files.plain():
+        if file["grade"] in CLEAN:
+            continue
+        if listed == _SHOWN:
+            return
+        listed += 1
+        repair = file["repair"] or {"FY_max_abs_N": None, "MZ_max_abs_Nm": None}
+        FY, MZ = repair["FY_max_abs_N"], repair["MZ_max_abs_Nm"]
+        yield [
+            file["path"],
+            file["grade"],
+            file["record"] or ", ".join(file["candidates"]),
+            file["variant"] or file["reason"] or "",
+            file["in_force"] or "",
+            "" if FY is None else f"{FY:.1f}",
+            "" if MZ is None else f"{MZ:.2f}",
+        ]

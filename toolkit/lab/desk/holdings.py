@@ -1,0 +1,169 @@
+"""What a laboratory's home holds beside its registry: tests, audits, diagnoses, plans, each under an id.
+
+An id is a hash of the place in the home. Who shows what is held, or asks for it, names no path.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Kind = Literal["test", "audit", "diagnosis", "case", "plan"]
+
+ANSWER, CASE, PLAN = "diagnosis.json", "case.toml", "plan.json"
+_ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "migrations", "node_modules"))
+
+_WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses", "models", "plans"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Holdings:
+    """What lies in a home, by kind and id: places relative to it, in their order.
+
+    ``manifests`` are the places of manifests of delivered reports.
+    """
+
+    home: Path
+    places: Mapping[Kind, Mapping[str, str]]
+    manifests: tuple[str, ...]
+
+    def path(self, kind: Kind, holding_id: str) -> Path | None:
+        """Return the folder of a holding; None where it is not known, or no longer there."""
+        place = self.places[kind].get(holding_id)
+        if place is None:
+            return None
+        folder = self.home / place
+        return folder if any((folder / name).is_file() for name in _marks()[kind]) else None
+
+
+def holding_id(place: str) -> str:
+    """Return the id of a place in a home.
+
+    >>> holding_id("tests/a")
+    '1eaf7c41475c3a55'
+    """
+    return hashlib.sha256(os.fsencode(place)).hexdigest()[:16]
+
+
+def holdings_of(home: Path) -> Holdings:
+    """Look through a home. Links are not followed; hidden folders, registry and templates are left out."""
+    from toolkit.report.handover import MANIFEST
+
+    by_kind: dict[Kind, dict[str, str]] = {kind: {} for kind in _marks()}
+    manifests: list[str] = []
+    for place, names in home_folders(home):
+        for kind, marks in _marks().items():
+            if not marks.isdisjoint(names):
+                by_kind[kind][holding_id(place)] = place
+        if MANIFEST in names:
+            manifests.append(place)
+    return Holdings(
+        home=home,
+        places=MappingProxyType(
+            {
+                kind: MappingProxyType(dict(sorted(held.items(), key=lambda item: item[1])))
+                for kind, held in by_kind.items()
+            }
+        ),
+        manifests=tuple(manifests),
+    )
+
+
+def home_folders(home: Path) -> Iterator[tuple[str, list[str]]]:
+    """Yield the folders in which work lies, relative to the home, with the names of their files."""
+    for folder, below, names in os.walk(home):
+        below[:] = sorted(name for name in below if not name.startswith(".") and name not in _ELSEWHERE)
+        yield os.path.relpath(folder, home), names
+
+
+def archives_of(home: Path) -> dict[str, str]:
+    """Return the folders of a home that may be audited, by id: those in it that no command writes into."""
+    try:
+        entries = sorted(os.scandir(home), key=lambda entry: entry.name)
+    except OSError:
+        return {}
+    return {
+        holding_id(entry.name): entry.name
+        for entry in entries
+        if entry.is_dir(follow_symlinks=False)
+        and not entry.name.startswith(".")
+        and entry.name not in _ELSEWHERE | _WRITTEN
+    }
+
+
+def reported_inputs(holdings: Holdings) -> frozenset[str]:
+    """Return the hashes of what the delivered reports of a home rest on."""
+    from toolkit.report.handover import MANIFEST
+
+    return frozenset(
+        sha256 for place in holdings.manifests for sha256 in _inputs(holdings.home / place / MANIFEST)
+    )
+
+
+def rows_of_tests(
+    holdings: Holdings, ids: Iterable[str], reported: frozenset[str]
+) -> Iterator[dict[str, Any]]:
+    """Yield what the ``test.toml`` of each test says, and its state.
+
+    ``state`` is ``reported``, ``no report`` or ``refused``; then ``reason`` says why it cannot be read.
+    """
+    from toolkit.declared import read_text
+    from toolkit.errors import ToolkitError
+    from toolkit.files import sha256_bytes
+    from toolkit.inputs import SETTINGS_FILE, read_input
+    from toolkit.recording.folder import TEST_FILE, StatedTest
+
+    for test_id in ids:
+        place = holdings.places["test"][test_id]
+        row: dict[str, Any] = {
+            "id": test_id, "place": place, "date": None, "machine": None, "tire": None, "reason": None,
+        }  # fmt: skip
+        toml = holdings.home / place / TEST_FILE
+        try:
+            data = read_input(toml, SETTINGS_FILE)
+            stated = read_text(StatedTest, data, where=toml)
+        except ToolkitError as error:
+            yield row | {"state": "refused", "reason": f"{error.what}: {error.got}"}
+            continue
+        yield row | {
+            "date": stated.date,
+            "machine": stated.machine,
+            "tire": stated.tire.size if stated.tire is not None else None,
+            "state": "reported" if sha256_bytes(data) in reported else "no report",
+        }
+
+
+def _marks() -> Mapping[Kind, frozenset[str]]:
+    """Return the files by which a folder is told to hold a test, an audit, a diagnosis, a case or a plan."""
+    from toolkit.audit.resume import RESULTS
+    from toolkit.lab.archives.audit import LINES
+    from toolkit.recording.folder import TEST_FILE
+
+    return {
+        "test": frozenset((TEST_FILE,)),
+        "audit": frozenset((LINES, RESULTS)),
+        "diagnosis": frozenset((ANSWER,)),
+        "case": frozenset((CASE,)),
+        "plan": frozenset((PLAN,)),
+    }
+
+
+def _inputs(path: Path) -> set[str]:
+    """Return the hashes of what a manifest's report rests on; empty where it is none."""
+    import json
+
+    from toolkit.inputs import RESULT_FILE, read_regular
+
+    try:
+        manifest = json.loads(read_regular(path, RESULT_FILE))
+        return {str(entry["sha256"]) for entry in manifest["inputs"]}
+    except (OSError, ValueError, TypeError, KeyError):
+        return set()

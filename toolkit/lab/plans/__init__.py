@@ -1,0 +1,1 @@
+"""Plans: the next session, the next test, the next run, the next calibration."""

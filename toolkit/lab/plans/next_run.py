@@ -1,0 +1,316 @@
+"""`toolkit plan next`: from a diagnosis that leaves a class to the run that parts it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.declared.answers import merged
+from toolkit.errors import ConfigError
+from toolkit.findings import FindingEntry
+from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.planning.members import Member
+    from toolkit.planning.next_run import NextRun
+    from toolkit.report.content import Plot
+    from toolkit.report.word.package import Template
+    from toolkit.worker.posix import Limits
+
+
+class _RunFiles(_Sheet):
+    out: Path | None
+    files: list[Path]
+    findings: list[FindingEntry]
+
+
+PlanNextAnswer = merged(NextRunPlan, _RunFiles)
+
+
+INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
+
+
+def plan_next(
+    source: Path,
+    out: Path | None,
+    *,
+    case: Path | None = None,
+    limits: Sequence[str] = (),
+    budget_s: float = 60.0,
+    calibrations: Path | None = None,
+    home: Path | None = None,
+    worker: Limits | None = None,
+    template: Template | None = None,
+    tell: Callable[[str], None] = lambda _text: None,
+) -> tuple[dict[str, Any], str]:
+    """Return the JSON answer and the text of the run that parts an answer's class; write its files.
+
+    Parameters
+    ----------
+    source : folder of ``toolkit diagnose --out``, or its diagnosis.json
+    case : the case file; by default the one that the answer's model names
+    limits : ``NAME=LOW..HIGH`` in the channel's unit
+    budget_s : seconds of the search over runs
+    worker : limits of the case's own code; None runs it in this process
+    template : of the sheet that stands in ``out`` beside the other files; None for none
+
+    Raises
+    ------
+    ConfigError
+        ``plan-next``: no class, a case that is another one, no run that can be made;
+        ``plan-infeasible``: no run stays within the limits, with the nearest limits that one keeps
+    """
+    from datetime import date
+
+    from toolkit.declared import answer
+    from toolkit.diagnosis.answer.reader import read_answer
+    from toolkit.diagnosis.case.reader import read_case
+    from toolkit.diagnosis.fit.problem import problem_of
+    from toolkit.diagnosis.simulators.build_simulator import model_of
+    from toolkit.diagnosis.simulators.case_code import running
+    from toolkit.lab.plans.plan_sheets import next_sheet, sheet_text, write_plan
+    from toolkit.lab.studies.diagnosis import machine_registry
+    from toolkit.planning.members import class_of, members_of
+    from toolkit.planning.next_run import Change, RunSearch
+
+    stated = None if case is None else read_case(case)
+    diagnosis, file = read_answer(source)
+    effect = class_of(diagnosis, file)
+    read = stated or read_case(_case_of(file))
+    if read.sha256 != diagnosis.case_sha256:
+        raise _wrong(
+            "the case is not the one of the answer", read.path, read.sha256[:16],
+            diagnosis.case_sha256[:16], "diagnose the case again, or name the right one with --case",
+        )  # fmt: skip
+    registry = machine_registry(read.simulation.kind, calibrations, home)
+    with running(read, worker) as code:
+        if code is not None:
+            code.until = time.monotonic() + 10 * budget_s
+        problem = problem_of(read, model_of(read, registry, code))
+        reach = _limits(limits, read)
+        tell("the members of the class")
+        members = members_of(problem, diagnosis, effect)
+        tell("runs")
+        ends = time.monotonic() + budget_s
+        search = RunSearch(
+            problem=problem, members=members, limits=reach, until=lambda: time.monotonic() < ends,
+            learn=(lambda _runs: None) if code is None else code.learn,
+        )  # fmt: skip
+        best = search.best()
+        chosen = search.judge(best)
+        if chosen is None and reach:
+            raise _infeasible(problem, reach)
+        # A repeat was made once: limits of the next run are none of it.
+        recorded = dataclasses.replace(search, limits={}, judged={}, runs={}) if reach else search
+        repeat = recorded.judge(Change(run=best.run))
+    if chosen is None or repeat is None:
+        raise _wrong("no run can be simulated", read.path, best.run, "a run of the case",
+                     "look at the case's simulation")  # fmt: skip
+    plan = _plan(
+        read, diagnosis.effects, members, chosen, repeat, len(search.judged), time.monotonic() < ends
+    )
+    payload: dict[str, Any] = answer(plan) | {"out": out, "files": [], "findings": []}
+    if out is not None:
+        figures = plots(problem, members, chosen)
+        files = _files(problem, members, chosen, plan, figures)
+        sheet = next_sheet(plan, figures, date.today())  # noqa: DTZ011
+        payload |= write_plan(files, out, sheet, template, payload) | {"files": list(files)}
+    return payload, plan_text(plan, payload["files"]) + sheet_text(payload)
+
+
+def _case_of(file: Path) -> Path:
+    """Return the case that an answer's model names."""
+    from toolkit.files import read_toml
+
+    model = file.parent / "model.toml"
+    named = read_toml(model).get("answer", {}).get("case") if model.is_file() else None
+    if not isinstance(named, str):
+        raise _wrong(
+            "the answer does not say where its case is", model, "no case",
+            "the model.toml beside diagnosis.json", "name the case with --case CASE.toml",
+        )  # fmt: skip
+    return Path(os.path.normpath(file.parent / named))
+
+
+def _limits(texts: Sequence[str], case: Case) -> dict[str, tuple[float, float]]:
+    names = [channel.name for channel in case.drivers]
+    limits = {}
+    for text in texts:
+        name, _, span = text.partition("=")
+        low, _, high = span.partition("..")
+        try:
+            ends = (float(low), float(high))
+        except ValueError:
+            ends = (1.0, 0.0)
+        if name.strip() not in names or not ends[0] < ends[1]:
+            raise _wrong("a limit cannot be read", "--limit", text,
+                         f"NAME=LOW..HIGH of {', '.join(names)}", "write for example SA=-10..10")  # fmt: skip
+        limits[name.strip()] = ends
+    return limits
+
+
+def _plan(
+    case: Case,
+    effects: Sequence[Any],
+    members: Sequence[Member],
+    chosen: NextRun,
+    repeat: NextRun,
+    judged: int,
+    complete: bool,
+) -> NextRunPlan:
+    likelihood = {member.label: member.fit.log_posterior for member in members}
+    again = {(true, other): gain for true, other, gain in repeat.pairs}
+    names = {
+        name for effect in effects if effect.equivalent_to for name in (effect.name, *effect.equivalent_to)
+    }
+    fitted = {member.fit.active[-1].effect.name for member in members}
+    run = chosen.run
+    return NextRunPlan(
+        case_sha256=case.sha256,
+        members=tuple(member.label for member in members),
+        lost=tuple(sorted(names - fitted)),
+        steps=chosen.change.words(),
+        conditions=dict(run.conditions),
+        seconds=float(run.t[-1] - run.t[0]),
+        pairs=tuple(
+            PartedPair(
+                true=true, other=other, recorded=likelihood[true] - likelihood[other],
+                repeat=again[true, other], expected=gain,
+            )
+            for true, other, gain in chosen.pairs
+        ),
+        power=chosen.power,
+        power_of_repeat=repeat.power,
+        together=chosen.together,
+        judged=judged,
+        complete=complete,
+        assumptions=ASSUMPTIONS,
+    )  # fmt: skip
+
+
+def _files(
+    problem: Problem,
+    members: Sequence[Member],
+    chosen: NextRun,
+    plan: NextRunPlan,
+    figures: Sequence[Plot],
+) -> dict[str, bytes]:
+    """Return inputs, predictions, figures and the operator's steps by the names of their files."""
+    from toolkit.diagnosis.fit.predict import csv_of
+    from toolkit.report.figures import draw
+
+    run, case = chosen.run, problem.case
+    given = [c.name for c in case.channels if c.role != "output" and c.name in run.columns]
+    columns = {name: run.columns[name] for name in given}
+    clock = {channel.name: run.columns[channel.name] for channel in case.channels if channel.role == "time"}
+    said = {
+        f"{name}_{member.label.replace(' ', '_')}": predicted.outputs[name]
+        for name in problem.names
+        for member, predicted in zip(members, chosen.predicted, strict=True)
+    }
+    files = {
+        INPUTS: csv_of(columns).encode(),
+        PREDICTIONS: csv_of(clock | said).encode(),
+        STEPS: ("\n".join(_operator(plan)) + "\n").encode(),
+    }
+    return files | {f"{plot.name}.png": draw(plot).png for plot in figures}
+
+
+def _operator(plan: NextRunPlan) -> list[str]:
+    return [
+        f"Next run, {plan.seconds:.0f} s: the inputs over time stand in {INPUTS}.",
+        *(f"- {step}" for step in plan.steps),
+        *(f"- condition {key}: {value}" for key, value in plan.conditions.items()),
+        f"It parts: {', '.join(plan.members)}.",
+    ]
+
+
+def plots(problem: Problem, members: Sequence[Member], chosen: NextRun) -> tuple[Plot, ...]:
+    """Return a figure of each output: what every member predicts of the run."""
+    from toolkit.report.content import Curve, Plot
+
+    run = chosen.run
+    clock = tuple((run.t - run.t[0]).tolist())
+    return tuple(
+        Plot(
+            name=f"next_{output.name}",
+            x_label="t / s" if problem.case.has_time else "row",
+            y_label=f"{output.name} / {output.unit.replace('*', '·')}",
+            curves=tuple(
+                Curve(label=member.label, x=clock, y=tuple(predicted.outputs[output.name].tolist()),
+                      style="line", group=place)
+                for place, (member, predicted) in enumerate(zip(members, chosen.predicted, strict=True))
+            ),
+            caption=f"{output.name} in the run that is proposed, as each member of the class predicts it.",
+            alt=f"{output.name} over time by {', '.join(member.label for member in members)}.",
+        )
+        for output in problem.model.outputs
+    )  # fmt: skip
+
+
+def plan_text(plan: NextRunPlan, files: Sequence[str]) -> str:
+    """Return the run for people: what to do, what it parts and with what chance, what it rests on."""
+    from toolkit.lab.answers import table
+
+    rows = [
+        [pair.true, pair.other, f"{pair.recorded:+.1f}", f"{pair.repeat:.1f}", f"{pair.expected:.1f}"]
+        for pair in plan.pairs
+    ]
+    lines = [
+        f"next run, {plan.seconds:.0f} s, to part {', '.join(plan.members)}:",
+        *(f"  {step}" for step in plan.steps),
+        "",
+        table(["if true", "against", "recorded", "by a repeat", "by this run"], rows, align="<<>>>"),
+        "  log-evidence: over 3 the data prefer the first",
+        f"the true member is named by this run in {100 * plan.power:.0f} %, by a repeat in "
+        f"{100 * plan.power_of_repeat:.0f} %",
+    ]
+    lines += [f"stay together: {' and '.join(pair)}" for pair in plan.together]
+    if plan.lost:
+        lines.append(f"could not be fitted: {', '.join(plan.lost)}")
+    if not plan.complete:
+        lines.append("the search was ended by --budget: a longer one may find a better run")
+    lines += ["", "assumed:", *(f"  {text}" for text in plan.assumptions)]
+    if files:
+        lines += ["", *(f"written: {name}" for name in files)]
+        pairs = " ".join(f"--condition {key}={value}" for key, value in _simulated(plan.conditions).items())
+        lines.append(f"  toolkit simulate ANSWER/model.toml --inputs {INPUTS} {pairs} --out DIR".rstrip())
+    return "\n".join(lines)
+
+
+def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
+    return {key: value for key, value in conditions.items() if key != "file"}
+
+
+def _infeasible(problem: Problem, limits: Mapping[str, tuple[float, float]]) -> ConfigError:
+    """Return the error of limits that no change of a recording keeps, with the nearest."""
+    from toolkit.planning.next_run import nearest_limits
+
+    run, nearest = nearest_limits(problem, limits)
+    # Rounded outward: the recording itself lies on the limit.
+    wide = " ".join(f"--limit {name}={_ends(*span)}" for name, span in nearest.items())
+    return ConfigError(
+        "no run stays within the limits", where="--limit",
+        got=" ".join(f"{name}={low:g}..{high:g}" for name, (low, high) in limits.items()),
+        expected=f"nearest: what was recorded in {run}", next_step=f"ask with {wide}; nothing was written",
+        rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def _ends(low: float, high: float) -> str:
+    step = 10.0 ** (math.floor(math.log10(high - low)) - 3)
+    return f"{math.floor(low / step) * step:.6g}..{math.ceil(high / step) * step:.6g}"
+
+
+def _wrong(problem: str, where: object, actual: object, expected: str, next_step: str) -> ConfigError:
+    return ConfigError(
+        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="plan-next"
+    )

@@ -1,0 +1,142 @@
+"""`toolkit plan interval`: when an instrument is to be calibrated again, by its check loads."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+from toolkit.declared.answers import merged
+from toolkit.errors import ConfigError
+from toolkit.findings import Finding, FindingEntry
+from toolkit.lab.answers import findings_text, table
+from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.planning.interval import IntervalPlan
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.planning.interval import IntervalPlan
+    from toolkit.report.word.package import Template
+
+
+class _IntervalKeys(_Sheet):
+    instrument: str
+    record: str
+    in_use: Annotated[str | None, "interval, as its approval states it"]
+    next: Annotated[str, "day of the next session"]
+    method_2_days: Annotated[int | None, "what drift alone recommends"]
+    assumptions: Annotated[list[str], "what it rests on"]
+    findings: list[FindingEntry]
+
+
+PlanIntervalAnswer = merged(IntervalPlan, _IntervalKeys)
+
+
+LEAST = 0.5
+"""Reliability below which an interval is none."""
+
+
+def interval_plan_answer(
+    registry: Registry,
+    instrument: str,
+    *,
+    reliability: float,
+    tests_a_year: float | None,
+    load: str | None,
+    out: Path | None = None,
+    template: Template | None = None,
+) -> tuple[dict[str, Any], str, list[Finding]]:
+    """Return the interval of an instrument as JSON and as text, with its findings; its sheet into ``out``.
+
+    Raises
+    ------
+    ToolkitError
+        no such instrument, a reliability or a number that cannot be used, too short a history;
+        ``plan-infeasible``: no interval keeps the reliability
+    """
+    from toolkit.calibration.control.chart import control_chart
+    from toolkit.calibration.control.recall import due_of
+    from toolkit.declared import answer
+    from toolkit.lab.plans.plan_sheets import interval_sheet, sheet_text, write_plan
+    from toolkit.planning.interval import ASSUMPTIONS, paths_of, plan_interval
+
+    if not LEAST <= reliability < 1:
+        raise _wrong("--reliability", reliability, f"a share from {LEAST:g} to below 1, such as 0.95")
+    if tests_a_year is not None and not (math.isfinite(tests_a_year) and tests_a_year >= 0):
+        raise _wrong("--tests", tests_a_year, "tests a year, 0 or more")
+    due = due_of(registry, instrument, registry.today())
+    chart = control_chart(registry, instrument, load=load)
+    records = {point.record for series in chart.series for point in series.points}
+    dates = {record: dt.date.fromisoformat(registry.load(record).date) for record in sorted(records)}
+    plan = plan_interval(paths_of(chart, dates), reliability=reliability, tests_a_year=tests_a_year)
+    if not plan.days:
+        raise _infeasible(plan)
+    findings = _findings(plan, instrument)
+    payload = answer(plan) | {
+        "instrument": instrument, "record": due.record, "in_use": due.recall,
+        "next": (due.session_date + dt.timedelta(days=plan.days)).isoformat(),
+        "method_2_days": due.recommendation.days, "assumptions": ASSUMPTIONS,
+        "findings": [finding.as_dict() for finding in findings],
+    }  # fmt: skip
+    if out is not None:
+        sheet = interval_sheet(plan, instrument, due.record, findings, registry.today())
+        payload |= write_plan({}, out, sheet, template, payload)
+    return payload, _text(plan, payload, findings) + sheet_text(payload), findings
+
+
+def _infeasible(plan: IntervalPlan) -> ConfigError:
+    """Return the error of a reliability that not even the shortest interval keeps, with the nearest."""
+    reached = math.floor(1e4 * (1 - plan.chosen.beyond)) / 1e4
+    step = f"ask with --reliability {reached:g}, or look for" if reached >= LEAST else "look for"
+    return ConfigError(
+        "no interval keeps the reliability", where="--reliability", got=plan.reliability,
+        expected=f"nearest: {plan.chosen.days} days, which keep {reached:g}; {plan.limiting} limits them",
+        next_step=f"{step} what drifts or scatters; nothing was written", rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
+    from toolkit.planning.interval import STEP
+
+    if plan.capped:
+        message = (
+            f"kept at {STEP:g} times the longest gap of {plan.seen_days} days: beyond it nothing was seen"
+        )
+        return [Finding(rule="plan-interval", where=instrument, message=message, level="note")]
+    return []
+
+
+def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) -> str:
+    from toolkit.planning.interval import ASSUMPTIONS
+
+    lines = [
+        f"{payload['instrument']}: {plan.days} days, next by {payload['next']}",
+        f"at its end inside the tolerance with {100 * (1 - plan.chosen.beyond):.1f} %; asked for: "
+        f"{100 * plan.reliability:g} %; in use: {payload['in_use'] or 'none'}; ILAC-G24 method 2: "
+        f"{payload['method_2_days'] or '-'} days",
+        f"{plan.limiting} drifts most, by {plan.readings} readings ({plan.paths} check loads and loads): "
+        f"{plan.trend_per_year:+.2g} tolerances a year, random walk {plan.walk_per_root_year:.2g} in a year",
+        "",
+        table(
+            ["days", "beyond the tolerance", "sessions a year", "tests recalled a year"],
+            [
+                [str(risk.days), f"{100 * risk.beyond:.1f} %", f"{risk.sessions_a_year:.2g}",
+                 "-" if risk.recalled_a_year is None else f"{risk.recalled_a_year:.3g}"]
+                for risk in sorted({*plan.risks, plan.chosen}, key=lambda risk: risk.days)
+            ],
+            align=">>>>",
+        ),
+        "",
+        "it assumes:", *(f"  {text}" for text in ASSUMPTIONS),
+    ]  # fmt: skip
+    found = findings_text(findings)
+    return "\n".join([*lines, *([found] if found else [])])
+
+
+def _wrong(where: str, actual: object, expected: str) -> ConfigError:
+    return ConfigError(
+        "a number cannot be used", where=where, got=actual, expected=expected, next_step="correct it",
+        rule="plan-demand",
+    )  # fmt: skip

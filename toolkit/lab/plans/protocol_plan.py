@@ -1,0 +1,387 @@
+"""`toolkit plan test`: from an earlier test or a tire file to the plan, its protocol and its simulation."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from toolkit.declared.answers import merged
+from toolkit.errors import ConfigError
+from toolkit.files import real_path
+from toolkit.findings import FindingEntry
+from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.planning.protocol_plan import ProtocolPlan
+
+if TYPE_CHECKING:
+    from toolkit.lab.tire_tests.resolve import Resolved
+    from toolkit.machine import Machine
+    from toolkit.planning.expectation import EarlierTest
+    from toolkit.planning.printed_units import PrintedUnits
+    from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
+    from toolkit.report.word.package import Template
+    from toolkit.simulation.plan import Plan
+
+
+class _ProtocolFiles(_Sheet):
+    out: Path | None
+    files: Annotated[Mapping[str, Path], "by what they are for"]
+    findings: list[FindingEntry]
+
+
+PlanTestAnswer = merged(ProtocolPlan, _ProtocolFiles)
+
+
+PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
+DEMANDS = ("slope_cornering", "conicity", "plysteer", "peak")
+_SIMULATED = 3  # tests of a tire file: the scatter of one alone is not sure
+_NEAR = 0.15  # a load that is asked for is the nominal one within this part of it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProtocolOrder:
+    """What `plan_test` is asked for: texts of demands and loads, an earlier test or tire, the time.
+
+    ``like`` None is the published tire of the virtual machine; ``between_files_s`` None its pause.
+    """
+
+    like: Path | None = None
+    demands: tuple[str, ...] = ()
+    loads: tuple[str, ...] = ()
+    minutes: float = math.inf
+    between_files_s: float | None = None
+    sliding_kJ: float = math.inf
+    rise_K: float = math.inf
+    calibration: str | None = None
+    calibrations: Path | None = None
+    home: Path | None = None
+    draft: bool = False
+
+
+def plan_test(
+    order: ProtocolOrder,
+    out: Path | None = None,
+    *,
+    template: Template | None = None,
+    tell: Callable[[str], None] = lambda _text: None,
+) -> tuple[dict[str, Any], str]:
+    """Return the JSON answer of a plan and its text; write the files of a plan into ``out``, its
+    sheet by a template too.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-demand``, ``plan-load``, ``plan-like``; ``plan-infeasible`` with the nearest plan that is
+        feasible: then nothing is written; ToolkitError: the earlier test cannot be used
+    """
+    from datetime import date
+
+    from toolkit.declared import answer
+    from toolkit.lab.plans.plan_sheets import protocol_sheet, sheet_text, write_plan
+    from toolkit.machine import load_machine
+    from toolkit.planning.demands import parse_demand
+    from toolkit.planning.printed_units import units_of
+    from toolkit.planning.protocol_plan import plan_protocol
+    from toolkit.planning.tread import Tread
+
+    demands = tuple(dict.fromkeys(parse_demand(text) for text in order.demands or DEMANDS))
+    _refuse_doubled([demand.label for demand in demands])
+    _refuse_endless(order)
+    tell("the earlier test")
+    earlier, like, tire = _earlier(order)
+    own = load_machine(earlier.machine.name)
+    tread = dataclasses.replace(
+        Tread.of(own, earlier, between_files_s=order.between_files_s),
+        energy_J=1e3 * order.sliding_kJ, rise_K=order.rise_K,
+    )  # fmt: skip
+    plan = plan_protocol(
+        earlier, demands, _loads(order.loads, earlier), machine=own, like=like, minutes=order.minutes,
+        tread=tread, tell=tell,
+    )  # fmt: skip
+    if not plan.feasible:
+        raise _beyond(plan, order) or _infeasible(plan, order.minutes)
+    payload: dict[str, Any] = answer(plan) | {"out": out, "files": {}, "findings": []}
+    units = units_of(own.protocol)
+    if out is not None:
+        payload["files"] = {"protocol": PROTOCOL, "simulation": SIMULATION}
+        sheet = protocol_sheet(plan, date.today(), units)  # noqa: DTZ011
+        payload |= write_plan(_files(plan, own, tire, out), out, sheet, template, payload)
+    return payload, plan_text(plan, payload["files"], units) + sheet_text(payload)
+
+
+def _refuse_doubled(labels: Sequence[str]) -> None:
+    doubled = sorted({label for label in labels if labels.count(label) > 1})
+    if doubled:
+        raise ConfigError(
+            "a characteristic has two demands", where="--u", got=", ".join(doubled),
+            expected="one demand of each", next_step="state the smaller one", rule="plan-demand",
+        )  # fmt: skip
+
+
+def _refuse_endless(order: ProtocolOrder) -> None:
+    limits = {
+        "--minutes": (order.minutes, "minutes above 0"),
+        "--sliding": (order.sliding_kJ, "kJ above 0"),
+        "--rise": (order.rise_K, "kelvins above 0"),
+    }
+    wrong = {name: stated for name, stated in limits.items() if not stated[0] > 0}
+    if order.between_files_s is not None and not 0 <= order.between_files_s < math.inf:
+        wrong["--between-files"] = (order.between_files_s, "seconds, zero or more")
+    for name, (size, expected) in wrong.items():
+        raise ConfigError(
+            "a limit is no number that a test can keep", where=name, got=size, expected=expected,
+            next_step="state such a number, or leave the option out", rule="plan-infeasible",
+        )  # fmt: skip
+
+
+def _earlier(order: ProtocolOrder) -> tuple[EarlierTest, str, Path | None]:
+    """Return the earlier test, what it is called, and the tire file that it was simulated from."""
+    from toolkit.lab.tire_tests.resolve import resolve_test
+
+    like = order.like
+    if like is None or like.suffix.lower() in (".tir", ".toml"):
+        what = "the published passenger tire (SAE 870421)" if like is None else f"the tire {like.name}"
+        return _virtual(order), f"{_SIMULATED} simulated tests of {what} on the virtual machine", like
+    resolved = resolve_test(
+        like, calibration=order.calibration, calibrations=order.calibrations, home=order.home,
+        draft=order.draft,
+    )  # fmt: skip
+    return _of(resolved, str(like)), f"the test {resolved.result.reduced.info.name}", None
+
+
+def _of(resolved: Resolved, where: str) -> EarlierTest:
+    from toolkit.machine import load_machine
+    from toolkit.planning.expectation import earlier_test
+
+    reduced = resolved.result.reduced
+    if reduced.impossible:
+        raise ConfigError(
+            "the earlier test holds values that no tire has", where=f"--like {where}",
+            got=", ".join(dict.fromkeys(finding.rule for finding in reduced.impossible)),
+            expected="a test whose values are a tire's", next_step="'toolkit process' names the rows",
+            rule="plan-like",
+        )  # fmt: skip
+    machine = load_machine(reduced.info.machine)
+    return earlier_test(resolved.result, machine=machine, record=resolved.record)
+
+
+def _virtual(order: ProtocolOrder) -> EarlierTest:
+    """Return the virtual machine's protocol on a tire, processed: what is expected of such a tire."""
+    from toolkit.lab.home import packaged_home, registry_if_any
+    from toolkit.lab.studies.simulate import simulate_plan
+    from toolkit.lab.tire_tests.resolve import resolve_test
+    from toolkit.machine.default import SIMULATED_MACHINE
+    from toolkit.planning.expectation import pooled
+    from toolkit.simulation.plan import read_plan
+
+    registry = registry_if_any(order.calibrations, order.home)
+    known = registry is not None and (registry.folder / SIMULATED_MACHINE).is_dir()
+    calibrations = registry.folder if registry is not None and known else packaged_home() / "calibrations"
+    plan = read_plan(Path(__file__).parents[1] / "examples" / "virtual" / "test_plan.toml")
+    if order.like is not None:
+        plan = _with_tire(plan, order.like)
+    tests = []
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(_SIMULATED):
+            test = Path(folder) / str(number)
+            simulate_plan(dataclasses.replace(plan, seed=plan.seed + number), test, calibrations=calibrations)
+            resolved = resolve_test(
+                test, calibration=order.calibration, calibrations=calibrations, draft=order.draft
+            )
+            tests.append(_of(resolved, str(order.like)))
+    return pooled(tests)
+
+
+def _with_tire(plan: Plan, tire: Path) -> Plan:
+    """Return a plan with another tire, which brings its own nominal load and pressure."""
+    from datetime import date
+
+    from toolkit.declared import toml_text
+    from toolkit.simulation.plan import read_plan
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "plan.toml"
+        text = {"schema": 1, "date": date.fromisoformat(plan.date), "tire": {"file": str(real_path(tire))}}
+        path.write_text(toml_text(text), encoding="utf-8")
+        own = read_plan(path)
+    return dataclasses.replace(own, seed=plan.seed, label=plan.label)
+
+
+def _loads(texts: Sequence[str], earlier: EarlierTest) -> tuple[float, ...]:
+    """Return the nominal loads that are asked for; all of the earlier test by default."""
+    from toolkit.units import in_both
+
+    if not texts:
+        return earlier.loads_N
+    loads = []
+    for text in texts:
+        asked = _quantity(text)
+        nearest = min(earlier.loads_N, key=lambda load: abs(load - asked))
+        if abs(nearest - asked) > _NEAR * nearest:
+            raise _wrong_load(text, in_both(list(earlier.loads_N), "lbf", ".0f"))
+        loads.append(nearest)
+    return tuple(sorted(set(loads)))
+
+
+def _quantity(text: str) -> float:
+    import re
+
+    from toolkit.errors import UnitError
+    from toolkit.units import si_scale
+
+    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(\S.*?)\s*", text)
+    if match is None:
+        raise _wrong_load(text, "a number with its unit: '833 lbf', '3700 N'")
+    try:
+        return float(match[1]) * si_scale(match[2], "force", where="--load")
+    except UnitError as error:
+        raise _wrong_load(text, "a force with its unit: '833 lbf', '3700 N'") from error
+
+
+def _wrong_load(actual: str, expected: str) -> ConfigError:
+    return ConfigError(
+        "a load cannot be planned", where="--load", got=actual, expected=expected,
+        next_step="name a load that the earlier test measured, or another test", rule="plan-load",
+    )  # fmt: skip
+
+
+def _beyond(plan: ProtocolPlan, order: ProtocolOrder) -> ConfigError | None:
+    """Return the error of limits of the tread that the nearest plan does not keep; None where it does."""
+    design = plan.plan
+    asked = {
+        "--sliding": (order.sliding_kJ, design.sliding_kJ, "kJ"),
+        "--rise": (order.rise_K, design.rise_K, "K"),
+    }
+    beyond = {name: entry for name, entry in asked.items() if entry[1] > entry[0]}
+    if not beyond and design.minutes <= order.minutes:
+        return None
+    if not beyond:
+        beyond = {"--minutes": (order.minutes, design.minutes, "min")}
+    return ConfigError(
+        "no test spares the tread so far", where=", ".join(beyond),
+        got=", ".join(f"{name} {limit:g} {unit}" for name, (limit, _, unit) in beyond.items()),
+        expected="nearest: " + ", ".join(f"{_up(size)} {unit}" for _, size, unit in beyond.values()),
+        next_step="allow as much, or ask for fewer or smaller loads", rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def _up(size: float) -> str:
+    return f"{math.ceil(10 * size) / 10:g}"
+
+
+def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
+    """Return the error of demands that no design meets, with the nearest plan."""
+    from toolkit.estimate import round_uncertainty
+
+    missed = [value for value in plan.values if value.planned_U > value.demanded_U]
+    by_name: dict[str, list[PlannedValue]] = {}
+    for value in missed:
+        by_name.setdefault(value.name, []).append(value)
+    nearest = [
+        f"{name}: {round_uncertainty(max(v.planned_U * 1.05 for v in values))} {values[0].unit} at "
+        + ", ".join(f"{v.load_N:.0f} N" for v in values)
+        + f" ({_largest(values[0].sources)})"
+        for name, values in by_name.items()
+    ]
+    limit = "" if math.isinf(minutes) else f" in {minutes:g} min"
+    angles = ", ".join(f"{angle:g}" for angle in sorted(plan.plan.slip_angles_deg))
+    return ConfigError(
+        f"no test{limit} reaches what is demanded", where="--u",
+        got="; ".join(
+            f"{value.name} U = {round_uncertainty(value.demanded_U)} {value.unit} at {value.load_N:.0f} N"
+            for value in missed
+        ),
+        expected=f"at least: {'; '.join(nearest)}",
+        next_step=f"demand what is feasible{', or allow more time' * (limit != '')}; the nearest plan has "
+        f"slip angles {angles} deg at {len(plan.plan.loads_N)} loads: {plan.plan.rows} rows in "
+        f"{plan.plan.minutes:.1f} min",
+        rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def _largest(sources: Sequence[tuple[str, float]]) -> str:
+    return f"mostly {max(sources, key=lambda source: source[1])[0]}"
+
+
+def _files(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> dict[str, str]:
+    """Return the protocol, and what the virtual machine runs of it, by the names of their files."""
+    from datetime import date
+
+    from toolkit.machine.default import SIMULATED_MACHINE
+    from toolkit.planning.protocol_plan import protocol_text, simulation_text
+
+    twin = own.name if own.simulated else SIMULATED_MACHINE
+    own_tire = None if tire is None else Path(os.path.relpath(real_path(tire), real_path(out))).as_posix()
+    return {
+        PROTOCOL: protocol_text(plan, own.protocol),
+        SIMULATION: simulation_text(plan, machine=twin, on=date(2026, 3, 17), tire=own_tire),
+    }
+
+
+def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) -> str:
+    """Return a plan for people: what to measure, what it reaches, what it rests on and gives up."""
+    from toolkit.estimate import plus_minus, round_uncertainty
+    from toolkit.lab.answers import table
+    from toolkit.planning.printed_units import title_of
+
+    own, design = plan.protocol, plan.plan
+
+    def row(value: PlannedValue) -> list[str]:
+        def U(size: float | None) -> str:
+            return "" if size is None else round_uncertainty(units.shown(size, value.unit)[0])
+
+        size, unit = units.shown(value.value, value.unit)
+        return [
+            title_of(value.name), f"{units.shown(value.load_N, 'N')[0]:.0f}",
+            f"{plus_minus(size, units.shown(value.planned_U, value.unit)[0])} {unit}", U(value.demanded_U),
+            f"{U(value.planned_U_low)} to {U(value.planned_U_high)}", U(value.protocol_U),
+            U(value.same_time_U),
+        ]  # fmt: skip
+
+    rows = [row(value) for value in plan.values]
+    head = [
+        "",
+        f"FZ [{units.force}]",
+        "expected, ± U",
+        "U demanded",
+        "U, how sure",
+        "U by protocol",
+        "U in its time",
+    ]
+    directions = " and ".join(design.rotations)
+    waits = ", ".join(f"{pause:.0f}" for pause in design.pauses_s)
+    pauses = [f"  pauses       {waits} s before each"] if max(design.pauses_s) > max(own.pauses_s) else []
+    loads = [units.shown(load, "N")[0] for load in design.loads_N]
+    lines = [
+        f"{design.rows} rows in {design.minutes:.1f} min: {len(design.slip_angles_deg)} slip angles at "
+        f"{len(design.loads_N)} loads, drum {directions}",
+        f"  slip angles  {', '.join(f'{angle:g}' for angle in design.slip_angles_deg)} deg, in this order",
+        f"  loads        {', '.join(f'{load:.0f}' for load in loads)} {units.force}",
+        *pauses,
+        f"  like         {plan.like}"
+        + (f", record {plan.calibration}" if plan.calibration is not None else ""),
+        "",
+        table(head, rows, align="<>>>>>>"),
+        "",
+        f"protocol of {plan.machine}: {own.rows} rows in {own.minutes:.1f} min",
+        f"tread: {design.sliding_kJ:.0f} kJ slide away, by the protocol {own.sliding_kJ:.0f} kJ; a recording "
+        f"warms it by {design.rise_K:.1f} K at most",
+    ]
+    if plan.alike is not None:
+        lines.append(
+            f"its uncertainties, within 5 %, in {plan.alike.rows} rows and {plan.alike.minutes:.1f} min "
+            f"({100 * plan.alike.rows / own.rows:.0f} % of the rows)"
+        )
+    else:
+        lines.append("its uncertainties are not reached by fewer slip angles")
+    lines += ["", "assumed:", *(f"  {text}" for text in plan.assumptions)]
+    if plan.gives_up:
+        lines += ["", "given up:", *(f"  {text}" for text in plan.gives_up)]
+    if files:
+        lines += ["", *(f"written: {name}" for name in files.values())]
+    return "\n".join(lines)

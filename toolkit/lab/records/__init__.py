@@ -1,0 +1,1 @@
+"""Calibration records: sessions, gates, budgets, control, decisions, certificates."""

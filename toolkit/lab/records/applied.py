@@ -1,0 +1,258 @@
+"""Files of indications to files of loads: what `toolkit calibration apply` reads, computes and writes.
+
+The recording needs no machine definition and no tire: the record names its indications, every other column of
+numbers with a unit goes through as it is. Each row names the record that computed it; a draft says so in
+every row and in the file's own properties.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+
+import numpy as np
+
+from toolkit.calibration.records.use import UsedRecord
+from toolkit.errors import ConfigError, OutputError, UnreadableError
+from toolkit.findings import FindingEntry
+from toolkit.inputs import RECORDING_FILE, read_input
+from toolkit.recording.columns import rig
+from toolkit.recording.extras import needed
+from toolkit.recording.formats.mdf import mdf_bytes
+from toolkit.recording.formats.tdms import tdms_bytes
+from toolkit.recording.formats.vectors import Vector, Vectors, Written, series_of
+from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, STAMP
+from toolkit.recording.model import Series
+from toolkit.recording.read import read_recording
+from toolkit.recording.sniff import sniff
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.lab.records.record import Loads, Record
+
+
+class AppliedRange(TypedDict):
+    """The range of a load that was computed."""
+
+    unit: str
+    least: float
+    largest: float
+    U_largest: Annotated[float | None, "largest expanded uncertainty; null where it is not determined"]
+
+
+class ApplyAnswer(TypedDict):
+    """Loads of a file of indications, computed by a record."""
+
+    out: Annotated[Path, "file that was written"]
+    rows: int
+    calibration: UsedRecord
+    mark: Annotated[str | None, "what the file is marked with"]
+    loads: Annotated[Mapping[str, AppliedRange], "by load"]
+    findings: list[FindingEntry]
+
+
+Table = Mapping[str, "NDArray[Any]"]
+
+
+def read_indications(path: Path, record: Record) -> tuple[Series, ...]:
+    """Return the columns of a file that holds the indications of a record: each with its unit.
+
+    Raises
+    ------
+    RecordingError
+        see `toolkit.recording.read.read_recording`; a column without a unit is refused
+    ConfigError
+        ``missing-extra``
+    """
+    machine = rig(record.result.instrument, record.indications)
+    data = read_input(path, RECORDING_FILE)
+    if sniff(data).id == "parquet":
+        return series_of(_parquet(data, path), machine)
+    return read_recording(path, machine, data=data).series
+
+
+def _parquet(data: bytes, path: Path) -> Vectors:
+    parquet: Any = needed("pyarrow.parquet", extra="parquet", to="read a Parquet table", where=path)
+    try:
+        table = parquet.read_table(io.BytesIO(data))
+        names = table.column_names
+        columns = [np.asarray(table.column(at).to_numpy()) for at in range(len(names))]
+    except Exception as error:
+        raise UnreadableError(
+            "the Parquet table cannot be read", where=path, got=f"{type(error).__name__}: {error}"[:300],
+            expected="a Parquet file with one column a channel, 'NAME [unit]'",
+            next_step="write it again", rule="unreadable",
+        ) from error  # fmt: skip
+    vectors = [
+        Vector(name=name, unit=None, values=values) for name, values in zip(names, columns, strict=True)
+    ]
+    return Vectors(where=str(path), vectors=[vector for vector in vectors if vector.values.dtype.kind != "O"])
+
+
+def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of the output by header: those of the file, then each load and its U.
+
+    Raises
+    ------
+    ConfigError
+        ``doubled-column``: the file has a column of a load already
+    """
+    columns = {f"{column.symbol} [{column.unit}]": column.values for column in series}
+    clash = {column.symbol for column in series} & set(loads.value)
+    if clash:
+        raise ConfigError(
+            "the file has columns of loads already", where=", ".join(sorted(clash)),
+            got="a column in the file", expected="indications, and other columns of other names",
+            next_step="take it out of a copy of the file, or rename it there", rule="doubled-column",
+        )  # fmt: skip
+    for name, values in loads.value.items():
+        unit = loads.units[name]
+        columns[f"{name} [{unit}]"] = values
+        columns[f"U({name}) [{unit}]"] = loads.U[name]
+    return columns
+
+
+def write_applied(path: Path, columns: Table, use: CalibrationUse) -> None:
+    """Write the columns, whole or not at all; the ending names the format.
+
+    Raises
+    ------
+    OutputError
+        ``output-name original not-writable``: another ending, a file that is no result, a folder that cannot
+        be written to
+    ConfigError
+        ``missing-extra``
+    """
+    from toolkit.publication import write_result
+
+    write = check_output(path)
+    write_result(path, write(columns, use))
+
+
+def check_output(path: Path) -> Callable[[Table, CalibrationUse], bytes]:
+    """Return the writer of an ending, before anything is computed; errors as `write_applied`."""
+    write = WRITERS.get(path.suffix.lower())
+    if write is None:
+        raise OutputError(
+            "no format goes by this name", where=path, got=path.suffix or "no ending",
+            expected=", ".join(WRITERS), next_step="name the file so with --out; nothing was written",
+            rule="output-name",
+        )  # fmt: skip
+    if path.exists():
+        raise OutputError(
+            "the output exists", where=path, got="a file", expected="a new name: nothing is written over",
+            next_step="name another file with --out, or remove that one", rule="original",
+        )  # fmt: skip
+    return write
+
+
+def mark_line(use: CalibrationUse) -> str:
+    """Return the line that a file's properties hold: record, hash, how it stood."""
+    return "; ".join(filter(None, (GENERATOR, OWN_OUTPUT, f"{use.id} {use.sha256}", use.mark)))
+
+
+def _with_record(columns: Table, use: CalibrationUse) -> dict[str, NDArray[Any]]:
+    rows = len(next(iter(columns.values())))
+    texts = {"calibration": use.id, "calibration_sha256": use.sha256, "mark": use.mark or ""}
+    return {**columns, **{name: np.full(rows, text) for name, text in texts.items()}}
+
+
+def _csv(columns: Table, use: CalibrationUse) -> bytes:
+    import pandas as pd
+
+    frame = pd.DataFrame(_with_record(columns, use))
+    return str(frame.to_csv(index=False, lineterminator="\n")).encode()
+
+
+def _xlsx(columns: Table, use: CalibrationUse) -> bytes:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    sheet: Any = book.active
+    sheet.title = "loads"
+    table = _with_record(columns, use)
+    sheet.append(list(table))
+    for row in zip(*(values.tolist() for values in table.values()), strict=True):
+        sheet.append([None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row])
+    sheet.freeze_panes = "A2"
+    book.properties.creator, book.properties.title = GENERATOR, use.mark or f"loads by {use.id}"
+    book.properties.keywords = f"{OWN_OUTPUT}; {mark_line(use)}"
+    book.properties.created = book.properties.modified = STAMP
+    stream = io.BytesIO()
+    book.save(stream)
+    return stream.getvalue()
+
+
+def _parquet_bytes(columns: Table, use: CalibrationUse) -> bytes:
+    arrow: Any = needed("pyarrow", extra="parquet", to="write a Parquet table", where="--out")
+    parquet: Any = needed("pyarrow.parquet", extra="parquet", to="write a Parquet table", where="--out")
+    table = arrow.table({name: values.tolist() for name, values in _with_record(columns, use).items()})
+    stream = io.BytesIO()
+    parquet.write_table(
+        table.replace_schema_metadata({"generator": GENERATOR, "marks": mark_line(use)}), stream
+    )
+    return stream.getvalue()
+
+
+def _channels(columns: Table) -> list[Written]:
+    written = []
+    for header, values in columns.items():
+        symbol, _, unit = header.removesuffix("]").rpartition(" [")
+        written.append(
+            Written(symbol=symbol, header=header, unit=unit, values=np.asarray(values, dtype=float))
+        )
+    return written
+
+
+WRITERS: dict[str, Callable[[Table, CalibrationUse], bytes]] = {
+    ".csv": _csv,
+    ".xlsx": _xlsx,
+    ".parquet": _parquet_bytes,
+    ".tdms": lambda columns, use: tdms_bytes(_channels(columns), mark_line(use)),
+    ".mf4": lambda columns, use: mdf_bytes(_channels(columns), mark_line(use)),
+}
+"""Ending of an output -> its writer."""
+
+
+def apply_answer(
+    record: Record, source: Path, out: Path, *, tare: Mapping[str, float] | None, draft: bool
+) -> tuple[ApplyAnswer, str, Loads]:
+    """Compute a file's loads by a record and write them; return both forms of the answer, and the loads."""
+    from toolkit.lab.answers import finding_lines
+
+    check_output(out)
+    series = read_indications(source, record)
+    by_name = {column.symbol: column for column in series}
+    units = {name: by_name[name].unit for name in record.indications}
+    values = {name: by_name[name].values for name in record.indications}  # noqa: PD011  a Series of ours
+    loads = record.apply(values, units=units, tare=tare, draft=draft)
+    write_applied(out, applied_columns(series, loads), loads.use)
+    ranges = {name: _range(loads, name) for name in loads.value}
+    rows = len(series[0].values)
+    payload: ApplyAnswer = {
+        "out": out, "rows": rows, "calibration": loads.use.as_dict(), "mark": loads.use.mark, "loads": ranges,
+        "findings": [finding.as_dict() for finding in loads.findings],
+    }  # fmt: skip
+    lines = [f"{out}: {rows} rows by {record.id} ({loads.use.status})"]
+    lines += [f"  {name:4s} {_range_text(span)}" for name, span in ranges.items()]
+    lines += [loads.use.mark] if loads.use.mark else []
+    lines += finding_lines(loads.findings)
+    return payload, "\n".join(lines), loads
+
+
+def _range(loads: Loads, name: str) -> AppliedRange:
+    values, U = loads.value[name], loads.U[name]
+    return {
+        "unit": loads.units[name], "least": float(values.min()), "largest": float(values.max()),
+        "U_largest": float(U.max()),
+    }  # fmt: skip
+
+
+def _range_text(span: Mapping[str, Any]) -> str:
+    unit, U = span["unit"], span["U_largest"]
+    text = f"{span['least']:.6g} to {span['largest']:.6g} {unit}, "
+    return text + ("U not determined" if np.isnan(U) else f"U up to {U:.2g} {unit}")

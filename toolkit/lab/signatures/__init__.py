@@ -1,0 +1,1 @@
+"""Signatures: people and their signatures, the ledger in a document, seals, and what is verified offline."""

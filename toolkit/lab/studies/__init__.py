@@ -1,0 +1,1 @@
+"""Studies: the virtual machine, and why a simulation differs from a recording."""

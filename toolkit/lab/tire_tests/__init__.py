@@ -1,0 +1,1 @@
+"""Tire tests: read, reduced, fitted, compared, converted, reported, watched for."""

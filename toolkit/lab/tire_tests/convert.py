@@ -1,0 +1,247 @@
+"""Between tire files, TYDEX files, tables and reduced tests; what a target cannot hold is named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.channels import Axes
+    from toolkit.findings import Finding
+    from toolkit.lab.tire_tests.resolve import Resolved
+
+    Columns = dict[str, tuple[str, NDArray[np.float64]]]
+
+_KINDS = {
+    ".tir": "tir",
+    ".fmu": "fmu",
+    ".csv": "csv",
+    ".tdx": "tydex",
+    ".tydex": "tydex",
+    ".tyd": "tydex",
+    ".xlsx": "test",
+}
+_PAIRS = {
+    ("tir", "tir"),
+    ("tir", "fmu"),
+    ("tydex", "csv"),
+    ("csv", "tydex"),
+    ("test", "csv"),
+    ("test", "tydex"),
+}
+_WAYS = ".tir to .tir or .fmu; .tdx to .csv; .csv to .tdx; a reduced test .xlsx to .csv or .tdx"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Converted:
+    """A file that was converted: both formats, what the target could not hold, the record of a test."""
+
+    kinds: tuple[str, str]
+    findings: tuple[Finding, ...]
+    use: CalibrationUse | None = None
+
+
+def convert(
+    source: Path, target: Path, *, axes: str, resolve: Callable[[Path], Resolved], fmi: str = "2"
+) -> Converted:
+    """Write a file in another format.
+
+    Parameters
+    ----------
+    axes : of a .csv, read or written
+    resolve : reads a reduced test (`lab.resolve`)
+    fmi : version of FMI of an .fmu, 2 or 3
+
+    Raises
+    ------
+    ToolkitError
+        there is no such conversion; the source cannot be read; a table of a draft is asked for
+    """
+    from toolkit.channels import AXES
+    from toolkit.errors import ConfigError
+    from toolkit.lab.tire_tests.fmu_files import file_fmu
+    from toolkit.publication import write_result
+
+    if axes not in AXES:
+        raise ConfigError(
+            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
+            next_step="name one of those expected", rule="unknown-axes",
+        )  # fmt: skip
+    kinds = _kinds(source, target)
+    use: CalibrationUse | None = None
+    text: str | bytes
+    if kinds == ("tir", "tir"):
+        text, findings = _tir(source)
+    elif kinds == ("tir", "fmu"):
+        text, findings = file_fmu(source, target, fmi=fmi)
+    else:
+        resolved = resolve(source) if kinds[0] == "test" else None
+        use = None if resolved is None else resolved.result.reduced.calibration
+        _refuse_draft(source, target, kinds, use)
+        marks: tuple[str, ...]
+        if resolved is not None:
+            columns, read_in, lost = _of_test(source, resolved)
+            marks = (use.mark,) if use is not None and use.mark else ()
+        else:
+            columns, read_in, lost, marks = _read(source, kinds[0], axes)
+        text, target_findings = _written(columns, read_in, kinds[1], axes, source, marks)
+        findings = (*lost, *target_findings)
+    write_result(target, text)
+    return Converted(kinds=kinds, findings=findings, use=use)
+
+
+def _kinds(source: Path, target: Path) -> tuple[str, str]:
+    from toolkit.errors import OutputError
+    from toolkit.files import same_file
+
+    kinds = (_KINDS.get(source.suffix.lower(), ""), _KINDS.get(target.suffix.lower(), ""))
+    if kinds not in _PAIRS:
+        raise OutputError(
+            "there is no such conversion", where=f"{source.name} to {target.name}",
+            got=f"{source.suffix or 'no ending'} to {target.suffix or 'no ending'}", expected=_WAYS,
+            next_step="choose a name with one of these endings", rule="output-name",
+        )  # fmt: skip
+    if same_file(source, target):
+        raise OutputError(
+            "the output would replace the input", where="OUT", got=target, expected="another name",
+            next_step="choose another name", rule="original",
+        )  # fmt: skip
+    return kinds
+
+
+def _refuse_draft(source: Path, target: Path, kinds: tuple[str, str], use: CalibrationUse | None) -> None:
+    """Refuse a table of a draft: of a reduced test, or of a file that carries the mark of one."""
+    from toolkit.calibration.records.use import DRAFT_MARK
+    from toolkit.errors import OutputError
+    from toolkit.inputs import TYDEX_FILE, read_input
+
+    draft = use is not None and use.draft
+    if kinds[0] == "tydex":
+        draft = source.is_file() and DRAFT_MARK.encode() in read_input(source, TYDEX_FILE)
+    if draft and kinds[1] == "csv":
+        raise OutputError(
+            "a table has no place for the mark of a draft", where=target, got=f"{source.name}, a draft",
+            expected="a format that carries the mark, such as .tdx",
+            next_step="convert to .tdx, or use a record that is in force", rule="draft-unmarked",
+        )  # fmt: skip
+
+
+def _tir(source: Path) -> tuple[str, tuple[Finding, ...]]:
+    from toolkit.tires.tir import read_tir
+    from toolkit.tires.tir_write import file_text, in_si
+
+    file = read_tir(source)
+    _ = file.version  # a kind that cannot be evaluated is not passed on
+    converted, findings = in_si(file)
+    return file_text(converted), findings
+
+
+def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Finding, ...], tuple[str, ...]]:
+    # Columns in their own units, the axes that they are in, what stays out, and the marks of records.
+    from toolkit.findings import Finding
+    from toolkit.units import from_si, unit
+
+    if kind == "tydex":
+        from toolkit.tires.tydex import read_tydex
+
+        file = read_tydex(source)
+        columns = {
+            channel.symbol: (channel.unit, channel.values)
+            for channel in file.channels
+            if channel.symbol is not None
+        }
+        out = [channel.name for channel in file.channels if channel.symbol is None] + [
+            name for name in file.other if name != "RELEASE"
+        ]
+        note = Finding(
+            rule="not-converted", where=str(source), message=f"a table has no place for {', '.join(out)}"
+        )
+        return columns, "ISO-W", (*file.findings, *([note] if out else [])), _marks(source)
+    from toolkit.tires.table import read_table
+
+    table = read_table(source, axes=axes, required=("FZ",), measured=False)
+    units = [unit(cell.partition("[")[2].partition("]")[0]).text for cell in table.header]
+    columns = {
+        symbol: (name, from_si(values, name))
+        for name, (symbol, values) in zip(units, table.columns, strict=True)
+    }
+    return columns, table.axes, table.mark_findings, table.marks
+
+
+def _marks(tydex: Path) -> tuple[str, ...]:
+    """Return the marks of records among the comments of a TYDEX file."""
+    from toolkit.calibration.records.use import SINCE, UNVERIFIED
+    from toolkit.inputs import TYDEX_FILE, read_input
+
+    lines = read_input(tydex, TYDEX_FILE).decode("utf-8", errors="replace").splitlines()
+    return tuple(dict.fromkeys(line.strip() for line in lines if line.startswith((UNVERIFIED, SINCE))))
+
+
+def _of_test(source: Path, resolved: Resolved) -> tuple[Columns, Axes, tuple[Finding, ...]]:
+    import numpy as np
+
+    from toolkit.findings import Finding
+
+    all_conditions = resolved.result.reduced.conditions
+    use = resolved.result.reduced.calibration
+    conditions = [condition for condition in all_conditions if condition.used]
+    reverse = sum(condition.rotation == "reverse" for condition in conditions)
+    columns = {
+        "SA": ("deg", np.degrees([condition.SA for condition in conditions])),
+        "FZ": ("N", np.array([condition.FZ for condition in conditions])),
+        "FY": ("N", np.array([condition.FY for condition in conditions])),
+        "MZ": ("N*m", np.array([condition.MZ for condition in conditions])),
+    }
+    text = "the uncertainties and the provenance of the reduced test"
+    if reverse:
+        text += f", and which {reverse} of {len(conditions)} rows ran in reverse"
+    if len(all_conditions) > len(conditions):
+        text += f", and {len(all_conditions) - len(conditions)} blocks that the reduction does not use"
+    note = Finding(
+        rule="not-converted", where=str(source), message=f"the target has no place for {text}", level="note"
+    )
+    record_findings = [
+        finding for finding in resolved.findings if finding.where == use.id
+    ]  # how its record stands
+    return columns, "SAE", (*record_findings, note)
+
+
+def _written(
+    columns: Columns, read_in: Axes, kind: str, axes: str, source: Path, marks: Sequence[str]
+) -> tuple[str, tuple[Finding, ...]]:
+    import csv
+    import io
+
+    from toolkit.channels import signs
+    from toolkit.findings import Finding
+    from toolkit.tires.table import MARKS
+    from toolkit.tires.tydex import NAMES, tydex_text
+
+    turn = signs(read_in, "ISO-W" if kind == "tydex" else axes)  # type: ignore[arg-type]
+    turned = {symbol: (name, turn.get(symbol, 1) * values) for symbol, (name, values) in columns.items()}
+    if kind == "csv":
+        # Every row says how its record stands: a row that is copied elsewhere says so too.
+        mark = [" - ".join(marks)] if marks else []
+        table = io.StringIO()
+        writer = csv.writer(table, lineterminator="\n")
+        writer.writerow(
+            [f"{symbol} [{name}]" for symbol, (name, _) in turned.items()] + [MARKS for _ in mark]
+        )
+        for row in zip(*(values for _, values in turned.values()), strict=True):
+            writer.writerow([repr(float(value) + 0.0) for value in row] + mark)  # -0 is 0
+        return table.getvalue(), ()
+    out = [symbol for symbol in turned if symbol not in NAMES]
+    text, findings = tydex_text(
+        {symbol: column for symbol, column in turned.items() if symbol in NAMES}, comments=marks
+    )
+    if out:
+        message = f"TYDEX has no channel for {', '.join(out)}"
+        findings = (*findings, Finding(rule="not-converted", where=str(source), message=message))
+    return text, findings

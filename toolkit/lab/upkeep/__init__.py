@@ -1,0 +1,1 @@
+"""Upkeep of an installation and of a home: what is lacking, what is of an older version, its migration."""
