@@ -82,12 +82,12 @@ __all__ = [
 _PUBLIC = {
     "errors": "ToolkitError",
     "estimate": "Estimate",
-    "lab.archive": "Audit audit_archive",
-    "lab.cases": "Diagnosis Simulation diagnose simulate",
+    "lab.archives.archive": "Audit audit_archive",
+    "lab.studies.cases": "Diagnosis Simulation diagnose simulate",
     "lab.laboratory": "Laboratory example open_laboratory",
-    "lab.record": "Loads Record",
-    "lab.test": "ProcessedTest Recording Report Test read_recording read_test write_report",
-    "lab.tires": "Tire TireFit fit_tire read_tire",
+    "lab.records.record": "Loads Record",
+    "lab.tire_tests.test": "ProcessedTest Recording Report Test read_recording read_test write_report",
+    "lab.tire_tests.tires": "Tire TireFit fit_tire read_tire",
     "machine": "Machine load_machine",
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names.split()}

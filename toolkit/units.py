@@ -305,6 +305,34 @@ def unit_examples(text: str) -> tuple[str, ...]:
     return tuple(name for name, parts in _EXACT.items() if parts[3] == dimension)
 
 
+# Units that laboratories read for each other: a number in one, taken for the other, is off by their ratio.
+_TAKEN_FOR = {
+    "force": ("N", "lbf", "kgf", "kN"),
+    "moment": ("N*m", "lbf*ft", "lbf*in", "kgf*m", "kN*m", "N*mm"),
+    "bridge_ratio": ("mV/V", "µV/V", "V/V"),
+}
+_SAME_RATIO = 0.01
+
+
+def ratio_of_units(ratio: float, text: str) -> str | None:
+    """Return which units, one taken for another, make numbers too large by a ratio; None where none do.
+
+    ``text`` is the unit that the numbers are stated in: a unit taken for it is named first.
+
+    >>> ratio_of_units(0.2249, "N"), ratio_of_units(4.45, "N"), ratio_of_units(1.3, "N")
+    ('lbf against N', 'N against lbf', None)
+    """
+    names = _TAKEN_FOR.get(unit(text).dimension, ())
+    if not ratio > 0:
+        return None
+    pairs = [(right, wrong) for right in names for wrong in names if right != wrong]
+    pairs.sort(key=lambda pair: _canonical(text) != pair[1])
+    for right, wrong in pairs:
+        if abs(ratio * unit(right).factor / unit(wrong).factor - 1) < _SAME_RATIO:
+            return f"{right} against {wrong}"
+    return None
+
+
 _BESIDE = {"N": "lbf", "lbf": "N", "N*m": "lbf*ft", "lbf*ft": "N*m"}
 
 

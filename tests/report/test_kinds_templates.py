@@ -79,13 +79,13 @@ def of_a_test(name: str, **changes: object) -> ReportContent:
 
 
 @pytest.fixture(scope="session")
-def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Delivered]:
-    """Return a document of every packaged template, all of them converted in one call of LibreOffice."""
-    work = tmp_path_factory.mktemp("printed")
+def contents(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ReportContent]:
+    """Return a content for every packaged template."""
+    work = tmp_path_factory.mktemp("contents")
     registry = Registry(FOLDER.parent / "calibrations")
     audited = audit_archive(EXAMPLES / "fig4_4", registry, known_at=DAY)
     recordings = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=800.0) for i in range(2)}
-    contents = {
+    return {
         "org": of_a_test("org"),
         "summary": of_a_test("summary", simulated=True, unverified=True),
         "pruefbericht": of_a_test("pruefbericht"),
@@ -103,6 +103,14 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Delivered]:
             issued=DAY,
         ),
     }
+
+
+@pytest.fixture(scope="session")
+def printed(
+    contents: dict[str, ReportContent], tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Delivered]:
+    """Return a document of every packaged template, all of them converted in one call of LibreOffice."""
+    work = tmp_path_factory.mktemp("printed")
     jobs = [
         Job(template=read_template(FOLDER / f"{name}.docx"), content=content, out=work / "out", name=name)
         for name, content in contents.items()
@@ -115,6 +123,13 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Delivered]:
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.docx")), ids=lambda path: path.stem)
 def test_each_is_clean(path: Path) -> None:
     assert check_template(read_template(path), read_style(style_file(path))) == ()
+
+
+def test_a_figure_is_a_chart_where_its_axes_have_numbers(contents: dict[str, ReportContent]) -> None:
+    for content in contents.values():
+        for name, plot in content.plots.items():
+            numeric = not plot.names and all(curve.style != "bars" for curve in plot.curves)
+            assert (name in content.vocabulary.charts) is numeric, name
 
 
 @office_needed
@@ -361,3 +376,14 @@ def test_any_result_can_be_a_condition(tmp_path: Path) -> None:
         assert made.holds(name) is held, name
         assert made.vocabulary.knows_condition(name)
     assert not made.vocabulary.knows_condition("figure.rain")
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.docx")), ids=lambda path: path.name)
+def test_every_column_of_a_table_has_a_heading(path: Path) -> None:
+    w = "{http://schemas.openxmlformats.org/wordprocessingml/2006/main}"
+    with zipfile.ZipFile(path) as package:
+        document = etree.fromstring(package.read("word/document.xml"))
+    for header in document.iter(f"{w}tblHeader"):
+        row = header.getparent().getparent()
+        cells = ["".join(text.text or "" for text in cell.iter(f"{w}t")) for cell in row.iter(f"{w}tc")]
+        assert all(cells[:-1]), cells  # a mark behind the last column needs none

@@ -320,12 +320,15 @@ def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:
     findings = []
     p = measurand.precision
     tests = () if p is None else (
-        ("Cochran", p.cochran_p, p.cochran_laboratory, "scatters more than the others"),
-        ("Grubbs", p.grubbs_p, p.grubbs_laboratory, "lies apart from the others"),
+        ("Cochran", p.cochran_p, p.cochran_laboratory),
+        ("Grubbs", p.grubbs_p, p.grubbs_laboratory),
     )  # fmt: skip
-    for test, chance, laboratory, deviation in tests:
+    for test, chance, laboratory in tests:
         if chance is not None and chance < OUTLIER:
-            message = f"{laboratory} {deviation} ({test}, p = {chance:.2g}): s_r and s_R are with it"
+            deviation = " scatters more than" if test == "Cochran" else " lies apart from"
+            message = (
+                f"{laboratory}{deviation} the others ({test}, p = {chance:.2g}): s_r and s_R are with it"
+            )
             findings.append(Finding(rule="laboratory-outlier", where=measurand.name, message=message))
     if reference is None and len(measurand.scores) < FEW:
         message = (

@@ -5,6 +5,6 @@ its models, fills a template, hands over files, watches a folder, repairs an arc
 hold what a use case says: the JSON of the contract, and the text for people. Nothing here parses a command
 line or prints.
 
-The front door, `toolkit.__all__`, is `laboratory`, `record`, `test`, `tires`, `cases` and `archive`; what
-they return are `faces`.
+Each kind of work has its room. The front door, `toolkit.__all__`, is `laboratory`, `records.record`,
+`tire_tests.test`, `tire_tests.tires`, `studies.cases` and `archives.archive`; what they return are `faces`.
 """

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from toolkit.trust.signing import Travel
 
 TEMPLATES = "report_templates"
+PLAN = "plan.json"
 _PACKAGE = real_path(Path(__file__)).parents[1]
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import RenderError, ToolkitError
+from toolkit.inputs import PDF_FILE, read_input
 from toolkit.publication import publication
 from toolkit.recording.marks import refuse_original
 from toolkit.report.content import Plot, ReportContent
@@ -24,6 +25,7 @@ from toolkit.report.word.fill import fill, needed_figures
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
 from toolkit.report.word.package import Template
+from toolkit.report.word.spoken import with_alternatives
 from toolkit.report.word.toc_pages import Printed, print_copies
 from toolkit.report.word.verify import Check, verify_docx, verify_pdf
 
@@ -277,6 +279,8 @@ class _Run:
         self.filled = replace(self.filled, docx=copy.docx)
         docx.write_bytes(copy.docx)
         shutil.move(copy.pdf, pdf)
+        if self.filled.charts:
+            pdf.write_bytes(with_alternatives(read_input(pdf, PDF_FILE), self.filled.charts))
         checks, pages = verify_pdf(pdf, self.filled)
         self.checks += checks
         _demand(self.checks)

@@ -93,9 +93,13 @@ class DeclaredTable(Declaration[Source]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeclaredFigures(Declaration[Source]):
-    """Figures that one function draws, name to description; those without data it leaves out."""
+    """Figures that one function draws, name to description; those without data it leaves out.
+
+    ``charts``: they have numbers on both axes, and can stand as charts of Word's own.
+    """
 
     figures: Mapping[str, str]
+    charts: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -216,12 +220,15 @@ class Document(Generic[Source]):
         return declare
 
     def figures(
-        self, figures: Mapping[str, str]
+        self, figures: Mapping[str, str], *, charts: bool = True
     ) -> Callable[[Callable[[Source, Style], Iterable[Plot | None]]], DeclaredFigures[Source]]:
-        """Declare figures, name to description, above the function that returns those that there are."""
+        """Declare figures, name to description, above the function that returns those that there are.
+
+        ``charts`` is false where an axis has names in place of numbers.
+        """
 
         def declare(build: Callable[[Source, Style], Iterable[Plot | None]]) -> DeclaredFigures[Source]:
-            return DeclaredFigures(figures=figures, build=build)
+            return DeclaredFigures(figures=figures, charts=charts, build=build)
 
         return declare
 
@@ -274,6 +281,12 @@ class Document(Generic[Source]):
             marks={declared.name: declared.places for declared in self._all(DeclaredMark)},
             open_values=open_values.pattern if open_values else None,
             foreign=self.foreign,
+            charts=frozenset(
+                name
+                for declared in self._all(DeclaredFigures)
+                if declared.charts
+                for name in declared.figures
+            ),
         )
 
     def plots(self, source: Source, style: Style) -> dict[str, Plot]:

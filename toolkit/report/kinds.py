@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.report.content import ReportContent, Value
 from toolkit.report.style import Style
+from toolkit.report.tags import DRAWN
 from toolkit.report.vocabulary import Entry, TableEntry, Vocabulary
 from toolkit.report.word.check import LintFinding, check_template
 
@@ -55,7 +56,7 @@ def _tag(entry: Entry, content: ReportContent | None, style: Style, vocabulary: 
         available = not value.missing
         shown = value.text(None, content.style) if available else None
         unit = value.unit or unit
-    elif content is not None and entry.kind == "figure":
+    elif content is not None and entry.kind in DRAWN:
         available = name in content.plots
         shown = content.plots[name].alt if available else None
     elif content is not None and entry.kind == "table":
@@ -87,9 +88,10 @@ def _chapter(vocabulary: Vocabulary) -> Iterator[str]:
     for entry in vocabulary.values:
         yield _row(f"`tk:{entry.path}`", entry.kind, entry.unit or "", entry.description)
     yield from ("", "### Figures", "", "Each has its caption as `tk:caption.<name>`.", "")
-    yield from ("| tag | figure |", "|---|---|")
+    yield from ("| tag | as a chart of Word's own | figure |", "|---|---|---|")
     for name, description in vocabulary.figures.items():
-        yield _row(f"`tk:figure.{name}`", description)
+        chart = f"`tk:chart.{name}`" if name in vocabulary.charts else ""
+        yield _row(f"`tk:figure.{name}`", chart, description)
     yield from ("", "### Tables", "")
     for name, table in vocabulary.tables.items():
         yield from _table(name, table)

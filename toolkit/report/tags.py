@@ -1,7 +1,7 @@
 """Tags: ``tk:<path>`` with an optional ``|<format>``, and the formats that they may have.
 
-The kinds are ``text number date figure table if row``. Values have a default format each; a number takes one
-Python format spec after the bar, a figure ``width=120mm``.
+The kinds are ``text number date figure chart table if row``. Values have a default format each; a number
+takes one Python format spec after the bar, a figure ``width=120mm``.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import re
 from dataclasses import dataclass
 
 from toolkit.errors import TemplateError
+
+DRAWN = ("figure", "chart")  # the families of a figure: as a picture, and as a chart of Word's own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,9 +23,9 @@ class Tag:
 
     @property
     def family(self) -> str:
-        """``figure``, ``table``, ``if``, ``row`` or ``value``."""
+        """``figure``, ``chart``, ``table``, ``if``, ``row`` or ``value``."""
         head = self.path.partition(".")[0]
-        return head if head in ("figure", "table", "if", "row") else "value"
+        return head if head in (*DRAWN, "table", "if", "row") else "value"
 
     @property
     def name(self) -> str:
@@ -67,7 +69,7 @@ def format_problem(kind: str, spec: str | None) -> str | None:
         return None
     if kind == "number":
         return None if spec and _NUMBER_SPEC.fullmatch(spec) else "not a Python format spec of a number"
-    if kind == "figure":
+    if kind in DRAWN:
         return None if _WIDTH.fullmatch(spec) else "a figure takes width=NUMBERmm (or cm, in, pt)"
     return f"a {kind} takes no format"
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["text", "number", "date", "figure", "table", "if", "row"]
+Kind = Literal["text", "number", "date", "figure", "chart", "table", "if", "row"]
 
 # What an organisation chooses the unit of, and the unit where it does not.
 UNITS = {"force": "N", "moment": "N*m", "force/angle": "N/deg", "moment/angle": "N*m/deg"}
@@ -108,6 +108,7 @@ class Vocabulary:
     name : ``report``, ``certificate`` ...
     values : every value, in the order of the manual
     figures : name to description
+    charts : names of the figures that can stand as a chart of Word's own, numbers on both axes
     tables : name to description and columns
     conditions : names that ``tk:if.`` may have beside those of figures, tables and values
     required : tags that every template of the kind must hold
@@ -125,6 +126,7 @@ class Vocabulary:
     marks: Mapping[str, frozenset[str]]
     open_values: re.Pattern[str] | None = None
     foreign: tuple[str, ...] = ()
+    charts: frozenset[str] = frozenset()
 
     @property
     def asked(self) -> dict[str, str]:
@@ -149,6 +151,11 @@ class Vocabulary:
             *(_entry(f"caption.{n}", "text", f"caption of the figure: {d}") for n, d in self.figures.items()),
             *(_entry(f"figure.{name}", "figure", text) for name, text in self.figures.items()),
             *(
+                _entry(f"chart.{name}", "chart", f"{text}; as a chart that Word can edit")
+                for name, text in self.figures.items()
+                if name in self.charts
+            ),
+            *(
                 Entry(path=f"table.{n}", kind="table", description=t.description, columns=t.columns)
                 for n, t in self.tables.items()
             ),
@@ -162,6 +169,10 @@ class Vocabulary:
         if name != path and name in self.figures:
             return _entry(path, "text", f"caption of the figure: {self.figures[name]}")
         return next((entry for entry in self.values if entry.path == path), None)
+
+    def entry(self, path: str) -> Entry | None:
+        """Return the entry of a path of any family."""
+        return next((entry for entry in self.entries if entry.path == path), None)
 
     def knows(self, path: str) -> bool:
         """Tell whether a value of that path can exist in some content."""

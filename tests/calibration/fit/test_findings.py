@@ -13,8 +13,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from tests.calibration.calibration_factory import hub_data
+from tests.calibration.calibration_factory import SENSITIVITY, ZERO, hub_data
 from toolkit.calibration.fit.findings import session_findings
+from toolkit.calibration.fit.printed_digits import copies
 from toolkit.calibration.fit.recommend import holm
 from toolkit.calibration.fit.regression import fit_terms
 from toolkit.calibration.fit.robust import robust_weights
@@ -171,3 +172,129 @@ def test_exact_data_are_not_judged() -> None:
     x = np.arange(30.0)
     fit = fit_terms(terms=TERMS, columns={"x": x}, load=2 * x + 1)
     assert robust_weights(fit, columns={"x": x}, load=2 * x + 1) is None
+
+
+@pytest.mark.parametrize("digits", [4, 5, 6])
+def test_what_printing_rounded_away_is_no_scatter(make_session: Make, digits: int) -> None:
+    # Rounding grows with the decade of a value: it looks like a curve, like outliers, like unequal weights.
+    values = np.array([[float(f"{one:.{digits}g}") for one in row] for row in hub_data(80, 3, noise=0.0)])
+    fit = fitted(make_session(values, digits=12))
+    assert all(load.exact for load in fit.loads)
+    advice = {one.rule for one in session_findings(fit)} & {
+        "outlier",
+        "robust",
+        "model",
+        "method",
+        "lack-of-fit",
+    }
+    assert not advice
+    values[9, 3] += 2.0
+    fit = fitted(make_session(values, digits=12))
+    assert not fit.loads[0].exact
+    assert told(fit)["outlier"].where == "FY, row 10"
+
+
+def test_an_outlier_is_told_by_the_distance_that_names_it(make_session: Make) -> None:
+    values = in_runs(60, 3, 8)
+    values[:, 3] += np.repeat([-3.0, 0.0, 3.0], 20)  # zeros of the runs, far beyond their scatter
+    values[33, 3] += 0.6
+    finding = told(session_in_runs(make_session, values))["outlier"]
+    assert finding.where == "FY, row 34"
+    deviations = re.search(r"within its run, ([0-9.]+) standard deviations", finding.message)
+    assert deviations is not None
+    assert float(deviations[1]) > 4
+
+
+def test_readings_of_one_loading_are_no_repeats_of_it(make_session: Make) -> None:
+    # What is applied scatters from loading to loading, and each is read three times.
+    named = 0
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        steps = np.concatenate([np.linspace(-1, 1, 9), np.linspace(1, -1, 9)])
+        loads = np.zeros((54, 3))
+        for at in range(3):
+            loads[18 * at : 18 * at + 18, at] = steps * [500.0, 100.0, 150.0][at]
+        applied = loads * (1 + 2e-3 * rng.normal(size=loads.shape)) * (loads != 0)
+        values = np.repeat(hub_rows(applied + rng.normal(0, 0.1, loads.shape), applied), 3, axis=0)
+        values[:, :3] += rng.normal(0, 1e-6, (162, 3))
+        session = read_session(make_session(values))
+        table = dataclasses.replace(
+            session.table, up=np.tile(np.repeat([True, False], 27), 3), run=np.ones(162)
+        )
+        fit = fit_session(dataclasses.replace(session, table=table))
+        named += "lack-of-fit" in told(fit)
+    assert named <= 1
+
+
+def hub_rows(loads: NDArray[np.float64], applied: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.column_stack([loads @ SENSITIVITY.T + ZERO, applied])
+
+
+@pytest.mark.parametrize("digits", [6, 5])
+def test_check_loads_that_were_copied_in_fewer_digits_check_nothing(make_session: Make, digits: int) -> None:
+    values = hub_data(60, 1)
+    copied = np.array([[float(f"{one:.{digits}g}") for one in row] for row in values[[3, 17, 40, 41]]])
+    check = np.vstack([hub_data(9, 2), copied])
+    found = [
+        one
+        for one in session_findings(fitted(make_session(values, check_rows=check)))
+        if one.rule == "check-not-apart"
+    ]
+    assert [one.where for one in found] == [f"check row {row}" for row in (10, 11, 12, 13)]
+    assert [int(one.message.split()[2]) for one in found] == [4, 18, 41, 42]
+
+
+def test_check_loads_of_the_same_weights_are_no_copies() -> None:
+    # One cell, the weights of the fit, an indicator of five digits: some readings agree by chance.
+    told_of = 0
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        load = np.tile(np.linspace(0, 20, 6), 6)
+        rows = np.column_stack([np.round(load / 10 + rng.normal(0, 4e-4, 36), 4), load])
+        check = np.column_stack([np.round(load[:6] / 10 + rng.normal(0, 4e-4, 6), 4), load[:6]])
+        repeated = {tuple(row) for row in rows.tolist()}
+        new = [at for at, row in enumerate(check.tolist()) if tuple(row) not in repeated]
+        told_of += bool(set(copies(check, rows, [4e-4, 0.0])) & set(new))
+    assert told_of <= binom.ppf(0.999, 200, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "column", "units"),
+    [
+        (1 / 4.4482216, 3, "lbf against N"),
+        (4.4482216, 3, "N against lbf"),
+        (1.3558179, 4, "N*m against lbf*ft"),
+    ],
+)
+def test_a_run_in_another_unit_is_named_with_its_units(
+    make_session: Make, ratio: float, column: int, units: str
+) -> None:
+    values = in_runs(81, 3, 5)
+    values[27:54, column] *= ratio
+    found = session_findings(session_in_runs(make_session, values))
+    (finding,) = [one for one in found if one.rule == "run-scale"]
+    assert finding.message.startswith(
+        f"run 2 (rows 28 to 54): its loads are {ratio:.4g} times what most other"
+    )
+    assert f"the ratio of {units}" in finding.message
+    # Advice follows the runs that agree.
+    assert not {one.rule for one in found} & {"model", "lack-of-fit", "method"}
+
+
+def test_indications_of_a_run_in_another_unit_are_named_too(make_session: Make) -> None:
+    values = in_runs(80, 2, 5)
+    values[:, :3] -= ZERO
+    values[40:, :3] *= 1000
+    finding = told(session_in_runs(make_session, values))["run-scale"]
+    assert "run 2 (rows 41 to 80): its loads are 0.001 times what the other runs tell" in finding.message
+
+
+def test_runs_that_load_one_axis_each_tell_no_scale(make_session: Make) -> None:
+    rng = np.random.default_rng(4)
+    loads = np.zeros((60, 3))
+    for at, largest in enumerate((500.0, 100.0, 150.0)):
+        loads[20 * at : 20 * at + 20, at] = np.linspace(-largest, largest, 20)
+    values = np.column_stack([hub_rows(loads, loads), np.repeat([1.0, 2.0, 3.0], 20)])
+    values[:, :3] += rng.normal(0, 2e-4, (60, 3))
+    values[20:40, 3] += 3.0
+    assert "run-scale" not in told(session_in_runs(make_session, values))

@@ -86,6 +86,14 @@ def test_a_decision_that_cannot_be_made(
     assert registry.instruments() == ("hub",)
 
 
+def test_an_id_that_never_was_is_no_lost_file(run: Run) -> None:
+    for words in (("approve", "hub-r9", *FROM), ("diff", "hub-r1", "hub-r9"), ("show", "other-r1")):
+        _, answer = run(*words)
+        assert "backup" not in answer["next_step"]
+        assert "toolkit calibration list" in answer["next_step"]
+    assert "hub-r1" in run("approve", "hub-r9", *FROM)[1]["expected"]
+
+
 def test_a_second_approval_moves_the_date_back_and_never_forward(run: Run, registry: Registry) -> None:
     assert run("approve", "hub-r1", *FROM)[0] == 0
     again = ("approve", "hub-r1", "--checked-by", "B", "--in-force-from")

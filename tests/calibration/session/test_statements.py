@@ -10,8 +10,9 @@ import pytest
 from tests.calibration.calibration_factory import hub_data
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.session.read import read_session
 from toolkit.calibration.session.statements import statements_of
-from toolkit.errors import ToolkitError
+from toolkit.errors import ConfigError, SessionError, ToolkitError
 
 Make = Callable[..., Path]
 UNCERTAINTY = "[reference.uncertainty]\nFY = {{ {} }}\n"
@@ -138,3 +139,17 @@ def test_a_certificates_number_needs_no_quotes(tmp_path: Path, make_session: Mak
     made = calibrate(make_session(tail=tail), Registry(tmp_path / "cal"))
     told = statements_of(made.record).reference
     assert (told.standard, told.certificate) == ("7", "2025118")
+
+
+def test_rows_are_weighed_by_their_own_uncertainty_alone(make_session: Make) -> None:
+    tail = '\n[reference.uncertainty]\nFY = { U = 0.1, k = 2, unit = "%" }\n'
+    with pytest.raises(SessionError, match="u_FY, u_MZ, u_MX are not in the data") as caught:
+        read_session(make_session(method='"wls"', tail=tail))
+    assert "[reference.uncertainty]" in str(caught.value)
+    assert 'method = "ols"' in str(caught.value)
+
+
+def test_an_instrument_that_no_file_can_be_named_after_is_refused(make_session: Make) -> None:
+    assert read_session(make_session(instrument=f'"{"a" * 200}"')).instrument == "a" * 200
+    with pytest.raises(ConfigError, match="200 at most"):
+        read_session(make_session(instrument=f'"{"a" * 201}"'))

@@ -42,7 +42,7 @@ def test_evidence_has_no_steps() -> None:
 
 
 def test_what_a_release_shipped_is_shipped_today_too_or_has_a_step() -> None:
-    table = Path(str(packaged_home())) / "toolkit" / "lab" / "shipped_templates.toml"
+    table = Path(str(packaged_home())) / "toolkit" / "lab" / "upkeep" / "shipped_templates.toml"
     releases = tomllib.loads(table.read_text())
     today = {path.name for path in (packaged_home() / TEMPLATES).iterdir()}
     assert {name for files in releases.values() for name in files} <= today

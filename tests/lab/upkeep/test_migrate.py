@@ -14,7 +14,7 @@ from toolkit.files import sha256_file
 from toolkit.lab.home import TEMPLATES, make_home
 from toolkit.lab.upkeep.migrate import migrate, undo
 
-RELEASED = Path(__file__).parents[1] / "released" / "0.1.0.zip"
+RELEASED = Path(__file__).parents[2] / "released" / "0.1.0.zip"
 
 
 @pytest.fixture

@@ -253,6 +253,16 @@ def test_pictures_take_the_width_asked_or_of_their_place(tmp_path: Path) -> None
     column = section.page_width - section.left_margin - section.right_margin
     assert extents(result)[1] == pytest.approx(column / 36000, abs=0.1)
     assert "see  here" in texts(result.docx)
+    # No wider than the page, whatever is asked.
+    assert extents(filled(tmp_path, p("{{tk:figure.gough|width=400mm}}"))) == [
+        pytest.approx(column / 36000, abs=0.1)
+    ]
+    # A cell of no stated width has its share of the page, and within a cell of the cell.
+    shared = filled(
+        tmp_path, tbl(["a", p("{{tk:figure.gough}}")], ["b", tbl(["c", p("{{tk:figure.prat}}")])])
+    )
+    half = column / 36000 / 2 - 2 * 1.905
+    assert extents(shared) == [pytest.approx(half, abs=0.1), pytest.approx(half / 2 - 2 * 1.905, abs=0.1)]
     alts = [e.get("descr") for e in root(result).iter(f"{{{NS['wp']}}}docPr")]
     assert alts == [content().plots[name].alt for name in ("gough", "crat", "prat")]
     assert {tag for tag, _ in result.figures} == {"tk:figure.gough", "tk:figure.crat", "tk:figure.prat"}

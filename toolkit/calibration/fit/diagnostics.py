@@ -33,6 +33,7 @@ WIDEST = 5 * GAP
 class Diagnostics:
     """Row by row: studentised residuals (internal, external) and Cook's distance, each (rows,).
 
+    ``apart`` (rows,) is the external one free of what runs differ by, which ``outliers`` are judged by.
     ``press`` is the root of the mean squared leave-one-out residual, ``reversibility`` the mean residual
     going up minus that going down, both in the load's unit. ``lack_of_fit`` is (F, probability) from
     replicated rows, ``heteroscedasticity`` the Breusch-Pagan probability; None where not determined.
@@ -41,6 +42,7 @@ class Diagnostics:
 
     internal: NDArray[np.float64]
     external: NDArray[np.float64]
+    apart: NDArray[np.float64]
     cook: NDArray[np.float64]
     press: float
     outliers: tuple[int, ...]
@@ -87,6 +89,7 @@ def diagnose(
     return Diagnostics(
         internal=internal,
         external=external,
+        apart=external,
         cook=internal**2 * (h / (p * complement)),
         press=float(np.sqrt(inner(deleted, deleted) / n)),
         outliers=() if quiet or dof < 2 else _outliers(external, dof - 1),
@@ -221,22 +224,45 @@ def load_levels(loads: NDArray[np.float64]) -> NDArray[np.int64] | None:
     return None if int(level.max()) + 1 == rows else level
 
 
-def lack_of_fit(fit: TermFit, level: NDArray[np.int64] | None) -> LackOfFit | None:
-    """Return the lack-of-fit test against the pure error of replicated levels; None where not determined.
+def loadings(
+    level: NDArray[np.int64] | None, run: NDArray[np.float64] | None, up: NDArray[np.bool_] | None
+) -> NDArray[np.int64] | None:
+    """Return which loading each row was read at (rows,): rows behind each other of one level, run, direction.
 
-    F = [sum n_g mean_g^2 / (G - p)] / [sum (e - mean_g)^2 / (n - G)] over G levels of the residuals e,
-    weighted where the fit is. Hysteresis between loading and unloading counts as pure error. Source: Draper
-    and Smith, Applied Regression Analysis (1998), 2.1; ASTM E74 annex for calibrations.
+    Readings of a load that stays on are no replicates: they share what that loading made of it.
     """
     if level is None:
         return None
-    n, groups, p = len(fit.residuals), int(level.max()) + 1, len(fit.terms)
+    new = np.diff(level, prepend=-1) != 0
+    for told in (run, up):
+        if told is not None:
+            new[1:] |= told[1:] != told[:-1]
+    return np.asarray(np.cumsum(new) - 1, dtype=np.int64)
+
+
+def lack_of_fit(
+    fit: TermFit, level: NDArray[np.int64] | None, loading: NDArray[np.int64] | None = None
+) -> LackOfFit | None:
+    """Return the lack-of-fit test against the pure error of replicated levels; None where not determined.
+
+    F = [sum n_g mean_g^2 / (G - p)] / [sum (e - mean_g)^2 / (n - G)] over G levels of the residuals e,
+    weighted where the fit is. With ``loading`` (rows,) the residuals are the means of n loadings. Hysteresis
+    between loading and unloading counts as pure error. Source: Draper and Smith, Applied Regression Analysis
+    (1998), 2.1; ASTM E74 annex for calibrations.
+    """
+    if level is None:
+        return None
+    residuals, w = fit.residuals, np.ones(len(level)) if fit.weights is None else fit.weights
+    if loading is not None:
+        total = np.bincount(loading, weights=w)
+        residuals = np.bincount(loading, weights=w * residuals) / total
+        level, w = level[np.flatnonzero(np.diff(loading, prepend=-1))], np.asarray(total, dtype=np.float64)
+    n, groups, p = len(residuals), int(level.max()) + 1, len(fit.terms)
     pure_dof, lack_dof = n - groups, groups - p
     if pure_dof < 1 or lack_dof < 1:
         return None
-    w = np.ones(n) if fit.weights is None else fit.weights
-    mean = np.bincount(level, weights=w * fit.residuals) / np.bincount(level, weights=w)
-    pure = float(np.sum(w * (fit.residuals - mean[level]) ** 2))
+    mean = np.bincount(level, weights=w * residuals) / np.bincount(level, weights=w)
+    pure = float(np.sum(w * (residuals - mean[level]) ** 2))
     if pure <= 0:
         return None
     from scipy.special import fdtrc

@@ -13,9 +13,11 @@ import numpy as np
 from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
 from toolkit.calibration.fit.balance_report import balance_findings
 from toolkit.calibration.fit.basis import build_basis
-from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, replicate_groups
+from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, loadings, replicate_groups
 from toolkit.calibration.fit.forward_search import contradicting, deviating
+from toolkit.calibration.fit.printed_digits import copies
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
+from toolkit.calibration.fit.run_scale import RunScale, run_scales
 from toolkit.calibration.fit.session_fit import fit_session, session_statements
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.session.known_errors import undeclared_standard
@@ -45,8 +47,11 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
     """Return the findings of a session's data and fit."""
     session = fit.session
     wrong = {load.setting.name: contradicting_rows(session, load) for load in fit.loads}
-    sound = _without(fit, {row for rows in wrong.values() for row in rows})
-    findings = [*_data_findings(session), *_model_findings(sound), *balance_findings(fit)]
+    scales = {load.setting.name: run_scales(session, load) for load in fit.loads}
+    doubted = {row for rows in wrong.values() for row in rows}
+    doubted |= {row for runs in scales.values() for run in runs if run.most for row in run.rows}
+    sound = _without(fit, doubted)
+    findings = [*_data_findings(fit), *_model_findings(sound), *balance_findings(fit)]
     if fit.condition_number > COLLINEAR_FINDING:
         message = (
             f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
@@ -57,6 +62,9 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         findings += _method_findings(session, judged)
         findings += _scatter_findings(judged)
     findings += _robust_findings(fit, wrong)
+    findings += [
+        finding for load in fit.loads for finding in _scale_findings(load, scales[load.setting.name])
+    ]
     return tuple(findings)
 
 
@@ -67,8 +75,8 @@ def contradicting_rows(session: Session, load: LoadResult) -> tuple[int, ...]:
     run whose zero wrong ones have moved. And they contradict the mean of the others (`session_rows`): what a
     curve misses smoothly and what loading and unloading do apart are no wrong rows.
     """
-    if np.sqrt(np.mean(load.fit.residuals**2)) <= 1e-9 * load.setting.tolerance:
-        return ()  # rounding
+    if load.exact:
+        return ()
     reference = session.table.column(load.setting.name)
     design = build_basis(load.fit.terms, session.table.columns(session.indications)).design
     if load.fit.weights is not None:
@@ -146,8 +154,23 @@ def _beyond(session: Session, check: Table) -> list[Finding]:
     ]
 
 
-def _data_findings(session: Session) -> list[Finding]:
+def _scatter_of_columns(fit: SessionFit) -> list[float]:
+    """Return each indication's own scatter, at most, by what it moves; then 0 for each reference load."""
+    at = {
+        name: fit.session.terms.index(name) for name in fit.session.indications if name in fit.session.terms
+    }
+    scatter = []
+    for name in fit.session.indications:
+        slopes = [
+            (load.fit.residual_sd, abs(load.fit.coefficients[at[name]])) for load in fit.loads if name in at
+        ]
+        scatter.append(min((sd / slope for sd, slope in slopes if slope > 0), default=0.0))
+    return scatter + [0.0] * len(fit.loads)
+
+
+def _data_findings(fit: SessionFit) -> list[Finding]:
     findings: list[Finding] = []
+    session = fit.session
     table, where = session.table, session.path.name
     if table.rows < FEW_POINTS:
         message = f"{table.rows} points; ASTM E74 asks for at least {FEW_POINTS}"
@@ -169,12 +192,9 @@ def _data_findings(session: Session) -> list[Finding]:
     else:
         check = session.check.matrix(names)
         findings += [*_repeated(check, f"{where}, check loads"), *_beyond(session, session.check)]
-        # Most rows of a long session share no first value with a check load.
-        fitted = {tuple(row) for row in rows[np.isin(rows[:, 0], check[:, 0])].tolist()}
-        for number, row in enumerate(check.tolist(), start=1):
-            if tuple(row) in fitted:
-                message = "a check load equals a row of the fit: it checks nothing"
-                findings.append(Finding(rule="check-not-apart", where=f"check row {number}", message=message))
+        for at, row in copies(check, rows, _scatter_of_columns(fit)).items():
+            message = f"equals row {row + 1} of the fit, digit by digit: it checks nothing"
+            findings.append(Finding(rule="check-not-apart", where=f"check row {at + 1}", message=message))
     if session.reference_due is not None and session.reference_due < session.date:
         message = f"the reference standard was due on {session.reference_due.isoformat()}"
         findings.append(Finding(rule="reference-due", where=where, message=message))
@@ -202,9 +222,13 @@ def _load_findings(load: LoadResult, wrong: tuple[int, ...]) -> list[Finding]:
     findings: list[Finding] = []
     name, unit = load.setting.name, load.setting.unit
     for row in _named(load, wrong):
+        residual = load.fit.residuals[row - 1] - load.of_runs[row - 1]
+        within = (
+            f" within its {load.scatter.factor}" if load.scatter is not None and load.of_runs.any() else ""
+        )
         message = (
-            f"residual {load.fit.residuals[row - 1]:+.4g} {unit}, "
-            f"{abs(load.diagnostics.external[row - 1]):.1f} standard deviations from the other rows"
+            f"residual {residual:+.4g} {unit}{within}, "
+            f"{abs(load.diagnostics.apart[row - 1]):.1f} standard deviations from the other rows"
         )
         findings.append(Finding(rule="outlier", where=f"{name}, row {row}", message=message))
     if load.check_residuals is not None:
@@ -282,11 +306,11 @@ def _model_findings(fit: SessionFit) -> list[Finding]:
 def _misfits(fit: SessionFit) -> list[Finding]:
     table = fit.session.table
     level = load_levels(table.matrix([load.name for load in fit.session.loads]))
+    loading = loadings(level, table.run, table.up)
     findings = []
     for load in fit.loads:
-        lack = lack_of_fit(load.fit, level)
-        # Scatter that is rounding has no pure error to judge by.
-        if lack is None or load.fit.residual_sd <= 1e-9 * load.setting.tolerance:
+        lack = None if load.exact else lack_of_fit(load.fit, level, loading)
+        if lack is None:
             continue
         if lack.probability < _RISK / len(fit.loads):
             message = (
@@ -314,6 +338,22 @@ def _robust_findings(fit: SessionFit, wrong: Mapping[str, tuple[int, ...]]) -> l
                 "from the ordinary residuals. The fit is unchanged: look at these loadings"
             )
             findings.append(Finding(rule="robust", where=name, message=message))
+    return findings
+
+
+def _scale_findings(load: LoadResult, scales: tuple[RunScale, ...]) -> list[Finding]:
+    findings = []
+    for scale in scales:
+        first, last = scale.rows[0], scale.rows[-1]
+        block = last - first + 1 == len(scale.rows)
+        rows = f"{first} to {last}" if block else _some(list(scale.rows))
+        message = (
+            f"{scale.factor} {scale.run:g} (rows {rows}): its loads are {scale.ratio:.4g} times what "
+            f"{'most' if scale.most else 'the'} other {scale.factor}s tell of the same indications"
+        )
+        if scale.units is not None:
+            message += f", the ratio of {scale.units}: was it recorded in another unit?"
+        findings.append(Finding(rule="run-scale", where=load.setting.name, message=message))
     return findings
 
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 RISK = 0.002  # that a row of a clean session is named
 # Equations are drawn until one of sound rows is among them where a third of all rows is wrong, at this risk.
-_WRONG, _MISSED, _MOST_DRAWS = 1 / 3, 1e-4, 1000
-_REFINED = 10
+_WRONG, _MISSED, _MOST_DRAWS = 1 / 3, 1e-4, 2000
+_CONCENTRATED, _REFINED, _RANKED_BY = 400, 10, 2000
 _STEPS = 50
 _SETTLED = 1e-9
 _UNTOLD = 1e-13  # of the squares of all rows
@@ -88,12 +88,43 @@ def _judged(
     return deviation, float(stdtrit(dof, 1 - RISK / (2 * (len(rows) + 1))))
 
 
+def _best(
+    q: NDArray[np.float64], load: NDArray[np.float64], starts: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the best of some equations (equations, terms), as a sample of long sessions ranks them."""
+    if len(load) > _RANKED_BY:
+        sample = np.random.default_rng(1).choice(len(load), _RANKED_BY, replace=False)
+        q, load = q[sample], load[sample]
+    n, p = q.shape
+    half = (n + p + 1) // 2
+    residuals, sums = _trimmed(q, load, starts, half)
+    if len(starts) > _CONCENTRATED:
+        better = np.argpartition(sums, _CONCENTRATED)[:_CONCENTRATED]
+        near = np.zeros((_CONCENTRATED, n))
+        nearest = np.argpartition(residuals[better], half - 1, axis=1)[:, :half]
+        np.put_along_axis(near, nearest, 1.0, axis=1)
+        square = (near @ (q[:, :, None] * q[:, None, :]).reshape(n, -1)).reshape(-1, p, p)
+        product = ((near * load) @ q)[:, :, None]
+        solved = np.linalg.solve(square + _UNTOLD * np.eye(p), product)
+        starts = np.asarray(solved[:, :, 0], dtype=np.float64)
+        sums = _trimmed(q, load, starts, half)[1]
+    return starts[np.argsort(sums, kind="stable")[:_REFINED]]
+
+
+def _trimmed(
+    q: NDArray[np.float64], load: NDArray[np.float64], solutions: NDArray[np.float64], half: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return each equation's absolute residuals (equations, rows), and the squares of its nearest half."""
+    residuals = np.asarray(np.abs(load - solutions @ q.T), dtype=np.float64)
+    return residuals, np.sum(np.square(np.partition(residuals, half - 1, axis=1)[:, :half]), axis=1)
+
+
 def _best_half(q: NDArray[np.float64], load: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the rows of the smallest sum of squares about one equation, just over half of them.
 
     ``q`` (rows, terms) is an orthonormal basis of the design. Equations through as many rows as terms, drawn
-    by a fixed seed, are ranked; the best are refined by fitting the half that is nearest to them, until it
-    stays.
+    by a fixed seed, are ranked; so are the better of them, once fitted to the half that is nearest to each:
+    an equation through as many rows as terms holds their scatter. The best are fitted so until it stays.
     """
     n, p = q.shape
     half = (n + p + 1) // 2
@@ -101,12 +132,10 @@ def _best_half(q: NDArray[np.float64], load: NDArray[np.float64]) -> NDArray[np.
     drawn = np.random.default_rng(0).integers(n, size=(draws, p))
     # Rows that repeat one loading do not determine an equation: the least of their solutions is a poor start.
     starts = (np.linalg.pinv(q[drawn]) @ load[drawn][:, :, None])[:, :, 0]
-    starts = np.vstack([starts, q.T @ load])
-    residuals = np.abs(load - starts @ q.T)
-    sums = np.sum(np.square(np.partition(residuals, half - 1, axis=1)[:, :half]), axis=1)
+    starts = np.asarray(np.vstack([starts, q.T @ load]), dtype=np.float64)
     best, rows = np.inf, np.arange(n)
-    for start in np.argsort(sums, kind="stable")[:_REFINED]:
-        nearest, before = np.argpartition(residuals[start], half - 1)[:half], np.inf
+    for start in _best(q, load, starts):
+        nearest, before = np.argpartition(np.abs(load - q @ start), half - 1)[:half], np.inf
         for _ in range(_STEPS):
             solution = np.linalg.lstsq(q[nearest], load[nearest], rcond=None)[0]
             distance = np.abs(load - q @ solution)

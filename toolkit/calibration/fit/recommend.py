@@ -97,7 +97,7 @@ def holm(probabilities: Sequence[float]) -> tuple[float, ...]:
 def recommend_wider(fit: SessionFit) -> Wider | None:
     """Return the simplest wider model on which no other improves; None where the session's is as good."""
     session, columns = fit.session, fit.session.table.columns(fit.session.indications)
-    loads = [load for load in fit.loads if not _exact(load)]
+    loads = [load for load in fit.loads if not load.exact]
     current = _Model(name="session", lines="", terms=session.terms)
     applied = session.table.matrix([load.name for load in session.loads])
     models = [m for m in _models(session) if _determined(m.terms, columns, applied)]
@@ -141,7 +141,7 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
     """
     session, columns = fit.session, fit.session.table.columns(fit.session.indications)
     higher = [name for name in session.terms if name not in (*session.indications, INTERCEPT)]
-    loads = [load for load in fit.loads if not _exact(load)]
+    loads = [load for load in fit.loads if not load.exact]
     if not higher or not loads:
         return None
     extent = dict(zip(session.terms, np.abs(term_matrix(session.terms, columns)).max(axis=0), strict=True))
@@ -288,11 +288,6 @@ def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[
 
 def _root(load: LoadResult, rows: int) -> NDArray[np.float64]:
     return np.ones(rows) if load.fit.weights is None else np.sqrt(load.fit.weights)
-
-
-def _exact(load: LoadResult) -> bool:
-    # The tolerance is 0.1 % of full scale unless stated: scatter this small is rounding of the arithmetic.
-    return load.fit.residual_sd <= 1e-9 * load.setting.tolerance
 
 
 def _determined(

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.diagnostics import LackOfFit, Reversal, lack_of_fit, load_levels, reversals
+from toolkit.calibration.fit.diagnostics import (
+    LackOfFit,
+    Reversal,
+    lack_of_fit,
+    load_levels,
+    loadings,
+    reversals,
+)
 from toolkit.calibration.fit.robust import robust_weights
 from toolkit.calibration.terms import term_matrix
 
@@ -117,7 +124,8 @@ def report_session(fit: SessionFit) -> tuple[FitReport, ...]:
     """Return the report of every load of a fitted session."""
     table = fit.session.table
     level = load_levels(table.matrix([load.name for load in fit.session.loads]))
-    return tuple(_report(fit, load, level) for load in fit.loads)
+    loading = loadings(level, table.run, table.up)
+    return tuple(_report(fit, load, level, loading) for load in fit.loads)
 
 
 def prediction_half_width(
@@ -161,13 +169,18 @@ def coefficient_rows(fit: TermFit, extent: NDArray[np.float64], full_scale: floa
     )  # fmt: skip
 
 
-def _report(fit: SessionFit, load_result: LoadResult, level: NDArray[np.int64] | None) -> FitReport:
+def _report(
+    fit: SessionFit,
+    load_result: LoadResult,
+    level: NDArray[np.int64] | None,
+    loading: NDArray[np.int64] | None,
+) -> FitReport:
     session, table, solved, tests = fit.session, fit.session.table, load_result.fit, load_result.diagnostics
     load = table.column(load_result.setting.name)
     columns = table.columns(session.indications)
     full = float(np.abs(load).max())
     extent = np.abs(term_matrix(solved.terms, columns)).max(axis=0)
-    noise_free = solved.residual_sd <= 1e-12 * full
+    noise_free = load_result.exact
     total, within, left_out = _sums(solved, load, weighted=session.method == "wls")
     error = solved.standard_errors
     size = np.where(error > 0, error, 1.0)
@@ -196,14 +209,14 @@ def _report(fit: SessionFit, load_result: LoadResult, level: NDArray[np.int64] |
         internal=tests.internal,
         external=tests.external,
         cook=tests.cook,
-        robust_weight=robust_weights(solved, columns=columns, load=load),
+        robust_weight=None if noise_free else robust_weights(solved, columns=columns, load=load),
         outliers=tests.outliers,
         direction=table.direction,
         press=tests.press,
         predicted_r_squared=1 - left_out / total,
         heteroscedasticity=tests.heteroscedasticity,
         normality=None if noise_free else _normality(tests.internal),
-        lack_of_fit=None if noise_free else lack_of_fit(solved, level),
+        lack_of_fit=None if noise_free else lack_of_fit(solved, level, loading),
         levels=int(np.count_nonzero(sizes > 1)),
         replicated_rows=int(sizes[sizes > 1].sum()),
         prediction_half_width=float(

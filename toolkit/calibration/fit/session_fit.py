@@ -14,6 +14,7 @@ from toolkit.calibration.fit.adequacy import check_adequate
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups
 from toolkit.calibration.fit.odr import fit_odr
+from toolkit.calibration.fit.printed_digits import rounding_alone
 from toolkit.calibration.fit.regression import (
     Factor,
     TermFit,
@@ -108,6 +109,7 @@ class LoadResult:
     """One load. ``fit.covariance`` is that of `records.scatter` where the session's runs tell ``scatter``.
 
     ``of_runs`` (rows,) is what of the residuals the runs' zeros and gains make; rows are judged without it.
+    ``exact``: the rows lie on the equation as far as their printed digits tell, so that nothing scatters.
 
     ``llf`` and ``check_residuals`` (fitted - reference, check rows,) in the load's unit.
 
@@ -118,6 +120,7 @@ class LoadResult:
     fit: TermFit
     scatter: RunScatter | None
     of_runs: NDArray[np.float64]
+    exact: bool
     diagnostics: Diagnostics
     llf: float
     check_residuals: NDArray[np.float64] | None
@@ -223,6 +226,7 @@ def _result(
             rows = rows_of(design, load, group)
             of_runs = rows.of_runs(scatter, fit.residuals)
             fit = dataclasses.replace(fit, covariance=rows.covariance(scatter))
+    exact = rounding_alone(fit, table.columns(session.indications), load, setting.tolerance)
     residuals, percent = None, None
     if session.check is not None:
         check = session.check
@@ -234,7 +238,8 @@ def _result(
         fit=fit,
         scatter=scatter,
         of_runs=of_runs,
-        diagnostics=_diagnosed(fit, of_runs, cells=cells, load=load, up=table.up, groups=groups),
+        exact=exact,
+        diagnostics=_diagnosed(fit, of_runs, cells=cells, load=load, up=table.up, groups=groups, exact=exact),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
         check_residuals=residuals,
         check_max_percent_fs=percent,
@@ -258,13 +263,19 @@ def _diagnosed(
     load: NDArray[np.float64],
     up: NDArray[np.bool_] | None,
     groups: NDArray[np.intp],
+    exact: bool,
 ) -> Diagnostics:
     diagnostics = diagnose(fit, cells=cells, load=load, up=up, replicates=groups)
+    if exact:
+        return dataclasses.replace(diagnostics, outliers=(), lack_of_fit=None, heteroscedasticity=None)
     if not of_runs.any():
         return diagnostics
     within = diagnose(within_runs(fit, of_runs), cells=cells, load=load, up=up, replicates=groups)
     return dataclasses.replace(
-        diagnostics, outliers=within.outliers, heteroscedasticity=within.heteroscedasticity
+        diagnostics,
+        apart=within.external,
+        outliers=within.outliers,
+        heteroscedasticity=within.heteroscedasticity,
     )
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar, Literal
 
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, canonical
 from toolkit.calibration.registry.refit import polarity
-from toolkit.calibration.session.settings import INSTRUMENT, wrong
+from toolkit.calibration.session.settings import INSTRUMENT, INSTRUMENT_FORM, wrong
 from toolkit.calibration.session.statement_checks import check_load_unit
 from toolkit.calibration.terms import INTERCEPT, NAME, parse_term
 from toolkit.declared import Day, Entry, Fault, Format, Keyed, Size, Text, UnitName, plain, read_text
@@ -64,7 +64,7 @@ class LegacyFile:
 
     instrument: Annotated[
         str, Text(pattern=INSTRUMENT.pattern),
-        Entry("what was calibrated", example="rig", expected="letters, digits, '-', '_' and '.'"),
+        Entry("what was calibrated", example="rig", expected=INSTRUMENT_FORM),
     ]  # fmt: skip
     date: Annotated[str, Day(), Entry("of the source", example="2021-12-31")]
     entered_by: Annotated[str, Text(strip=True), Entry("who enters it", example="first person")]

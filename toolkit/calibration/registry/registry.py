@@ -330,11 +330,11 @@ def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRec
         data = read_regular(path)
     except OSError as error:
         raise RecordError(
-            f"record {record_id} is missing",
+            f"record {record_id} is missing" if entered else f"the registry has no record {record_id}",
             where=path,
-            got=error.strerror,
-            expected="the record's file" if entered else "a record that the registry has",
-            next_step="restore it from a backup, or see 'toolkit calibration list'",
+            got=error.strerror if entered else record_id,
+            expected="the record's file" if entered else ", ".join(ledger.entered()) or "a record",
+            next_step="restore it from a backup" if entered else "see 'toolkit calibration list'",
             rule="missing",
         ) from error
     record = from_bytes(data, where=path)

@@ -29,7 +29,7 @@ from toolkit.calibration.session.settings import (
     settings_of,
     wrong,
 )
-from toolkit.calibration.session.statement_checks import check_columns, check_statements
+from toolkit.calibration.session.statement_checks import check_columns, check_statements, check_weights
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.declared import Source, refuse
 from toolkit.errors import SessionError
@@ -146,10 +146,12 @@ def read_session(path: Path, *, entered: bool = False, standards: Standards | No
     recorded = read_table(
         data_bytes,
         where=path.parent / str(raw["data"]),
-        required=[*indications, *loads, *(uncertainties if settings.method == "wls" else ())],
+        required=[*indications, *loads],
         optional=uncertainties,
         labels=labels,
     )
+    if settings.method == "wls":
+        check_weights(recorded, loads, path)
     check_columns(recorded, loads, path)
     check_statements(raw, recorded, loads, path)
     bridges = bridges_of(raw.get("cells", {}), indications, where=path)

@@ -26,7 +26,9 @@ _ENCODER = json.JSONEncoder(
 METHODS = ("ols", "wls", "gls", "odr")
 DEFAULT_TOLERANCE = 1e-3
 _MOST_PRELOADS = 99
-INSTRUMENT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*\Z")
+# It is a folder's name and the beginning of files' names, which file systems limit to 255 bytes.
+INSTRUMENT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,199}\Z")
+INSTRUMENT_FORM = "letters, digits, '-', '_' and '.', 200 at most"
 _CHECK_VALUE, _CHECK_TABLE = re.compile(r"(?m)^\s*check\s*="), re.compile(r"(?m)^\s*\[\s*check\s*\]")
 
 
@@ -115,7 +117,7 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
         raise wrong(where, "schema", raw["schema"], "1")
     instrument = _text(raw, "instrument", where)
     if not INSTRUMENT.match(instrument):
-        raise wrong(where, "instrument", instrument, "letters, digits, '-', '_' and '.'")
+        raise wrong(where, "instrument", instrument, INSTRUMENT_FORM)
     indications, loads = _names(raw, "indications", where), _names(raw, "loads", where)
     if set(indications) & set(loads):
         raise wrong(where, "loads", ", ".join(loads), "names that are no indications")

@@ -75,6 +75,27 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
             )  # fmt: skip
 
 
+def check_weights(table: Table, loads: tuple[str, ...], where: object) -> None:
+    """Refuse data that do not weigh their rows: ``wls`` takes a column ``u_<LOAD>`` of each load.
+
+    Raises
+    ------
+    SessionError
+    """
+    lacking = [f"u_{load}" for load in loads if not table.has(f"u_{load}")]
+    if lacking:
+        raise SessionError(
+            f'method = "wls" weighs rows by their own uncertainty, and {", ".join(lacking)} '
+            f"{'is' if len(lacking) == 1 else 'are'} not in the data",
+            where=where,
+            got=", ".join(table.names),
+            expected=f"{lacking[0]} [{table.unit(lacking[0][2:])}], a standard uncertainty of each row",
+            next_step='add it, or take method = "ols": a U of [reference.uncertainty] is an error that all '
+            "rows share, and weighs none; nothing was written",
+            rule="columns",
+        )
+
+
 def _other_unit(where: str, unit: Unit, dimension: str, allowed: str) -> UnitError:
     return UnitError(
         f"unit {unit.text!r} is no unit of {dimension}",

@@ -13,12 +13,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+from toolkit.lab.home import PLAN
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 Kind = Literal["test", "audit", "diagnosis", "case", "plan"]
 
-ANSWER, CASE, PLAN = "diagnosis.json", "case.toml", "plan.json"
+ANSWER, CASE = "diagnosis.json", "case.toml"
 _ELSEWHERE = frozenset(("calibrations", "report_templates", "trust", "jobs", "migrations", "node_modules"))
 
 _WRITTEN = frozenset(("audits", "repaired", "reports", "diagnoses", "models", "plans"))

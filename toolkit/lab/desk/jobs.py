@@ -1,8 +1,8 @@
 """Long work of a home: one command at a time, in a process that outlives the page and the server.
 
 A job is a folder ``jobs/<id>``: `Job` in job.toml, ``log`` with what the command printed, ``progress`` with
-how far it is, and ``cancel`` once somebody asked for its end. Its runner (`toolkit.lab.desk.job_runner`) and its
-command hold the lock of ``jobs/`` as long as they live: a job without an end whose lock is free was
+how far it is, and ``cancel`` once somebody asked for its end. Its runner (`toolkit.lab.desk.job_runner`) and
+its command hold the lock of ``jobs/`` as long as they live: a job without an end whose lock is free was
 interrupted, be it by a power cut.
 """
 

@@ -11,8 +11,8 @@ from typing import Any, Literal, get_args
 
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.inputs import RESULT_FILE, read_input
-from toolkit.lab.desk.holdings import PLAN, holding_id
-from toolkit.lab.home import TEMPLATES
+from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.home import PLAN, TEMPLATES
 
 PLANS = "plans"
 """Folder of the home into which plans of the workbench are written."""

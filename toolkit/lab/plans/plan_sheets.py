@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NotRequired
 
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import DeliveredDocument, Timed
+from toolkit.lab.home import PLAN
 from toolkit.planning.printed_units import title_of
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step
@@ -48,7 +49,6 @@ def write_plan(
     """
     from toolkit.declared import json_value
     from toolkit.lab.answers import delivered_keys
-    from toolkit.lab.desk.holdings import PLAN
     from toolkit.publication import publication
     from toolkit.report.deliver import deliver
     from toolkit.report.plan.content import build_plan_content

@@ -182,7 +182,7 @@ def _virtual(order: ProtocolOrder) -> EarlierTest:
     registry = registry_if_any(order.calibrations, order.home)
     known = registry is not None and (registry.folder / SIMULATED_MACHINE).is_dir()
     calibrations = registry.folder if registry is not None and known else packaged_home() / "calibrations"
-    plan = read_plan(Path(__file__).parents[1] / "examples" / "virtual" / "test_plan.toml")
+    plan = read_plan(Path(__file__).parents[2] / "examples" / "virtual" / "test_plan.toml")
     if order.like is not None:
         plan = _with_tire(plan, order.like)
     tests = []

@@ -1,9 +1,10 @@
 """`toolkit verify`: who issued a document, when, over what, and whether it still holds; offline.
 
-A seal is checked by `toolkit.trust.seal`, the proof of a document's entry by `toolkit.lab.signatures.proofs`. What the
-laboratory's ledger says is asked through a function (`Ledger`), so that a document can be verified where no
-ledger is. A file whose hash a signed entry holds (a Word file, a digital certificate without a seal) is
-proved by it; a PDF without a seal is not: its own bytes stand in no entry.
+A seal is checked by `toolkit.trust.seal`, the proof of a document's entry by
+`toolkit.lab.signatures.proofs`. What the laboratory's ledger says is asked through a function (`Ledger`), so
+that a document can be verified where no ledger is. A file whose hash a signed entry holds (a Word file, a
+digital certificate without a seal) is proved by it; a PDF without a seal is not: its own bytes stand in no
+entry.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def convert(
     Parameters
     ----------
     axes : of a .csv, read or written
-    resolve : reads a reduced test (`lab.resolve`)
+    resolve : reads a reduced test (`lab.tire_tests.resolve`)
     fmi : version of FMI of an .fmu, 2 or 3
 
     Raises

@@ -295,7 +295,8 @@ def next_measurements(source: Told, _style: Style) -> Rows:
 
 
 @DIAGNOSIS.figures(
-    {"diagnosis_errors": "error on held-out rows over the noise, before and after: the chart of ten seconds"}
+    {"diagnosis_errors": "error on held-out rows over the noise, before and after: the chart of ten seconds"},
+    charts=False,
 )
 def errors_chart(source: Told, style: Style) -> Iterator[Plot]:
     """Return the chart, where something was fitted; the document of a case without a search has none."""

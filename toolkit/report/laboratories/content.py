@@ -269,7 +269,8 @@ def outliers(compared: ComparedLaboratories, style: Style) -> Rows:
     | {
         "laboratories_h": "Mandel's h of every laboratory, with its limits",
         "laboratories_k": "Mandel's k of every laboratory, with its limits",
-    }
+    },
+    charts=False,
 )
 def figures(compared: ComparedLaboratories, _style: Style) -> Iterator[Plot]:
     """Return the figures of the first measurands, and of h and k."""

@@ -173,7 +173,8 @@ def models(report: ReportedTest, _style: Style) -> Rows:
     {
         "models_fy": "error of each tire model in lateral force, fitted and with each load left out",
         "models_mz": "error of each tire model in aligning moment, fitted and with each load left out",
-    }
+    },
+    charts=False,
 )
 def error_charts(report: ReportedTest, style: Style) -> Iterable[Plot]:
     """Return the errors of the models in both channels."""

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from toolkit.report.style import Style
-from toolkit.report.tags import format_problem, parse_tag
+from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
 from toolkit.report.word.advice import advice, placeholders
 from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
@@ -27,6 +27,7 @@ from toolkit.report.word.scan import (
     row_in,
     scan,
     table_of,
+    unbraced,
 )
 from toolkit.report.word.xml import (
     SDT_CONTENT,
@@ -75,7 +76,7 @@ def check_stories(
     findings = [
         *_tags(sites, style, words),
         *_tables(sites, words),
-        *_broken(parts),
+        *_broken(parts, words),
         *surroundings(package, parts, style),
         *placeholders(parts, style),
     ]
@@ -141,7 +142,7 @@ def _tags(sites: list[Site], style: Style, words: Vocabulary) -> Iterator[LintFi
     counted: dict[str, int] = {}
     for site in sites:
         yield from _one(site, words)
-        if site.tag.family in ("figure", "table") and site.story.body and not site.fallback:
+        if site.tag.family in (*DRAWN, "table") and site.story.body and not site.fallback:
             counted[site.tag.path] = counted.get(site.tag.path, 0) + 1
             if counted[site.tag.path] == 2:
                 yield _at(
@@ -153,10 +154,19 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
     tag, family = site.tag, site.tag.family
     known: dict[str, Mapping[str, object]] = {
         "figure": words.figures,
+        "chart": dict.fromkeys(words.charts),
         "table": words.tables,
     }
     if not tag.path or re.search(r"[\s|{}]", tag.path):
         yield _at(site, "malformed-tag", f"'{tag}' has no path, or white space in it")
+        return
+    if family == "chart" and tag.name in words.figures and tag.name not in words.charts:
+        yield _at(
+            site,
+            "not-as-chart",
+            f"{tag}: an axis of this figure has names in place of numbers, so that it stands as a picture "
+            f"alone: write tk:figure.{tag.name}",
+        )
         return
     asked = family == "if" and not words.knows_condition(tag.name)
     if (
@@ -174,9 +184,9 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
         yield _at(site, "bad-format", f"{tag}: {problem}")
     if family == "if" and site.form == "literal":
         yield _at(site, "wrong-place", f"{tag} must be a content control around what it keeps, not a literal")
-    if family == "figure" and _in_heading(site):
+    if family in DRAWN and _in_heading(site):
         yield _at(site, "wrong-place", f"{tag}: a figure cannot stand in a heading")
-    if family == "figure" and site.story.root.tag in (q("w:footnotes"), q("w:endnotes")):
+    if family in DRAWN and site.story.root.tag in (q("w:footnotes"), q("w:endnotes")):
         # LibreOffice 7.4 loses every picture of a note when it reads a .docx.
         yield _at(site, "wrong-place", f"{tag}: a figure in a note would be missing from the PDF")
     if site.form == "control":
@@ -185,13 +195,13 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
             yield _at(site, "wrong-place", f"{tag}: the control has no content")
         elif family not in ("if", "table") and content.find(W_TR) is not None:
             yield _at(site, "wrong-place", f"{tag}: a value or figure cannot stand around a table row")
-        if family in ("value", "figure", "row"):
+        if family in ("value", "row", *DRAWN):
             yield from _swallowed(site)
         outer = next(
             (
                 s
                 for s in site.element.iterancestors(W_SDT)
-                if (t := control_tag(s)) and t.family in ("value", "figure", "row")
+                if (t := control_tag(s)) and t.family in ("value", "row", *DRAWN)
             ),
             None,
         )
@@ -290,7 +300,7 @@ def _tables(sites: list[Site], words: Vocabulary) -> Iterator[LintFinding]:
             )
         if not rows:
             yield from _untagged(site, table, columns)
-        elif any(o.tag.family == "figure" and row_in(table, o.element) is rows[0] for o in sites):
+        elif any(o.tag.family in DRAWN and row_in(table, o.element) is rows[0] for o in sites):
             yield _at(site, "wrong-place", f"{site.tag}: a figure cannot stand in the prototype row")
     for site in sites:
         if site.tag.family == "row" and id(site) not in inside:
@@ -316,7 +326,7 @@ def _untagged(site: Site, table: Element, columns: list[str]) -> Iterator[LintFi
         )
 
 
-def _broken(parts: list[Story]) -> Iterator[LintFinding]:
+def _broken(parts: list[Story], words: Vocabulary) -> Iterator[LintFinding]:
     for story in parts:
         for paragraph in broken_literals(story):
             yield LintFinding(
@@ -334,6 +344,15 @@ def _broken(parts: list[Story]) -> Iterator[LintFinding]:
                 place=place_of(element, story),
                 message=f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters",
             )
+        for element, path in unbraced(story):
+            if words.entry(path) is not None:
+                yield LintFinding(
+                    rule="malformed-tag",
+                    level="error",
+                    part=story.name,
+                    place=place_of(element, story),
+                    message=f"tk:{path} would be printed as it stands: write {{{{tk:{path}}}}}",
+                )
 
 
 __all__ = ["RULES", "LintFinding", "check_stories", "check_template"]

@@ -53,6 +53,14 @@ def settle(sdt: Element, iso_date: str | None = None) -> None:
             date.set(q("w:fullDate"), f"{iso_date}T00:00:00Z")
 
 
+def hold_anything(sdt: Element) -> None:
+    """Make a control one of rich text: one of a picture or of plain text may not hold a chart."""
+    properties = sdt.find(SDT_PR)
+    for kind in ("w:picture", "w:text"):
+        for element in properties.findall(q(kind)):
+            properties.remove(element)
+
+
 def release(paragraph: Element) -> None:
     """Settle the controls of others around a paragraph's literals: Word would show their own data again."""
     holders = [t for t in visible_texts(paragraph) if "{{" in (t.text or "") or "}}" in (t.text or "")]

@@ -14,8 +14,9 @@ from toolkit.errors import TemplateError
 from toolkit.files import sha256_bytes
 from toolkit.report.content import SIGNATURE, ReportContent, Table
 from toolkit.report.figures import Picture
-from toolkit.report.tags import Tag
+from toolkit.report.tags import DRAWN, Tag, width_emu
 from toolkit.report.word.bulk import Bulk, row_texts
+from toolkit.report.word.chart import Chart
 from toolkit.report.word.check import LintFinding, check_stories
 from toolkit.report.word.closing import close
 from toolkit.report.word.controls import (
@@ -23,6 +24,7 @@ from toolkit.report.word.controls import (
     fill_control,
     fill_literals,
     from_the_right,
+    hold_anything,
     kept_whole,
     release,
     replace_content,
@@ -32,7 +34,7 @@ from toolkit.report.word.filled import Entry, Filled
 from toolkit.report.word.numbering import levelled, number_captions
 from toolkit.report.word.package import Template, open_package, undated
 from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark_pages, set_properties
-from toolkit.report.word.pictures import Ids, free_height, insert_at_mark, picture_run
+from toolkit.report.word.pictures import Ids, chart_run, free_height, insert_at_mark, picture_run
 from toolkit.report.word.rows import fill_table
 from toolkit.report.word.scan import Site, row_in, scan, table_of
 from toolkit.report.word.toc import write_contents
@@ -48,6 +50,7 @@ from toolkit.report.word.xml import (
     stories,
     write_back,
 )
+from toolkit.words.phrasebook import locale_of
 
 _MARK = "\ufdd0"  # a noncharacter: it stands where a literal figure goes, and no value may hold it
 
@@ -115,6 +118,7 @@ class _Log:
     rows_of_the_run: set[int] = field(default_factory=set)
     in_margins: set[str] = field(default_factory=set)
     elsewhere: set[str] = field(default_factory=set)
+    charts: list[Chart] = field(default_factory=list)
 
 
 class _Filler:
@@ -163,7 +167,7 @@ class _Filler:
                 )
                 fill_control(site.element, self._value(site.tag, site), iso_date=iso)
         for site in outside:
-            if site.form == "control" and site.tag.family == "figure":
+            if site.form == "control" and site.tag.family in DRAWN:
                 self._figure_control(site)
         added = self._marks(used)
         for name, text in close(body.find(q("w:body")), self.content, signed=SIGNATURE in used):
@@ -196,6 +200,7 @@ class _Filler:
             perhaps_shown=perhaps,
             of_the_run=frozenset(self.log.of_the_run),
             rows_of_the_run=frozenset(self.log.rows_of_the_run),
+            charts=tuple(self.log.charts),
             in_margins=frozenset(self.log.in_margins - self.log.elsewhere),
         )
 
@@ -216,7 +221,7 @@ class _Filler:
                 value = self.content.values.get(tag.path)
                 if value is None or value.missing:
                     absent[f"tk:{tag.path}"] = f"{site.story.name}, {site.place}"
-            elif tag.family == "figure" and tag.name not in self.content.plots:
+            elif tag.family in DRAWN and tag.name not in self.content.plots:
                 absent[f"tk:{tag.path}"] = f"{site.story.name}, {site.place}"
             elif tag.family == "table" and (problem := _unprintable(self.content.tables.get(tag.name))):
                 absent[f"tk:{tag.path}{problem}"] = f"{site.story.name}, {site.place}"
@@ -292,9 +297,9 @@ class _Filler:
             def resolve(tag: Tag, site: Site = site, figures: list[Tag] = figures) -> str:
                 if tag.family == "table":
                     return ""
-                if tag.family != "figure":
+                if tag.family not in DRAWN:
                     return self._value(tag, site)
-                if tag.name not in self.pictures:
+                if not self._drawable(tag):
                     return self._no_figure(tag, site)
                 figures.append(tag)
                 return _MARK
@@ -307,12 +312,17 @@ class _Filler:
 
     def _figure_control(self, site: Site) -> None:
         free_height(next(site.element.iter(W_P), ancestor(site.element, W_P)))
-        if site.tag.name in self.pictures:
+        if self._drawable(site.tag):
             run = self._picture(site.tag, site)
         else:
             run = new_run(self._no_figure(site.tag, site), None)
         settle(site.element)
+        if site.tag.family == "chart":
+            hold_anything(site.element)
         replace_content(site.element, run)
+
+    def _drawable(self, tag: Tag) -> bool:
+        return tag.name in (self.pictures if tag.family == "figure" else self.content.plots)
 
     def _no_figure(self, tag: Tag, site: Site) -> str:
         self.log.missing.append(f"tk:{tag.path}")
@@ -323,24 +333,26 @@ class _Filler:
         return self.content.style.missing
 
     def _picture(self, tag: Tag, site: Site) -> Element:
-        from toolkit.report.tags import width_emu
-
-        alt = self.content.plots[tag.name].alt
+        plot = self.content.plots[tag.name]
+        width = width_emu(tag.spec)
+        if tag.family == "chart":
+            language = locale_of(self.content.style.language)
+            run, drawn, chart = chart_run(
+                site.story, self.package, site.element, plot, width, self.ids, language
+            )
+            self.log.charts.append(chart)
+        else:
+            drawn = self.pictures[tag.name].png
+            run = picture_run(
+                site.story, self.package, site.element, self.pictures[tag.name], plot.alt, tag.name, width,
+                self.ids,
+            )  # fmt: skip
         if not site.fallback:
-            self.log.figures.append((f"tk:{tag.path}", alt))
+            self.log.figures.append((f"tk:{tag.path}", plot.alt))
             margin = site.story.root.tag in (q("w:hdr"), q("w:ftr"))
             (self.log.in_margins if margin else self.log.elsewhere).add(f"tk:{tag.path}")
-            self.log.pictures.append(f"{tag.name} {sha256_bytes(self.pictures[tag.name].png)}")
-        return picture_run(
-            site.story,
-            self.package,
-            site.element,
-            self.pictures[tag.name],
-            alt,
-            tag.name,
-            width_emu(tag.spec),
-            self.ids,
-        )
+            self.log.pictures.append(f"{tag.name} {sha256_bytes(drawn)}")
+        return run
 
     def _marks(self, used: set[str]) -> tuple[str, ...]:
         """Say what must be said (simulated, unverified, draft) where the template has no place for it."""

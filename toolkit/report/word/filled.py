@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from toolkit.report.word.chart import Chart
 from toolkit.report.word.lint import LintFinding
 from toolkit.report.word.toc import Contents
 from toolkit.report.word.xml import STORIES, W_P, W_SDT, W_TR, Element, ancestor, q
@@ -38,7 +39,7 @@ class Filled:
     page can show, ``perhaps_shown`` those that depend on the number of pages, with their own words;
     ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them;
     ``in_margins`` the figures that stand in headers and footers alone; ``page_mark`` the line that every page
-    carries.
+    carries; ``charts`` those of the figures that are charts of Word's own, in their order.
     """
 
     docx: bytes
@@ -57,6 +58,7 @@ class Filled:
     rows_of_the_run: frozenset[int] = frozenset()
     in_margins: frozenset[str] = frozenset()
     page_mark: str | None = None
+    charts: tuple[Chart, ...] = ()
 
 
 # A Word file as it was written, read back piece by piece: its tables may be of any length.

@@ -11,7 +11,17 @@ from xml.sax.saxutils import quoteattr
 
 from lxml import etree
 
-from toolkit.report.figures import Picture
+from toolkit.report.content import Plot
+from toolkit.report.figures import SIZE_IN, Picture
+from toolkit.report.word.chart import (
+    BOOK_RELATION,
+    BOOK_TYPE,
+    CHART_TYPE,
+    Chart,
+    chart_book,
+    chart_texts,
+    chart_xml,
+)
 from toolkit.report.word.scan import own_rows
 from toolkit.report.word.xml import (
     NS,
@@ -28,7 +38,7 @@ from toolkit.report.word.xml import (
     q,
 )
 
-EMU_TWIP = 635
+EMU_TWIP, EMU_INCH = 635, 914400
 _VML_EMU = {"pt": 12700, "in": 914400, "cm": 360000, "mm": 36000, "px": 9525}
 _CELL_MARGIN = 2 * 108
 _LETTER = (12240, 15840, 1440)
@@ -72,15 +82,48 @@ def picture_run(
 
     image = package.get_or_add_image_part(io.BytesIO(picture.png))
     rel = story.part.relate_to(image, RELATIONSHIP_TYPE.IMAGE)
+    cx, cy = _size(at, story, width, picture.height_px / picture.width_px)
+    named = _named(ids.next_drawing(), name, alt)
+    return _drawing_run(at, _inline(cx, cy, named, _picture_graphic(rel, cx, cy, named)))
+
+
+def chart_run(
+    story: Story, package: Any, at: Element, plot: Plot, width: int | None, ids: Ids, language: str
+) -> tuple[Element, bytes, Chart]:
+    """Return a run with a figure as a chart, as wide as a picture of it; its part, and what it shows."""
+    from docx.opc.constants import RELATIONSHIP_TYPE
+    from docx.opc.packuri import PackURI
+    from docx.opc.part import Part
+
+    identity = ids.next_drawing()
+    width_in, height_in = SIZE_IN
+    cx, cy = _size(at, story, width, height_in / width_in)
+    xml = chart_xml(plot, language, scale=min(1.0, cx / EMU_INCH / width_in))
+    chart = Part(PackURI(f"/word/charts/chart{identity}.xml"), CHART_TYPE, xml, package)
+    path = PackURI(f"/word/embeddings/chart{identity}.xlsx")
+    chart.load_rel(RELATIONSHIP_TYPE.PACKAGE, Part(path, BOOK_TYPE, chart_book(plot), package), BOOK_RELATION)
+    rel = story.part.relate_to(chart, RELATIONSHIP_TYPE.CHART)
+    graphic = f'<a:graphicData uri="{NS["c"]}"><c:chart xmlns:c="{NS["c"]}" r:id="{rel}"/></a:graphicData>'
+    run = _drawing_run(at, _inline(cx, cy, _named(identity, plot.name, plot.alt), graphic))
+    shown = Chart(
+        tag=f"tk:chart.{plot.name}", alt=plot.alt, width_emu=cx, height_emu=cy, texts=chart_texts(plot)
+    )
+    return run, xml, shown
+
+
+def _size(at: Element, story: Story, width: int | None, slope: float) -> tuple[int, int]:
+    """Return width and height [EMU] of a drawing whose height is ``slope`` times its width."""
     room, tall = _room(at, story)
-    cx = width or _placeholder_width(at) or room
-    cy = round(cx * picture.height_px / picture.width_px)
-    if cy > tall:
-        cx, cy = round(cx * tall / cy), tall
+    page = max(_section(at, story)[0], 144) * EMU_TWIP
+    cx = min(width, page) if width else _placeholder_width(at) or room
+    cy = round(cx * slope)
+    return (round(cx * tall / cy), tall) if cy > tall else (cx, cy)
+
+
+def _drawing_run(at: Element, inline: Element) -> Element:
     anchor = next(at.iter(q("wp:anchor")), None)
     run = etree.Element(W_R)
     drawing = etree.SubElement(run, q("w:drawing"))
-    inline = _inline(rel, cx, cy, alt, name, ids.next_drawing())
     if anchor is None:
         drawing.append(inline)
         return run
@@ -94,20 +137,28 @@ def picture_run(
     return run
 
 
-def _inline(rel: str, cx: int, cy: int, alt: str, name: str, identity: int) -> Element:
+def _inline(cx: int, cy: int, named: str, graphic: str) -> Element:
     spaces = " ".join(f'xmlns:{p}="{NS[p]}"' for p in ("wp", "a", "pic", "r"))
-    label, text = quoteattr(f"Figure {name}"), quoteattr(clean(alt).replace("\n", " "))
     return etree.fromstring(
         f'<wp:inline {spaces} distT="0" distB="0" distL="0" distR="0"><wp:extent cx="{cx}" cy="{cy}"/>'
-        f'<wp:docPr id="{identity}" name={label} descr={text}/>'
+        f"<wp:docPr {named}/>"
         '<wp:cNvGraphicFramePr><a:graphicFrameLocks noChangeAspect="1"/></wp:cNvGraphicFramePr>'
-        f'<a:graphic><a:graphicData uri="{NS["pic"]}"><pic:pic><pic:nvPicPr>'
-        f'<pic:cNvPr id="{identity}" name={label} descr={text}/><pic:cNvPicPr/></pic:nvPicPr>'
-        f'<pic:blipFill><a:blip r:embed="{rel}"/><a:stretch><a:fillRect/></a:stretch></pic:blipFill>'
-        f'<pic:spPr><a:xfrm><a:off x="0" y="0"/><a:ext cx="{cx}" cy="{cy}"/></a:xfrm>'
-        '<a:prstGeom prst="rect"><a:avLst/></a:prstGeom></pic:spPr></pic:pic></a:graphicData></a:graphic>'
-        "</wp:inline>"
+        f"<a:graphic>{graphic}</a:graphic></wp:inline>"
     )
+
+
+def _picture_graphic(rel: str, cx: int, cy: int, named: str) -> str:
+    return (
+        f'<a:graphicData uri="{NS["pic"]}"><pic:pic><pic:nvPicPr><pic:cNvPr {named}/><pic:cNvPicPr/>'
+        f'</pic:nvPicPr><pic:blipFill><a:blip r:embed="{rel}"/><a:stretch><a:fillRect/></a:stretch>'
+        f'</pic:blipFill><pic:spPr><a:xfrm><a:off x="0" y="0"/><a:ext cx="{cx}" cy="{cy}"/></a:xfrm>'
+        '<a:prstGeom prst="rect"><a:avLst/></a:prstGeom></pic:spPr></pic:pic></a:graphicData>'
+    )
+
+
+def _named(identity: int, name: str, alt: str) -> str:
+    label, text = quoteattr(f"Figure {name}"), quoteattr(clean(alt).replace("\n", " "))
+    return f'id="{identity}" name={label} descr={text}'
 
 
 def insert_at_mark(paragraph: Element, mark: str, run: Element) -> None:
@@ -168,7 +219,7 @@ def _room(at: Element, story: Story) -> tuple[int, int]:
     cell = next(at.iter(W_TC), None) if at.tag != W_P else None
     cell = cell if cell is not None else ancestor(at, W_TC)
     if cell is not None and ancestor(cell, W_TBL) is not None:
-        width = min(width, _cell_width(cell) or width)
+        width = _cell_room(cell, width)
     box = ancestor(at, q("w:txbxContent"))
     if box is not None:
         frame = next((e for tag in ("wp:anchor", "wp:inline") for e in box.iterancestors(q(tag))), None)
@@ -178,7 +229,14 @@ def _room(at: Element, story: Story) -> tuple[int, int]:
     return max(width, 144) * EMU_TWIP, max(height, 144) * EMU_TWIP
 
 
-def _cell_width(cell: Element) -> int | None:
+def _cell_room(cell: Element, page: int) -> int:
+    """Return the width [twips] inside a cell: as stated, else its share of the room that its table has."""
+    outer = ancestor(ancestor(cell, W_TBL), W_TC)
+    room = page if outer is None else _cell_room(outer, page)
+    return min(room, _cell_width(cell, room) or room)
+
+
+def _cell_width(cell: Element, room: int) -> int | None:
     stated = cell.find(f"{q('w:tcPr')}/{q('w:tcW')}")
     if stated is not None and stated.get(q("w:type")) == "dxa" and (stated.get(q("w:w")) or "").isdigit():
         return int(stated.get(q("w:w"))) - _CELL_MARGIN
@@ -186,6 +244,7 @@ def _cell_width(cell: Element) -> int | None:
     grid = [int(float(g.get(q("w:w")) or 0)) for g in table.findall(f"{q('w:tblGrid')}/{q('w:gridCol')}")]
     if row not in own_rows(table):
         return None
+    grid = grid if any(grid) else [room // max(len(grid), 1)] * len(grid)
     at = 0
     for cell_before in (cell_ for cell_ in row.iter(W_TC) if ancestor(cell_, W_TR) is row):
         span = _number_of(cell_before, "w:tcPr/w:gridSpan")

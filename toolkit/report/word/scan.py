@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from toolkit.report.tags import Tag, parse_tag
+from toolkit.report.tags import DRAWN, Tag, parse_tag
 from toolkit.report.word.xml import (
     SDT_CONTENT,
     SDT_PR,
@@ -27,6 +27,7 @@ LITERAL = re.compile(r"\{\{\s*(tk:[^{}]*?)\s*\}\}")
 BROKEN = re.compile(r"\{\{\s*tk:(?![^{}]*\}\})")
 # Word's autocorrection makes {{Tk: of it at the start of a sentence; it would be printed as it stands.
 MISSPELT = re.compile(r"(?!tk:)[tT][kK]\s*:")
+UNBRACED = re.compile(r"\btk:([\w.]*\w)")
 MISSPELT_LITERAL = re.compile(r"\{\{\s*" + MISSPELT.pattern)
 
 
@@ -80,7 +81,7 @@ def filled_by(element: Element) -> Element | None:
     """Return the control around an element whose content will be replaced, None where there is none."""
     for sdt in element.iterancestors(W_SDT):
         tag = control_tag(sdt)
-        if tag is not None and tag.family in ("value", "figure", "row"):
+        if tag is not None and tag.family in ("value", "row", *DRAWN):
             return sdt
     return None
 
@@ -104,6 +105,14 @@ def misspelt(story: Story) -> Iterator[tuple[Element, str]]:
             text = "".join(t.text or "" for t in visible_texts(element))
             if found := MISSPELT_LITERAL.search(text):
                 yield element, text[found.start() : found.start() + 40]
+
+
+def unbraced(story: Story) -> Iterator[tuple[Element, str]]:
+    """Yield (paragraph, path) of texts such as ``{tk:tire.size}`` that stand in no double braces."""
+    for paragraph in story.root.iter(W_P):
+        text = "".join(t.text or "" for t in visible_texts(paragraph))
+        for match in UNBRACED.finditer(BROKEN.sub("", LITERAL.sub("", text))):
+            yield paragraph, match[1]
 
 
 def table_of(site: Site) -> Element | None:

@@ -66,8 +66,10 @@ def tag_sheet(
         _table(document, ("tag", "what it prints", "example"), rows)
     document.add_heading("figures", level=1)
     rows = [
-        (_literal(f"figure.{name}|width=120mm"), text, _literal(f"caption.{name}"))
+        (_literal(f"{family}.{name}|width=120mm"), f"{text}{how}", _literal(f"caption.{name}"))
         for name, text in vocabulary.figures.items()
+        for family, how in (("figure", ""), ("chart", "; as a chart that Word can edit"))
+        if family == "figure" or name in vocabulary.charts
     ]
     _table(document, ("tag", "figure", "its caption"), rows)
     for name, table in vocabulary.tables.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import re
 import unicodedata
@@ -223,18 +224,22 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     pictures = data.count(b"/Subtype/Image")
     # Headers and footers are artifacts of a tagged PDF: nothing in them has a text beside it.
     mute = [
-        tag for tag, alt in filled.figures if tag not in filled.in_margins and _pdf_string(alt) not in data
+        tag
+        for tag, alt in filled.figures
+        if tag not in filled.in_margins and not any(text in data for text in _pdf_strings(alt))
     ]
+    drawn = {tag for tag, _ in filled.figures} - {chart.tag for chart in filled.charts}
     return (
         (
             *text_checks(text, filled),
             *_contents(pdf, text, filled),
             *_margins(filled),
+            *_charts(text, filled),
             _fonts(listing),
             Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
             Check(
                 name="figures",
-                ok=pictures >= len({tag for tag, _ in filled.figures}) and not mute,
+                ok=pictures >= len(drawn) and not mute,
                 message=f"no alternative text in the PDF for {', '.join(mute)}"
                 if mute
                 else f"{pictures} pictures in the PDF, {len(filled.figures)} figures in the report",
@@ -263,6 +268,20 @@ def _margins(filled: Filled) -> list[Check]:
     ]
 
 
+def _charts(text: str, filled: Filled) -> list[Check]:
+    if not filled.charts:
+        return []
+    page = squeeze(text)
+    lost = [
+        f"{chart.tag} {name[:40]!r}"
+        for chart in filled.charts
+        for name in chart.texts
+        if squeeze(name) not in page and not any(map(_hard_to_extract, name))
+    ]
+    message = f"the axes and series of {len(filled.charts)} charts are in the PDF"
+    return [Check(name="charts", ok=not lost, message="; ".join(lost[:5]) or message)]
+
+
 def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
     if not filled.contents.entries:
         return []
@@ -277,10 +296,11 @@ def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
     ]
 
 
-def _pdf_string(text: str) -> bytes:
-    # LibreOffice writes alternative texts as UTF-16 in hexadecimal, in objects that are not packed.
-    plain = clean(text).replace("\n", " ")
-    return b"<FEFF" + plain.encode("utf-16-be").hex().upper().encode() + b">"
+def _pdf_strings(text: str) -> tuple[bytes, bytes]:
+    # Alternative texts stand as UTF-16 in hexadecimal in objects that are not packed: in capital letters by
+    # LibreOffice, in small ones where `toolkit.report.word.spoken` wrote them.
+    written = b"<" + (codecs.BOM_UTF16_BE + clean(text).replace("\n", " ").encode("utf-16-be")).hex().encode()
+    return written.upper() + b">", written + b">"
 
 
 def _fonts(listing: str) -> Check:

@@ -66,7 +66,7 @@ def seal_pdf(
     from pyhanko.sign.timestamps.common_utils import TimestampRequestError
 
     try:
-        writer = _writer(data)
+        writer = pdf_writer(data)
         if writer.prev.embedded_signatures:
             raise _unsealable("the PDF has a seal already", "a signature in the file", "a PDF without one")
         attach(writer, attachments or {})
@@ -97,7 +97,7 @@ def proved_pdf(data: bytes, files: Mapping[str, bytes], code: bytes, place: Plac
 
     modules, changed = qr_modules(code), io.BytesIO()
     try:
-        writer = _writer(data)
+        writer = pdf_writer(data)
         attach(writer, files)
         draw(writer, modules, place)
         writer.write(changed)
@@ -266,7 +266,8 @@ def _der_length(raw: bytes) -> int:
     return 2 + count + size
 
 
-def _writer(data: bytes) -> IncrementalPdfFileWriter:
+def pdf_writer(data: bytes) -> IncrementalPdfFileWriter:
+    """Return a writer that adds a revision to a PDF/A and leaves what the file says of itself alone."""
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
 
     class Writer(IncrementalPdfFileWriter):

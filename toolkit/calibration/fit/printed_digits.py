@@ -1,0 +1,96 @@
+"""What a session's printed digits tell: scatter that is rounding alone, and check loads that are copies.
+
+The residuals of noise-free data are what printing rounded away. They are no scatter: they grow with the
+decade of a value, and a curve, a method or an outlier that is found in them is one of the digits. Check
+loads that were copied from rows of the fit agree with them in every digit oftener than chance allows.
+"""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.terms import term_matrix
+from toolkit.recording.digits import FULL_DIGITS, half_last_places
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.fit.regression import TermFit
+
+_CHANCE = 0.01  # that check loads which were measured anew are taken for copies
+_FITTED = 2.0  # a row's own rounding, and that of the rows which drew the equation
+_NOMINAL = 3  # digits
+_SIX_DIGITS = 5e-7  # of a value whose digits a conversion has hidden
+
+
+def rounding_alone(
+    fit: TermFit, columns: Mapping[str, NDArray[np.float64]], load: NDArray[np.float64], tolerance: float
+) -> bool:
+    """Tell whether every row lies as near to the equation as its printed digits can tell.
+
+    Loads of up to three digits, such as those of weights, are nominal and count as exact, and so do those
+    whose last digit is coarser than the check loads' ``tolerance``.
+    """
+    sd = fit.residual_sd
+    if sd <= 1e-9 * tolerance:
+        return True
+    if sd > tolerance:
+        return False
+    names = list(columns)
+    half = half_last_places(np.stack([load, *columns.values()]))
+    step = 10.0 ** (np.floor(np.log10(np.where(load == 0, 1.0, np.abs(load)))) - _NOMINAL + 1)
+    nominal = np.abs(load / step - np.round(load / step)) < 1e-9
+    bound = np.where(nominal | (half[0] >= tolerance), 0.0, half[0])
+    coefficients = np.asarray(fit.coefficients)
+    at = term_matrix(fit.terms, columns) @ coefficients
+    for name, by in zip(names, half[1:], strict=True):
+        moved = term_matrix(fit.terms, {**columns, name: columns[name] + by}) @ coefficients
+        bound += np.abs(moved - at)
+    return bool((np.abs(fit.residuals) <= _FITTED * bound).all())
+
+
+def _half_place(value: float) -> float:
+    digits, exponent = Decimal(repr(value)).as_tuple()[1:]
+    return 0.5 * 10.0**exponent if len(digits) < FULL_DIGITS and isinstance(exponent, int) else 0.0
+
+
+def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Sequence[float]) -> dict[int, int]:
+    """Return which rows of a check (from 0) repeat a row of the fit (from 0) within their printed digits.
+
+    ``check`` and ``rows`` (rows, columns) have the same columns; ``scatter`` is the standard deviation of
+    each column where a loading is repeated, 0 of what is exact or not known. Rows that agree in every digit
+    are always told; others only where so many would agree by chance once in a hundred sessions or less.
+    """
+    same: dict[int, int] = {}
+    near: dict[int, int] = {}
+    expected = 0.0
+    sd = np.asarray(scatter, dtype=np.float64)
+    order = np.argsort(rows[:, 0], kind="stable")
+    first = rows[order, 0]
+    for at, values in enumerate(check):
+        by = np.maximum([_half_place(value) for value in values.tolist()], _SIX_DIGITS * np.abs(values))
+        reach = 4 * math.sqrt(2) * sd + by
+        low, high = np.searchsorted(first, [values[0] - reach[0], values[0] + reach[0]], side="left")
+        around = np.sort(order[low : high + 1])
+        distance = np.abs(rows[around] - values)
+        equal = around[(distance == 0).all(axis=1)]
+        alike = around[(distance <= by).all(axis=1)]
+        if equal.size:
+            same[at] = int(equal[0])
+        elif alike.size:
+            near[at] = int(alike[0])
+        # Two readings of one loading differ by sqrt(2) sd: the chance that they agree within the rounding.
+        share = np.where(sd > 0, np.minimum(by / (math.sqrt(math.pi) * np.where(sd > 0, sd, 1.0)), 1.0), 1.0)
+        expected += float((distance <= reach).all(axis=1).sum() * share.prod())
+    if near:
+        from scipy.special import pdtrc
+
+        if pdtrc(len(near) - 1, expected) < _CHANCE:
+            same |= near
+    return same
