@@ -190,11 +190,10 @@ def run(task: Task, coarse: Measured, count: Array, width: float, *, again: int 
     half = sides.max(axis=0)
     wide = half > np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
     undetermined = [p for p, at, too in zip(free, bound, wide, strict=True) if at or too]
-    stretch = np.ones(len(spread))
     linear = factor * errors[: len(free)]
-    stretch[: len(free)] = np.where(linear > 1e-9 * half, half / np.maximum(linear, 1e-300), 1.0)
-    spread = spread * np.outer(stretch, stretch)
-    covariance = spread[: len(free), : len(free)]
+    # Of each parameter by itself: what follows from all of them together, a stiffness, keeps their spread.
+    stretch = np.where(linear > 1e-9 * half, half / np.maximum(linear, 1e-300), 1.0)
+    covariance = spread[: len(free), : len(free)] * np.outer(stretch, stretch)
     return StageFit(
         values=values,
         free=free,
