@@ -354,3 +354,21 @@ def test_a_tag_may_ask_for_any_result_as_a_condition(tmp_path: Path) -> None:
     for name in ("figure.gough", "table.pull", "caption.gough", "calibration.FY.E5", "report.opinions"):
         expected = ["unknown-tag"] if name == "report.opinions" else []
         assert rules(tmp_path, sdt(f"tk:if.{name}", p("x"))) == expected, name
+
+
+@pytest.mark.parametrize(
+    ("lost", "rule", "says"),
+    [
+        ("word/_rels/document.xml.rels", "zip-damaged", "a relation that the template lacks"),
+        ("word/document.xml", "not-word", "lacks its main document"),
+    ],
+)
+def test_a_package_with_a_hole_is_refused_for_what_it_lacks(
+    tmp_path: Path, lost: str, rule: str, says: str
+) -> None:
+    def edit(members: dict[str, bytes]) -> None:
+        members.pop(lost)
+
+    with pytest.raises(TemplateError, match=says) as caught:
+        opened(tmp_path, p("{{tk:tire.size}}"), header=p("x"), edit=edit)
+    assert caught.value.rule == rule
