@@ -211,8 +211,11 @@ def _measurand(
     if len(taking_part) < fewest:
         beside = "" if reference is None else f" beside {reference}"
         raise _refused(
-            name, "too few laboratories to compare", len(taking_part), f"{fewest} at least{beside}"
-        )
+            name, "too few laboratories to compare",
+            ", ".join(entry.laboratory for entry in taking_part) or "none", f"{fewest} at least{beside}",
+            "add a laboratory's results"
+            + (f", name a reference, beside which one is enough, or leave {name} out" * (reference is None)),
+        )  # fmt: skip
     robust = algorithm_a(np.array([entry.mean for entry in taking_part])) if len(taking_part) > 1 else None
     stated = next((entry for entry in results if entry.laboratory == reference), None)
     if stated is not None and stated.U is not None:
@@ -338,8 +341,10 @@ def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:
     return findings
 
 
-def _refused(measurand: str, problem: str, actual: object, expected: str) -> ConfigError:
+def _refused(
+    measurand: str, problem: str, actual: object, expected: str, next_step: str = "add what is expected"
+) -> ConfigError:
     return ConfigError(
-        problem, where=measurand, got=actual, expected=expected, next_step="add what is expected",
+        problem, where=measurand, got=actual, expected=expected, next_step=next_step,
         rule="laboratories",
     )  # fmt: skip

@@ -183,7 +183,7 @@ class Report:
         parts += [f"{', '.join(names)}: {why}" for why, names in reasons.items()]
         if any(place in own for place in stage.held):
             parts.append(
-                "standard errors of the others are with these held; that of a stiffness contains their spread"
+                "standard errors contain what the parameters held at their default may be within their bounds"
             )
         if at_bound:
             parts.append(f"at its bound: {', '.join(at_bound)}")
