@@ -211,3 +211,13 @@ def test_the_new_stiffness_is_that_of_the_reduced_test_before_its_common_load(vi
         else:
             expected = (b.MZ - a.MZ) / (b.SA - a.SA)
         assert one["new"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_will_be_in_force_cannot_be_known(tmp_path):
+    dated(tmp_path / "later", "2190-01-01")
+    write(tmp_path / "later" / "a.xlsx", recording())
+    made = audit(tmp_path)
+    (file,) = made.files
+    assert (file.grade, file.date) == ("undated", None)
+    assert (file.identification.in_force, file.identification.repair) == (None, None)
+    assert "2190-01-01, in the future" in rules(made, "test-toml")["later/a.xlsx"]

@@ -54,7 +54,7 @@ def run(*arguments):
 @pytest.fixture
 def files(tmp_path):
     (tmp_path / "x.tir").write_text(TIRE)
-    (tmp_path / "g.csv").write_text("SA [deg],FZ [N]\n-4,4000\n2,-4000\n4,4e3\n")
+    (tmp_path / "g.csv").write_text("SA [deg],FZ [N]\n-4,4000\n2,4000\n4,4e3\n")
     return tmp_path / "x.tir", tmp_path / "g.csv"
 
 
@@ -63,7 +63,7 @@ def test_the_grid_comes_back_with_its_own_digits(files, tmp_path):
     assert run(*files, "--out", out)[0] == 0
     rows = list(csv.reader(out.read_text().splitlines()))
     assert rows[0] == ["SA [deg]", "FZ [N]", "FX [N]", "FY [N]", "MZ [N*m]"]
-    assert [row[:2] for row in rows[1:]] == [["-4", "4000"], ["2", "-4000"], ["4", "4e3"]]
+    assert [row[:2] for row in rows[1:]] == [["-4", "4000"], ["2", "4000"], ["4", "4e3"]]
     code, printed = run(*files)
     assert (code, printed) == (0, out.read_text())
 
@@ -108,6 +108,25 @@ def test_beyond_the_range_ends_with_one_and_still_answers(files):
     assert code == 1
     assert [finding["rule"] for finding in json.loads(out)["findings"]] == ["tir-range"]
     assert json.loads(out)["rows"][0]["FY"] < 0
+
+
+def test_without_a_load_there_is_no_force_of_any_sign(files):
+    tir, grid = files
+    grid.write_text("SA [deg],FZ [N]\n-4,0\n4,0\n0,4000\n")
+    for axes in AXES:
+        _, text = run(tir, grid, "--axes", axes)
+        assert "-0.0," not in text
+        assert not text.rstrip().endswith("-0.0")
+        assert "-0.0" not in run(tir, grid, "--axes", axes, "--json")[1]
+
+
+def test_loads_of_both_signs_are_refused(files):
+    tir, grid = files
+    grid.write_text("SA [deg],FZ [N]\n-4,-4000\n4,4000\n2,-4000\n0,3\n")
+    with pytest.raises(ToolkitError) as caught:
+        run(tir, grid)
+    assert (caught.value.exit_code, caught.value.rule) == (2, "mixed-load-signs")
+    assert "row 3" in str(caught.value.where)
 
 
 def test_raw_angles_differ_by_the_tangent(files):

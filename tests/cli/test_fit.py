@@ -193,3 +193,12 @@ def test_a_few_equal_rows_are_no_finding(tmp_path):
     (tmp_path / "x.csv").write_text("\n".join(["SA [deg],FZ [N],FY [N],MZ [N*m]", *rows, *rows[:4]]) + "\n")
     code, out = run(tmp_path / "x.csv", "--json")
     assert (code, [one for one in json.loads(out)["findings"] if one["level"] != "note"]) == (0, [])
+
+
+@pytest.mark.parametrize(("name", "way"), [("a.tdx", "toolkit convert a.tdx a.csv"), ("a.txt", "a.csv")])
+def test_a_file_of_another_kind_is_told_the_way_to_a_table(tmp_path, name, way):
+    (tmp_path / name).write_text("**HEADER\n")
+    with pytest.raises(ToolkitError) as caught:
+        run(tmp_path / name)
+    assert (caught.value.exit_code, caught.value.rule) == (2, "fit-source")
+    assert way in caught.value.next_step

@@ -298,6 +298,11 @@ def test_the_same_recordings_twice(repeats: list[ReducedTest], record: Calibrati
 def test_equal_names_are_told_apart() -> None:
     a, b = conicity("a", 1, 2, 3), dataclasses.replace(conicity("a", 1, 2, 3), identity="other")
     assert [one.label for one in compare([a, b]).entries] == ["a (1)", "a (2)"]
+    a, b = (
+        dataclasses.replace(one, source=source)
+        for one, source in ((a, "/x/steel/new/a.csv"), (b, "/x/sand/new/a.csv"))
+    )
+    assert [one.label for one in compare([a, b]).entries] == ["a (steel/new)", "a (sand/new)"]
 
 
 @pytest.mark.parametrize(

@@ -173,6 +173,17 @@ def test_the_file_is_read_with_repeats_units_and_u(tmp_path) -> None:  # type: i
     assert reported["result"][2].k == 2.0
 
 
+def test_decimal_commas_and_another_unit_of_u_are_the_same_results(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    point, comma = tmp_path / "point.csv", tmp_path / "comma.csv"
+    point.write_text("laboratory,value [kN],U [kN],k\nA,1.05,0.125,2.5\nB,1.1,0.05,\n")
+    comma.write_text("laboratory;value [kN];U [N];k\nA;1,05;125;2,5\nB;1,1;50;\n")
+    by_point, by_comma = read_laboratories(point), read_laboratories(comma)
+    assert by_comma[1] == by_point[1] == "kN"
+    for a, b in zip(by_comma[0]["result"], by_point[0]["result"], strict=True):
+        assert (a.laboratory, a.values, a.k) == (b.laboratory, b.values, b.k)
+        assert a.U == pytest.approx(b.U, rel=1e-15)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -180,7 +191,10 @@ def test_the_file_is_read_with_repeats_units_and_u(tmp_path) -> None:  # type: i
         ("laboratory,value [N],value [N]\nA,1,1\n", "twice"),
         ("value [N]\n1\n", "laboratory"),
         ("laboratory,value [N],v [N]\nA,1,1\n", "unknown column"),
-        ("laboratory,value [N],U [kN]\nA,1,1\n", "another unit"),
+        ("laboratory,value [N],U [mm]\nA,1,1\n", "another dimension"),
+        ("laboratory;value [N]\nA;1,234\nB;5,678\n", "between thousands"),
+        ("laboratory;value [N]\nA;1,5\nB;2.5\n", "'1,5'"),
+        ("laboratory,value [N]\nA,1_000\n", "1_000"),
         ("laboratory,value [N]\n", "no results"),
         ("", "laboratory"),
         ("laboratory,value [N]\nA,nan\n", "nan"),

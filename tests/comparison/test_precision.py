@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -33,6 +36,26 @@ def test_gum_h5_zener_voltage_standard() -> None:
     # F 0.95 with 9 and 40 degrees of freedom is 2.124 there; 0.975 is 2.452.
     assert found.p is not None
     assert 0.025 < found.p < 0.05
+
+
+def test_an_answer_is_the_same_bits_in_every_process() -> None:
+    # Names have other hashes in each process: a sum over a set of them differed in its last digit.
+    program = """
+import numpy as np
+from toolkit.comparison.precision import factor_spread
+values = [0.71, 0.71, 0.70, 0.71, 0.69, 0.67, 0.68, 0.66, 0.65, 0.69, 0.67, 0.65, 0.66, 0.70, 0.69, 0.66,
+          0.73, 0.74, 0.73, 0.71, 0.71, 0.69, 0.70, 0.65, 0.68]
+levels = ["L1"] + [f"L{number}" for number in range(1, 9) for _ in range(3)]
+print(factor_spread(np.array(values), levels, factor="laboratory").s_between.hex())
+"""
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", program], check=True, capture_output=True, text=True,
+            env=os.environ | {"PYTHONHASHSEED": str(seed)},
+        ).stdout
+        for seed in (1, 7)  # of which the names stand in another order
+    }  # fmt: skip
+    assert len(said) == 1
 
 
 def test_unequal_levels_by_hand() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from tests.declared.sample import Cell, Sample
 from toolkit.declared import json_schema, plain, read_text, reference, starter, table_of
+from toolkit.simulation.plan_file import PlanFile
 
 
 def all_on(text: str) -> str:
@@ -85,3 +86,10 @@ def test_a_table_by_itself_has_its_name_as_a_field() -> None:
     with pytest.raises(KeyError):
         plain(Cell(name="a", gain=1.0))["schema"]
     assert tomllib.loads(starter(Cell))["gain"] == 1.0
+
+
+def test_a_default_is_printed_without_the_digits_of_its_conversion() -> None:
+    page = reference(PlanFile)
+    assert "34.3775" in page  # 0.6 rad
+    assert '{ value = 4.0, unit = "deg/s" }' in page
+    assert not re.search(r"\d\.\d{9,}", page)

@@ -20,6 +20,9 @@ from toolkit.recording.labview import write_labview
 from toolkit.recording.read import read_recording
 from toolkit.reduction.model import ReducedTest
 from toolkit.reduction.reduce import reduce_test
+from toolkit.simulation.plan import Plan
+from toolkit.simulation.run import simulate
+from toolkit.simulation.write import write_test
 from toolkit.units import from_si
 
 FIG = Path(__file__).resolve().parents[2] / "toolkit" / "examples" / "fig4_4" / "M15_fig4_4.xlsx"
@@ -330,3 +333,51 @@ def test_cells_beyond_the_calibrated_range_are_told(
     ]
     # Figure 4.4: D51 reaches 496 and E5 -498 lbf; D52 stays at 301, within the room of 5 % of the span.
     assert [f.message.split()[0] for f in found] == ["D51", "E5"]
+
+
+def test_blocks_of_another_condition_feed_nothing(
+    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+) -> None:
+    # Every recording again, leaning, with other forces: first by name, so that the protocol would take them.
+    plain = reduce_folder(virtual_test, virtual_record)
+    folder = tmp_path / "mixed"
+    shutil.copytree(virtual_test, folder)
+    machine = load_machine("m15-virtual")
+    files = {path: {s.symbol: s.values.copy() for s in read_recording(path, machine).series
+                    if s.role != "covariate"}
+             for path in sorted(folder.glob("*.xlsx"))}  # fmt: skip
+    assert len(files) > 3
+    toml = (folder / "test.toml").read_text()
+    for path, columns in files.items():
+        rows = len(columns["FZ"])
+        write_labview(path, machine, columns | {"IA [deg]": np.zeros(rows)}, simulated=True)
+        leaning = columns | {name: 1.2 * columns[name] for name in ("D51", "D52", "E5")}
+        other = path.with_name(f"0 leaning {path.name}")
+        write_labview(other, machine, leaning | {"IA [deg]": np.full(rows, 3.0)}, simulated=True)
+        toml = "\n".join(
+            f"{line}\n{line.replace(path.name, other.name)}" if path.name in line else line
+            for line in toml.splitlines()
+        )
+    (folder / "test.toml").write_text(toml)
+    mixed = reduce_folder(folder, virtual_record)
+    (told,) = [finding for finding in mixed.findings if finding.rule == "other-conditions"]
+    assert "IA 3 deg, kept 0 deg" in told.message
+    assert [(c.file, c.first_row, c.FY, c.MZ) for c in mixed.used()] == [
+        (c.file, c.first_row, c.FY, c.MZ) for c in plain.used()
+    ]
+
+
+def test_a_load_where_the_reach_of_a_nominal_one_ends_is_one_load(
+    tmp_path: Path, virtual_plan: Plan, virtual_record: CalibrationRecord
+) -> None:
+    # 15 % below 833 lbf lie 708 lbf: a load of 700 lbf with a spread of 3 % lies on both sides of that.
+    plan = dataclasses.replace(virtual_plan, loads_N=(700 * 4.4482216152605, 1200 * 4.4482216152605))
+    folder = tmp_path / "test"
+    write_test(simulate(plan), folder)
+    toml = folder / "test.toml"
+    toml.write_text(toml.read_text().replace('protocol = "protocol.toml"\n', ""))
+    (folder / "protocol.toml").unlink()
+    reduced = reduce_folder(folder, virtual_record)
+    assert len({condition.step_FZ for condition in reduced.conditions}) == 2
+    assert len({condition.FZ_common for condition in reduced.conditions}) == 2
+    assert "unplanned-load" in rules(reduced)

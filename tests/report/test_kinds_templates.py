@@ -376,3 +376,14 @@ def test_any_result_can_be_a_condition(tmp_path: Path) -> None:
         assert made.holds(name) is held, name
         assert made.vocabulary.knows_condition(name)
     assert not made.vocabulary.knows_condition("figure.rain")
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.docx")), ids=lambda path: path.name)
+def test_every_column_of_a_table_has_a_heading(path: Path) -> None:
+    w = "{http://schemas.openxmlformats.org/wordprocessingml/2006/main}"
+    with zipfile.ZipFile(path) as package:
+        document = etree.fromstring(package.read("word/document.xml"))
+    for header in document.iter(f"{w}tblHeader"):
+        row = header.getparent().getparent()
+        cells = ["".join(text.text or "" for text in cell.iter(f"{w}t")) for cell in row.iter(f"{w}tc")]
+        assert all(cells[:-1]), cells  # a mark behind the last column needs none

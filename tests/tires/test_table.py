@@ -203,7 +203,7 @@ def test_what_large_machines_measure_is_read(tmp_path):
     path = tmp_path / "tire.csv"
     path.write_text(
         "SA [deg],FZ [kN],FY [kN],MZ [kN*m],TIRE_ANGLE [deg],V [km/h],P [bar],t [s]\n"
-        "-180,-500,450,80,1e6,400,25,1.7e9\n90,600,0,0,0,0,0,0\n"
+        "-180,-500,450,80,1e6,400,25,1.7e9\n90,-600,0,0,0,0,0,0\n"
     )
     table = read_table(path)
     assert table["FZ"].tolist() == pytest.approx([5e5, 6e5])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from toolkit.calibration.registry.clock import begun
 from toolkit.errors import ConfigError
 from toolkit.files import read_toml, same_file
 from toolkit.inputs import is_regular
@@ -23,6 +24,9 @@ MachineSource = Literal["option", "test.toml", "file", "default"]
 class Context:
     """The machine and how it is known; the test's date and its test.toml, None where there is none.
 
+    ``date`` is None too where test.toml states one that has not begun, which ``future`` then holds: what will
+    be in force then cannot be known.
+
     ``tare`` tells whether test.toml gives a tare, which `toolkit process` subtracts; ``is_tare`` whether
     the file itself is that tare.
     """
@@ -31,6 +35,7 @@ class Context:
     machine_source: MachineSource
     date: dt.date | None
     test_toml: Path | None
+    future: dt.date | None = None
     tare: bool = False
     is_tare: bool = False
 
@@ -56,6 +61,9 @@ def context_of(
     toml = find(path)
     table: Mapping[str, Any] = {} if toml is None else read(toml)
     date = None if toml is None or "date" not in table else _date(table["date"], toml)
+    future = None
+    if date is not None and not begun(date):
+        date, future = None, date
     source: MachineSource
     if machine is not None:
         name, source = machine, "option"
@@ -70,6 +78,7 @@ def context_of(
         machine_source=source,
         date=date,
         test_toml=toml,
+        future=future,
         tare="tare" in table,
         is_tare=toml is not None and _is_tare(path, table.get("tare"), toml.parent),
     )

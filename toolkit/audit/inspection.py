@@ -12,6 +12,7 @@ from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, columns_of
 from toolkit.audit.quality import impossible
+from toolkit.calibration.registry.clock import in_future
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
@@ -172,13 +173,14 @@ def inspect_file(
     loaded_recording = with_load(recording, machine=context.machine, record=corrector)
     if not context.is_tare:
         split_blocks(loaded_recording, context.machine)  # refuses a file that holds no load at all
-    identification, corrected = None, None
+    identification, corrected, why = None, None, None
     if choice is not None:
         if columns.loads:
             identification = identify_columns(
                 columns, choice.records, on=context.date, in_force=choice.in_force, void=choice.void
             )
-        corrected = None if corrector is None else _corrected(columns, corrector)
+        why = _uncorrected(context, columns, choice, corrector)
+        corrected = recompute(columns, corrector) if corrector is not None and why is None else None
     first, *blocks = _blocks(loaded_recording, corrected)
     loaded = [block for block in blocks if not block.tare] or blocks
     rows = sum(block.last_row - block.first_row + 1 for block in loaded)
@@ -193,7 +195,11 @@ def inspect_file(
         corrected_by=corrector.id if corrector is not None and corrected else None,
         unverified=corrector is not None and not corrector.verified,
         choice=choice,
-        findings=(*_impossible(path, blocks, corrector), *_findings(path, identification, choice)),
+        findings=(
+            *_impossible(path, blocks, corrector),
+            *_findings(path, identification, choice),
+            *_of_context(path, context, why),
+        ),
     )
 
 
@@ -242,10 +248,30 @@ def wrong_signs(inspection: Inspection) -> str | None:
     return turned_against(mine, right, inspection.columns.loads)
 
 
-def _corrected(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]] | None:
+def _uncorrected(
+    context: Context, columns: Columns, choice: Choice, record: CalibrationRecord | None
+) -> str | None:
+    """Return why a file has no corrected values, None where it has."""
     from toolkit.audit.candidates import cannot_correct
 
-    return None if cannot_correct(record, columns) is not None else recompute(columns, record)
+    if record is not None:
+        reason = cannot_correct(record, columns)
+        return None if reason is None else f"{record.id} does not fit the file: {reason}"
+    if choice.trouble is not None:
+        return choice.trouble
+    days = "today" if context.date is None else f"on the test's date, {context.date.isoformat()}, or today"
+    return f"no record of {context.machine.name} is in force {days}"
+
+
+def _of_context(path: Path, context: Context, why: str | None) -> tuple[Finding, ...]:
+    findings = []
+    if context.future is not None:
+        message = f"{in_future(context.future)}; the file counts as undated"
+        findings.append(Finding(rule="test-toml", where=path.name, message=message))
+    if why is not None:
+        message = f"no corrected values: {why}"
+        findings.append(Finding(rule="not-corrected", where=path.name, message=message, level="note"))
+    return tuple(findings)
 
 
 def _blocks(recording: Recording, corrected: dict[str, NDArray[np.float64]] | None) -> tuple[LoadBlock, ...]:

@@ -20,6 +20,7 @@ from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import Grade, Identification, columns_of
 from toolkit.audit.quality import impossible, quality
+from toolkit.calibration.registry.clock import in_future
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.errors import ToolkitError
@@ -252,7 +253,8 @@ class Auditor:
     def _context(self, path: Path, data: bytes) -> tuple[Context, str | None]:
         # A test.toml that cannot be used must not hide what its recordings hold: they have no date then.
         try:
-            return context_of(path, own=lambda: machine_in(data), read=self._toml, find=self._find), None
+            context = context_of(path, own=lambda: machine_in(data), read=self._toml, find=self._find)
+            return context, None if context.future is None else f"time: {in_future(context.future)}"
         except ToolkitError as error:
             file_machine = machine_in(data)
             source: MachineSource = "default" if file_machine is None else "file"

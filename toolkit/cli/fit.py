@@ -101,6 +101,7 @@ def command(
         fit_table_models,
         fit_test_models,
         model_choice,
+        refuse_other_files,
         write_figures,
     )
     from toolkit.lab.tire_tests.fmu_files import check_fmu, write_fit_fmu
@@ -116,6 +117,7 @@ def command(
     modelled = check_fmu(fmu, source, names, fmi) if fmu is not None else None
     refuse_unwritable(figures)
     if source.suffix.lower() != ".csv" and not in_field_form:
+        refuse_other_files(source)
         fitted = fit_test_models(
             source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius,
             calibration=calibration, calibrations=place.calibrations, home=place.home, known_at=day(known_at),

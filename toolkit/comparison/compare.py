@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from toolkit.characteristics.characterise import characteristic_rows
@@ -171,15 +172,25 @@ def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
 
 
 def _labelled(entries: Sequence[Entry]) -> tuple[Entry, ...]:
-    """Return the entries with a label of their own each: equal names take a number."""
-    count = Counter(entry.label for entry in entries)
-    used: Counter[str] = Counter()
-    labelled = []
+    """Return the entries with a label of their own each: equal names take their folders, else a number."""
+    named: dict[str, list[Entry]] = {}
     for entry in entries:
-        used[entry.label] += 1
-        label = f"{entry.label} ({used[entry.label]})" if count[entry.label] > 1 else entry.label
-        labelled.append(replace(entry, label=label))
-    return tuple(labelled)
+        named.setdefault(entry.label, []).append(entry)
+    marks = {label: iter(_marks(alike)) for label, alike in named.items() if len(alike) > 1}
+    return tuple(
+        replace(entry, label=f"{entry.label} ({next(marks[entry.label])})") if entry.label in marks else entry
+        for entry in entries
+    )
+
+
+def _marks(alike: Sequence[Entry]) -> list[str]:
+    """Return what tells entries of one name apart: the ends of their folders that differ, else numbers."""
+    folders = [PurePath(entry.source).parts[:-1] for entry in alike]
+    for depth in range(1, max(map(len, folders)) + 1):
+        ends = ["/".join(folder[-depth:]) for folder in folders]
+        if all(ends) and len(set(ends)) == len(ends):
+            return ends
+    return [str(number) for number in range(1, len(alike) + 1)]
 
 
 def _findings(

@@ -211,8 +211,11 @@ def _measurand(
     if len(taking_part) < fewest:
         beside = "" if reference is None else f" beside {reference}"
         raise _refused(
-            name, "too few laboratories to compare", len(taking_part), f"{fewest} at least{beside}"
-        )
+            name, "too few laboratories to compare",
+            ", ".join(entry.laboratory for entry in taking_part) or "none", f"{fewest} at least{beside}",
+            "add a laboratory's results"
+            + (f", name a reference, beside which one is enough, or leave {name} out" * (reference is None)),
+        )  # fmt: skip
     robust = algorithm_a(np.array([entry.mean for entry in taking_part])) if len(taking_part) > 1 else None
     stated = next((entry for entry in results if entry.laboratory == reference), None)
     if stated is not None and stated.U is not None:
@@ -317,12 +320,15 @@ def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:
     findings = []
     p = measurand.precision
     tests = () if p is None else (
-        ("Cochran", p.cochran_p, p.cochran_laboratory, "scatters more than the others"),
-        ("Grubbs", p.grubbs_p, p.grubbs_laboratory, "lies apart from the others"),
+        ("Cochran", p.cochran_p, p.cochran_laboratory),
+        ("Grubbs", p.grubbs_p, p.grubbs_laboratory),
     )  # fmt: skip
-    for test, chance, laboratory, deviation in tests:
+    for test, chance, laboratory in tests:
         if chance is not None and chance < OUTLIER:
-            message = f"{laboratory} {deviation} ({test}, p = {chance:.2g}): s_r and s_R are with it"
+            deviation = " scatters more than" if test == "Cochran" else " lies apart from"
+            message = (
+                f"{laboratory}{deviation} the others ({test}, p = {chance:.2g}): s_r and s_R are with it"
+            )
             findings.append(Finding(rule="laboratory-outlier", where=measurand.name, message=message))
     if reference is None and len(measurand.scores) < FEW:
         message = (
@@ -335,8 +341,10 @@ def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:
     return findings
 
 
-def _refused(measurand: str, problem: str, actual: object, expected: str) -> ConfigError:
+def _refused(
+    measurand: str, problem: str, actual: object, expected: str, next_step: str = "add what is expected"
+) -> ConfigError:
     return ConfigError(
-        problem, where=measurand, got=actual, expected=expected, next_step="add what is expected",
+        problem, where=measurand, got=actual, expected=expected, next_step=next_step,
         rule="laboratories",
     )  # fmt: skip

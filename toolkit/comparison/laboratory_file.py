@@ -4,7 +4,8 @@
     conicity 4 kN,A,12.3,1.1,2
 
 ``measurand`` may be left out where there is one. A laboratory's repeats are rows of their own; its U, of the
-mean, stands in one of them or is the same in all. ``k`` is 2 where it is not stated.
+mean, stands in one of them or is the same in all, in the results' unit or another one of its dimension. ``k``
+is 2 where it is not stated. Between semicolons the numbers may have decimal commas.
 """
 
 from __future__ import annotations
@@ -13,17 +14,23 @@ import csv
 import io
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from toolkit.comparison.laboratories import K, Results
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
+from toolkit.recording.csvfile import decimal_sign, number_or_text
 from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from toolkit.units import Unit
 
 _COLUMNS = ("measurand", "laboratory", "value", "U", "k")
 _UNITS = ("value", "U")
+_NUMBERS = (*_UNITS, "k")
 ONE = "result"
 """Name of the only measurand of a file that names none."""
 
@@ -40,8 +47,12 @@ def read_laboratories(path: Path) -> tuple[dict[str, Sequence[Results]], str]:
     CellError
         a cell that is no finite number or empty, a negative U, a k of 0, two statements of one U
     """
-    head, *lines = _lines(path)
-    names, text = _columns(path, head)
+    (head, *lines), separator = _lines(path)
+    names, text, U_scale = _columns(path, head)
+    numbers = [place for place, name in enumerate(names) if name in _NUMBERS]
+    decimal = decimal_sign(
+        (cells[place] for cells in lines for place in numbers if place < len(cells)), separator, where=path
+    )
     reported: dict[str, dict[str, list[tuple[float, float | None, float]]]] = {}
     for number, cells in enumerate(lines, start=2):
         if not any(cell.strip() for cell in cells):
@@ -52,9 +63,10 @@ def read_laboratories(path: Path) -> tuple[dict[str, Sequence[Results]], str]:
         for name in ("measurand", "laboratory"):
             if name in row and not row[name]:
                 _refuse_cell(path, number, name, "an empty cell", "a name", "cell")
-        value = _number(path, number, "value", row["value"])
-        U = _number(path, number, "U", row["U"], 0.0) if row.get("U") else None
-        k = _number(path, number, "k", row["k"], 1e-9) if row.get("k") else K
+        at = _Place(path=path, row=number, decimal=decimal)
+        value = at.number("value", row["value"])
+        U = U_scale * at.number("U", row["U"], 0.0) if row.get("U") else None
+        k = at.number("k", row["k"], 1e-9) if row.get("k") else K
         by_laboratory = reported.setdefault(row.get("measurand", ONE), {})
         by_laboratory.setdefault(row["laboratory"], []).append((value, U, k))
     if not reported:
@@ -82,7 +94,8 @@ def _results(
     return Results(laboratory=laboratory, values=tuple(value for value, _, _ in rows), U=U, k=k)
 
 
-def _lines(path: Path) -> list[list[str]]:
+def _lines(path: Path) -> tuple[list[list[str]], str]:
+    """Return the cells of each line, and what parts them."""
     try:
         text = read_input(path, TABLE_FILE).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -91,14 +104,15 @@ def _lines(path: Path) -> list[list[str]]:
             expected="CSV in UTF-8", next_step="save it as 'CSV UTF-8'", rule="encoding",
         ) from error  # fmt: skip
     first = text.partition("\n")[0]
-    lines = list(csv.reader(io.StringIO(text, newline=""), delimiter=max(",;", key=first.count)))
-    return lines or [[]]
+    separator = max(",;", key=first.count)
+    lines = list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
+    return lines or [[]], separator
 
 
-def _columns(path: Path, head: list[str]) -> tuple[list[str], str]:
-    """Return the columns' names and the unit of the results."""
+def _columns(path: Path, head: list[str]) -> tuple[list[str], str, float]:
+    """Return the columns' names, the unit of the results, and the factor that brings U to it."""
     names: list[str] = []
-    units: dict[str, str] = {}
+    units: dict[str, Unit] = {}
     for cell in head:
         name, stated = split_header(cell, _COLUMNS.__contains__)
         if name not in _COLUMNS:
@@ -109,31 +123,40 @@ def _columns(path: Path, head: list[str]) -> tuple[list[str], str]:
         if name in _UNITS:
             if stated is None:
                 _refuse_column(path, "unknown-unit", f"the column {name} has no unit", cell, f"'{name} [N]'")
-            units[name] = unit(stated, where=f"{path}, column {name}").text
+            units[name] = unit(stated, where=f"{path}, column {name}")
     for name in ("laboratory", "value"):
         if name not in names:
             _refuse_column(
                 path, "missing-column", f"the column {name} is missing", ", ".join(head), ", ".join(_COLUMNS)
             )
-    if units.get("U", units["value"]) != units["value"]:
+    results = units["value"]
+    U = units.get("U", results)
+    if U.dimension != results.dimension:
         _refuse_column(
-            path, "unit-dimension", "U has another unit than the results", units["U"], units["value"]
-        )
-    return names, units["value"]
-
-
-def _number(path: Path, row: int, column: str, text: str, least: float = -math.inf) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or value < least:
-        at_least = "" if math.isinf(least) else " of 0 or more" if least == 0 else " above 0"
-        _refuse_cell(
-            path, row, column, repr(text) if text else "an empty cell",
-            f"a finite number{at_least} with a decimal point", "cell",
+            path, "unit-dimension", "U has a unit of another dimension than the results", U.text,
+            f"a unit of {results.dimension}, as {results.text} is",
         )  # fmt: skip
-    return value
+    return names, results.text, U.factor / results.factor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    # A row of a file, and the decimal sign of its numbers.
+    path: Path
+    row: int
+    decimal: str
+
+    def number(self, column: str, text: str, least: float = -math.inf) -> float:
+        """Return the number of a cell."""
+        value = number_or_text(text, self.decimal)
+        if isinstance(value, str) or not math.isfinite(value) or value < least:
+            at_least = "" if math.isinf(least) else " of 0 or more" if least == 0 else " above 0"
+            sign = "comma" if self.decimal == "," else "point"
+            _refuse_cell(
+                self.path, self.row, column, repr(text) if text else "an empty cell",
+                f"a finite number{at_least} with a decimal {sign}", "cell",
+            )  # fmt: skip
+        return value
 
 
 def _refuse_cell(path: Path, row: int, column: str, actual: object, expected: str, rule: str) -> NoReturn:

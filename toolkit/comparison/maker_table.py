@@ -39,7 +39,7 @@ from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.machine import TypeB
 from toolkit.reduction.model import Condition
-from toolkit.tires.conditions import of_one_condition
+from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
 from toolkit.tires.plausibility import demand_possible

@@ -137,7 +137,7 @@ def _precision(
 def _within(values: NDArray[np.float64], levels: Sequence[Hashable]) -> tuple[float, int]:
     """Return the pooled variance inside levels and its degrees of freedom."""
     squares, dof = 0.0, 0
-    for level in set(levels):
+    for level in dict.fromkeys(levels):
         members = values[[entry == level for entry in levels]]
         squares += float(np.sum((members - members.mean()) ** 2))
         dof += len(members) - 1

@@ -20,6 +20,7 @@ from toolkit.declared.tables import Field, FormsKind, TableKind
 from toolkit.declared.text import key_of, table_lines, value_text
 
 _WIDTH = 100
+_DIGITS = 6  # of a printed default
 Notes = Mapping[str, str]
 """Key of the top level -> how its value was come by."""
 
@@ -77,7 +78,7 @@ def _example(declared: Field) -> str:
     kind = declared.kind
     if declared.required or kind.entry.example is not None or declared.default in (None, (), ""):
         return value_text(kind.example())
-    return value_text(kind.write(declared.default))
+    return value_text(_printed(kind.write(declared.default)))
 
 
 def _sentence(declared: Field) -> str:
@@ -91,7 +92,16 @@ def _sentence(declared: Field) -> str:
 def _default(declared: Field) -> str:
     if declared.required or declared.default in (None, ()) or _inner_table(declared.kind) is not None:
         return ""
-    return value_text(declared.kind.write(declared.default))
+    return value_text(_printed(declared.kind.write(declared.default)))
+
+
+def _printed(value: Any) -> Any:
+    # A default is held in SI: in the unit of the file it has the digits of a conversion, which say nothing.
+    if isinstance(value, float):
+        return float(f"{value:.{_DIGITS}g}")
+    if isinstance(value, Mapping):
+        return {key: _printed(entry) for key, entry in value.items()}
+    return [_printed(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 def _comment(text: str) -> list[str]:

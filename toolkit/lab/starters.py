@@ -244,7 +244,10 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
             continue
         # As the reader of recordings will see it: what stands in square brackets is a unit to it.
         entries.append({"symbol": symbol, "header": split_header(header)[0], "unit": unit, "role": role})
-    silent += ["axes, rotations, drum and protocol: no header tells them"]
+    silent += [
+        "axes, rotations, drum and protocol: no header tells them",
+        "drum.circumference: without it the road counts as flat, a belt's or a trailer's",
+    ]
     note = f"guessed from {name}: FZ is the load, other forces and moments are computed by the rig"
     values = {"column": entries} if entries else {}
     return Guess(values=values, notes={"column": note} if entries else {}, silent=tuple(silent))

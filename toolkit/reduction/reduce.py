@@ -21,18 +21,20 @@ from toolkit.reduction.hub import HubBlock, hub_findings, hub_means, load_findin
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
 from toolkit.reduction.remarks import drift_findings
+from toolkit.reduction.selection import CONDITIONS, Selection, of_one_condition, parted
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine, TypeB
+    from toolkit.machine import Machine, Protocol, TypeB
     from toolkit.recording.model import Recording, TestInfo
 
 
 # Blocks at a load that the protocol does not know are one load while they lie within this part of each other.
 _SAME_LOAD = 0.10
+_RESOLVED = 0.008  # of a load: smaller gaps between loads are all alike
 
 
 def reduce_test(
@@ -80,7 +82,10 @@ def reduce_test(
         )
         for (name, recording, rotation), (loads, _), tare in zip(loaded, blocks, tares, strict=True)
     ]
-    measured, placed, later = _conditions(files, machine=machine, record=record, reversal=info.reversal)
+    selection = _selection(files)
+    measured, placed, later = _conditions(
+        files, machine=machine, record=record, reversal=info.reversal, used=selection.rows
+    )
     conditions = _ordered(_at_common_load(_own_loads(measured)), machine)
     protocol = machine.protocol
     findings = [
@@ -99,6 +104,7 @@ def reduce_test(
         *remarks.machine_findings(info, machine),
         *remarks.pressure_findings(info, machine),
         *remarks.speed_findings(files, machine),
+        *remarks.selection_findings(files, selection),
         *remarks.tare_findings(files, record),
         *remarks.angle_findings(files),
         *remarks.window_findings(files),
@@ -148,10 +154,16 @@ def _stated(machine: Machine, info: TestInfo, tare: Tare) -> tuple[TypeB, ...]:
 
 
 def _conditions(
-    files: Sequence[OpenedFile], *, machine: Machine, record: CalibrationRecord, reversal: Reversal
+    files: Sequence[OpenedFile],
+    *,
+    machine: Machine,
+    record: CalibrationRecord,
+    reversal: Reversal,
+    used: NDArray[np.bool_],
 ) -> tuple[list[Condition], list[plan.Placed], tuple[int, ...]]:
+    # What is placed in the protocol are the blocks of one condition.
     conditions: list[Condition] = []
-    placed: list[plan.Placed] = []
+    blocks: list[tuple[int, OpenedFile, float]] = []
     covariance = record_covariance(record) if machine.hub is not None else {}
     for order, file in enumerate(files):
         step = plan.nearest_step(float(np.mean(file.channels[0])), machine.protocol)
@@ -168,21 +180,62 @@ def _conditions(
                 covariance=covariance,
             )
             conditions.append(condition)
-            placed.append(
-                plan.Placed(
-                    file=file.name,
-                    file_order=order,
-                    rotation=file.rotation,
-                    SA=condition.SA,
-                    FZ=block.mean_FZ,
-                    step_SA=step,
-                    step_FZ=condition.step_FZ,
-                )
-            )
+            blocks.append((order, file, block.mean_FZ))
+    conditions = _one_step_a_load(conditions, machine.protocol)
+    kept = np.flatnonzero(used).tolist()
+    placed = [
+        plan.Placed(
+            file=file.name,
+            file_order=order,
+            rotation=file.rotation,
+            SA=condition.SA,
+            FZ=mean_FZ,
+            step_SA=condition.step_SA,
+            step_FZ=condition.step_FZ,
+        )
+        for condition, (order, file, mean_FZ) in ((conditions[index], blocks[index]) for index in kept)
+    ]
     later = plan.doubled(placed, machine.protocol)
-    for index in later:
+    for index in {*np.flatnonzero(~used).tolist(), *(kept[place] for place in later)}:
         conditions[index] = dataclasses.replace(conditions[index], used=False)
     return conditions, placed, later
+
+
+def _one_step_a_load(conditions: Sequence[Condition], protocol: Protocol) -> list[Condition]:
+    """Give the blocks of one load one nominal load of the protocol, or none.
+
+    A load that lies where the reach of a nominal one ends would be parted by its own scatter. Two blocks of
+    one file are two loads, however near.
+    """
+    stepped = list(conditions)
+    FZ = np.array([condition.FZ for condition in conditions])
+    for rows in parted(FZ, gap=_SAME_LOAD, resolved=_RESOLVED, relative=True):
+        group = [stepped[index] for index in rows]
+        low, high = FZ[rows].min(), FZ[rows].max()
+        if len({condition.step_FZ for condition in group}) < 2 or high - low > _SAME_LOAD * high:
+            continue
+        if len({(condition.file, condition.step_SA) for condition in group}) == len(group):
+            step = plan.nearest_load(float(np.median(FZ[rows])), protocol)
+            for index in rows:
+                stepped[index] = dataclasses.replace(stepped[index], step_FZ=step)
+    return stepped
+
+
+def _selection(files: Sequence[OpenedFile]) -> Selection:
+    """Return which load blocks are of one condition, by the means of what every file recorded of it.
+
+    A speed counts by its size: the direction of a run is declared.
+    """
+    recorded = {
+        symbol: np.array([
+            np.mean(file.recording[symbol].si_of(window.rows)) for file in files for window in file.windows
+        ])
+        for symbol in CONDITIONS
+        if all(file.recording.has(symbol) for file in files)
+    }  # fmt: skip
+    if "V" in recorded:
+        recorded["V"] = np.abs(recorded["V"])
+    return of_one_condition(recorded, (), rows=sum(len(file.windows) for file in files))
 
 
 def _condition(

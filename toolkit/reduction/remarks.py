@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from toolkit.recording.model import TestInfo
     from toolkit.reduction.model import Condition
     from toolkit.reduction.prepare_rows import OpenedFile
+    from toolkit.reduction.selection import Selection
 
 # A cell may leave the range of the reference loads by this part of it before it is said aloud.
 _BEYOND = 0.05
@@ -52,6 +53,30 @@ def speed_findings(files: Sequence[OpenedFile], machine: Machine) -> list[Findin
     if not speeds:
         return []
     return _speed([v for values in speeds.values() for v in values], _first_names(list(speeds)), machine)
+
+
+def selection_findings(files: Sequence[OpenedFile], selection: Selection) -> list[Finding]:
+    """Tell the load blocks that are of another condition than the test's, which are not used."""
+    names = [file.name for file in files for _ in file.windows]
+    findings = []
+    if selection.left_out:
+        away = list(dict.fromkeys(name for name, own in zip(names, selection.rows, strict=True) if not own))
+        message = (
+            f"{selection.left_out} of {len(names)} load blocks are at other conditions and not used: "
+            f"{'; '.join(selection.apart)}"
+        )
+        findings.append(Finding(rule="other-conditions", where=_first_names(away), message=message))
+    if selection.stands:
+        message = f"{'; '.join(selection.stands)} in every block that is used: the curves are of that"
+        findings.append(
+            Finding(
+                rule="one-condition",
+                where=_first_names(list(dict.fromkeys(names))),
+                message=message,
+                level="note",
+            )
+        )
+    return findings
 
 
 def _speed(speeds_m_s: Sequence[float], where: str, machine: Machine) -> list[Finding]:

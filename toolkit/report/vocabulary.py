@@ -170,6 +170,10 @@ class Vocabulary:
             return _entry(path, "text", f"caption of the figure: {self.figures[name]}")
         return next((entry for entry in self.values if entry.path == path), None)
 
+    def entry(self, path: str) -> Entry | None:
+        """Return the entry of a path of any family."""
+        return next((entry for entry in self.entries if entry.path == path), None)
+
     def knows(self, path: str) -> bool:
         """Tell whether a value of that path can exist in some content."""
         if self.value(path) is not None:

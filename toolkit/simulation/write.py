@@ -7,6 +7,8 @@ refused.
 from __future__ import annotations
 
 import json
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+    from toolkit.machine import Protocol
+    from toolkit.simulation.plan import Plan
 
 # The further columns of a continuous recording and of a case: their units and digits.
 
@@ -80,6 +85,7 @@ def further(signals: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.
 TRUTH = "truth.json"
 TEST = "test.toml"
 MACHINE = "machine.toml"
+PROTOCOL = "protocol.toml"
 SESSION = "SESSION.toml"
 # CSV has no place for a remark: the names carry it.
 LOADS_CSV = "loads_simulated.csv"
@@ -104,6 +110,8 @@ def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
         (stage / TEST).write_text(test_toml(test), encoding="utf-8")
         if not _is_packaged(test.plan.machine):
             (stage / MACHINE).write_text(toml_text(test.plan.machine), encoding="utf-8")
+        if (protocol := own_protocol(test.plan)) is not None:
+            (stage / PROTOCOL).write_text(toml_text(protocol), encoding="utf-8")
         (stage / TRUTH).write_text(_json(truth_document(test)), encoding="utf-8")
     return tuple(folder / name for name in names)
 
@@ -111,7 +119,26 @@ def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
 def test_names(test: VirtualTest) -> tuple[str, ...]:
     """Return the names of a virtual test's files, recordings first."""
     definition = () if _is_packaged(test.plan.machine) else (MACHINE,)
-    return (*(file.name for file in test.files), TEST, *definition, TRUTH)
+    protocol = () if own_protocol(test.plan) is None else (PROTOCOL,)
+    return (*(file.name for file in test.files), TEST, *definition, *protocol, TRUTH)
+
+
+def own_protocol(plan: Plan) -> Protocol | None:
+    """Return the protocol of a plan with a slip angle or load that the machine's has not, else None."""
+    times: Counter[tuple[str, float, float]] = Counter()
+    for run in plan.recordings:
+        times.update((run.rotation, angle, load) for angle, load in run.steps)
+    angles = tuple(
+        angle
+        for angle in dict.fromkeys(angle for _, angle, _ in times)
+        for _ in range(max(count for (_, step, _), count in times.items() if step == angle))
+    )
+    loads = tuple(dict.fromkeys(load for _, _, load in times))
+    standard = plan.machine.protocol
+    if set(angles) <= set(standard.slip_angles_rad) and set(loads) <= set(standard.loads_N):
+        return None
+    source = f"the plan of the simulated test, {plan.title}; all else as in: {standard.source}"
+    return replace(standard, source=source, slip_angles_rad=angles, loads_N=loads)
 
 
 def _is_packaged(machine: Machine) -> bool:
@@ -160,6 +187,7 @@ def test_toml(test: VirtualTest) -> str:
         f'speed = {{ value = {round(speed, 6)!r}, unit = "km/h" }}',
         f'pressure = {{ value = {round(float(from_si(plan.pressure_Pa, "psi")), 6)!r}, unit = "psi" }}',
         f'rated_load = {{ value = {plan.tire.nominal_load_N!r}, unit = "N" }}',
+        *([] if own_protocol(plan) is None else [f"protocol = {_text(PROTOCOL)}"]),
         "",
         "[tire]",
         *(f"{key} = {_text(value)}" for key, value in label.items()),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.channels import signs
-from toolkit.tires.conditions import of_one_condition
+from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import CHANNELS, Measured, cell
 from toolkit.tires.global_fit import undetermined

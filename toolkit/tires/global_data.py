@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.channels import Axes, signs
-from toolkit.tires.conditions import CONDITIONS, parted
+from toolkit.reduction.selection import CONDITIONS, parted
 from toolkit.tires.global_model import Rows, make_rows
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from toolkit.channels import signs
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
-from toolkit.tires.conditions import Selection, of_one_condition
+from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.global_data import CHANNELS, Measured, binned, cell, what_varies
 from toolkit.tires.global_model import (
     GlobalFit,
@@ -183,7 +183,7 @@ class Report:
         parts += [f"{', '.join(names)}: {why}" for why, names in reasons.items()]
         if any(place in own for place in stage.held):
             parts.append(
-                "standard errors of the others are with these held; that of a stiffness contains their spread"
+                "standard errors contain what the parameters held at their default may be within their bounds"
             )
         if at_bound:
             parts.append(f"at its bound: {', '.join(at_bound)}")

@@ -45,7 +45,7 @@ import numpy as np
 
 from toolkit.channels import Axes
 from toolkit.estimate import Estimate
-from toolkit.tires.conditions import Selection
+from toolkit.reduction.selection import Selection
 from toolkit.tires.model import Parameter
 
 if TYPE_CHECKING:

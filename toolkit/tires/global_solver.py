@@ -55,11 +55,27 @@ def descend(residual: Residual, x: Array, box: Box, *, steps: int, tolerance: fl
     residual : parameter sets (copies, p) to residuals (copies, n), finite
     steps : at most so many; a start leaves when its steps lower the cost by less than ``tolerance`` of it
     """
+    descent = descend_each(residual, x, box, steps=steps, tolerance=tolerance)
+    order = np.argsort(descent.cost, kind="stable")
+    return Descent(x=descent.x[order], cost=descent.cost[order])
+
+
+def descend_each(
+    residual: Residual,
+    x: Array,
+    box: Box,
+    *,
+    steps: int,
+    tolerance: float = 1e-9,
+    held: NDArray[np.bool_] | None = None,
+) -> Descent:
+    """Return where each start ends, in their order; ``held`` (starts, p) parameters of each stay."""
     x = np.clip(x, box.low, box.high)
     starts, count = x.shape
     if not count:
         r = _call(residual, x, box)
         return Descent(x=x, cost=np.vecdot(r, r))
+    stay_put = np.zeros(x.shape, dtype=np.bool_) if held is None else held
     alive = np.arange(starts)
     damping, radius = np.full(starts, 1e-2), np.full(starts, 8.0)
     final_cost = np.full(starts, np.inf)
@@ -70,6 +86,7 @@ def descend(residual: Residual, x: Array, box: Box, *, steps: int, tolerance: fl
         place = x[alive]
         gradient = np.matvec(J, r)
         frozen = ((place <= box.low) & (gradient > 0)) | ((place >= box.high) & (gradient < 0))
+        frozen |= stay_put[alive]
         delta, predicted = _step(J, gradient, frozen, damping, radius)
         trial = np.clip(place + delta * box.size, box.low, box.high)
         new_r = _call(residual, trial, box)
@@ -96,8 +113,7 @@ def descend(residual: Residual, x: Array, box: Box, *, steps: int, tolerance: fl
             r[moved], J[moved] = linearise(residual, x[alive[moved]], box)
         alive, cost, r, J = alive[stay], cost[stay], r[stay], J[stay]
         damping, radius, settled = damping[stay], radius[stay], settled[stay]
-    order = np.argsort(final_cost, kind="stable")
-    return Descent(x=x[order], cost=final_cost[order])
+    return Descent(x=x, cost=final_cost)
 
 
 def _step(

@@ -5,12 +5,17 @@ starts lose; the rest go on to the end. A parameter that the data do not determi
 default where the fit is as good with it: all defaults together lie in the 95 % region of the whole model, and
 raise its cost by no more than a thousandth, for a model's own misfit is no noise. Else it stays where the
 search ended, named, and free in the covariance, so that the errors of what moves with it stay true.
+
+An interval is linear first, with what is held at a default anywhere within its bounds. Each of its ends is
+held and all else fitted again: where the cost rises less than it should, the end moves out, and an end that
+fits better begins the search anew. Every end of the search whose cost the noise cannot tell from the lowest
+lies within the intervals: parameters in which such ends differ are not determined, however well each fits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +23,7 @@ import numpy as np
 from toolkit.estimate import coverage_factor
 from toolkit.tires.colour import autocorrelation_time
 from toolkit.tires.global_data import Measured
-from toolkit.tires.global_solver import Box, Descent, descend, linearise, spread_starts
+from toolkit.tires.global_solver import Box, Descent, descend, descend_each, linearise, spread_starts
 
 if TYPE_CHECKING:
     from toolkit.tires.global_model import Array, GlobalModel
@@ -28,6 +33,8 @@ _EXACT = 1e-18  # a cost below this share of the data's square is rounding
 _PLAN = (12, 6, 5, 60)  # starts, first steps, how many go on, steps to the end
 _PATIENT = (36, 8, 10, 90)
 _AGAIN = (25, 12, 8, 90)
+_REFITS = 15  # steps by which all else is fitted again where one parameter is held
+_PARABOLA, _LEAST_RISE = 0.7, 1e-2  # of the expected rise: below, an interval's end moves out, and so far
 _WIDE = (0.3, 2.5)  # an interval of more than 30 % of the value and 2.5 sizes to either side says little
 _LEVEL = 0.95
 _BIWEIGHT = 4.685  # 95 % efficiency on normal noise
@@ -56,7 +63,8 @@ class StageFit:
     """What a stage found: ``values`` of all parameters, ``covariance`` of those that stayed ``free``.
 
     ``held`` were set to their defaults, and ``spread`` that of ``free`` and ``held`` with the held
-    ones moving within their bounds: what follows from the curve, a stiffness, is uncertain by theirs too.
+    ones moving within their bounds: what follows from the curve, a stiffness, is uncertain by theirs too, and
+    so is every parameter: ``covariance`` is the part of the free ones.
     ``fixed`` (place, reason); ``bound`` places at a bound; ``undetermined`` places without a standard error;
     ``time`` autocorrelation time of the residuals; ``dof`` degrees of freedom;
     ``bin_width`` [rad] of the means that were fitted, zero where the rows were.
@@ -124,8 +132,11 @@ class Misfit:
         self.free.remove(place)
 
 
-def run(task: Task, coarse: Measured, count: Array, width: float) -> StageFit:
-    """Return what a stage finds; ``coarse`` are the means of bins of ``width`` [rad], ``count`` rows each."""
+def run(task: Task, coarse: Measured, count: Array, width: float, *, again: int = 2) -> StageFit:
+    """Return what a stage finds; ``coarse`` are the means of bins of ``width`` [rad], ``count`` rows each.
+
+    ``again``: how often the search begins anew from a better end that an interval's ends have come upon.
+    """
     scale = {name: float(np.sqrt(np.mean(task.data[name] ** 2))) or 1.0 for name in task.channels}
     weight = np.ones(len(task.data)) if task.sigma is None else 1.0 / task.sigma
     weight = weight / np.sqrt(np.mean(weight**2))
@@ -136,6 +147,7 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> StageFit:
     rows = Misfit(task, task.data, weight, scale)
     start = task.starts[:, list(task.free)]
     descent, starts = _search(search, start)
+    searched = task.values, task.free
     floor = _EXACT * float(np.sum((search.y * search.weight) ** 2))
     agreeing = descent.agreeing(_SAME, floor)
     x = descend(search, descent.x[:1].copy(), search.box(), steps=30, tolerance=1e-10).x
@@ -156,17 +168,32 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> StageFit:
         x = descend(rows, x, rows.box(), steps=10, tolerance=1e-10).x
     time, variance, dof = _noise(judged, x)
     on_rows = cheap or len(coarse) == len(task.data)
-    covariance, errors = _covariance(misfit, x, variance)
     box = misfit.box()
     factor = coverage_factor(dof)
     bound = _at_bound(x[0], box)
-    wide = factor * errors > np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
-    undetermined = [p for p, at, too in zip(misfit.free, bound, wide, strict=True) if at or too]
     values = misfit.base.copy()
     values[misfit.free] = x[0]
     free, held = tuple(misfit.free), tuple(place for place, _ in fixed)
     bounded = tuple(p for p, at in zip(free, bound, strict=True) if at)
-    spread, _ = _covariance(misfit, misfit.release(held, x), variance) if held else (covariance, None)
+    # What is held at a default may be anywhere within its bounds: the others move with it.
+    spread, errors = _covariance(misfit, misfit.release(held, x), variance)
+    half = factor * errors[: len(free)]
+    rivals = _rivals(descent, searched, factor**2 * variance)[:, list(free)] - values[list(free)]
+    sides = np.stack([half, half])
+    if cheap and task.model.grid == 1 and not task.robust:
+        sides, better = _profile(misfit, spread, half, factor**2 * variance)
+        if better is not None and again:
+            starts_of = np.concatenate([better[None], task.starts])
+            return run(replace(task, starts=starts_of), coarse, count, width, again=again - 1)
+    sides[0] = np.maximum(sides[0], -rivals.min(axis=0, initial=0.0))
+    sides[1] = np.maximum(sides[1], rivals.max(axis=0, initial=0.0))
+    half = sides.max(axis=0)
+    wide = half > np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
+    undetermined = [p for p, at, too in zip(free, bound, wide, strict=True) if at or too]
+    linear = factor * errors[: len(free)]
+    # Of each parameter by itself: what follows from all of them together, a stiffness, keeps their spread.
+    stretch = np.where(linear > 1e-9 * half, half / np.maximum(linear, 1e-300), 1.0)
+    covariance = spread[: len(free), : len(free)] * np.outer(stretch, stretch)
     return StageFit(
         values=values,
         free=free,
@@ -182,6 +209,41 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> StageFit:
         dof=dof,
         bin_width=0.0 if on_rows else width,
     )
+
+
+def _profile(misfit: Misfit, spread: Array, half: Array, rise: float) -> tuple[Array, Array | None]:
+    """Return how far the intervals reach below and above (2, reported), and all values of a better end.
+
+    Each parameter is held at either end of its linear interval and all else is fitted again: where the cost
+    rises by less than ``rise``, as a parabola would, that end moves out.
+    """
+    box, count = misfit.box(), len(half)
+    x = descend(misfit, misfit.base[misfit.free][None], box, steps=_REFITS, tolerance=1e-6)
+    variances = np.maximum(np.diag(spread)[:count], 1e-300)
+    step = spread[:count] * (half / variances)[:, None]
+    ends = np.clip(np.concatenate([x.x - step, x.x + step]), box.low, box.high)
+    held = np.tile(np.eye(count, len(spread), dtype=np.bool_), (2, 1))
+    moved = np.abs((ends - x.x)[held]).reshape(2, count)
+    away = descend_each(misfit, ends, box, steps=_REFITS, tolerance=1e-4, held=held)
+    lowest = int(np.argmin(away.cost))
+    if away.cost[lowest] < x.cost[0] - rise:
+        better = misfit.base.copy()
+        better[misfit.free] = away.x[lowest]
+        return np.stack([half, half]), better
+    expected = rise * (moved / np.maximum(half, 1e-300)) ** 2
+    risen = (away.cost.reshape(2, count) - x.cost[0]) / np.maximum(expected, 1e-300)
+    # At a bound there is no way out, and where rounding leaves no interval nothing to be held against.
+    risen = np.where(moved > 1e-9 * box.size[:count], risen, 1.0)
+    return half * np.sqrt(np.maximum(_PARABOLA / np.maximum(risen, _LEAST_RISE), 1.0)), None
+
+
+def _rivals(descent: Descent, searched: tuple[Array, tuple[int, ...]], excess: float) -> Array:
+    # All values (rivals, parameters) at the ends whose cost the noise cannot tell from the lowest.
+    base, free = searched
+    ends = descent.x[descent.cost <= descent.cost[0] + excess]
+    rivals = np.repeat(base[None], len(ends), axis=0)
+    rivals[:, list(free)] = ends
+    return rivals
 
 
 def _coarse(data: Measured, coarse: Measured, weight: Array) -> Array:

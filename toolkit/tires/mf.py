@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.channels import Axes, signs
 from toolkit.tires.global_model import Responses, parameters
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine, state
@@ -164,6 +165,11 @@ class Forces:
     FX: Array
     FY: Array
     MZ: Array
+
+    def in_axes(self, axes: Axes) -> Forces:
+        """Return the same forces in another axis system; what is zero has no sign there either."""
+        turn = signs("ISO-W", axes)
+        return Forces(FX=self.FX + 0.0, FY=turn["FY"] * self.FY + 0.0, MZ=turn["MZ"] * self.MZ + 0.0)
 
 
 Evaluator = Callable[..., Forces]

@@ -11,11 +11,15 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.errors import CellError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N, STIFFNESS
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.tires.model import CurveFit
 
 # The largest size [SI] by dimension; of a slip or inclination angle any, of the two angles that turn on none.
@@ -29,6 +33,7 @@ _CHARACTERISTIC = {
 }  # fmt: skip
 _SHOWN = {"rad": "90 deg"}
 _SURE = 3.0  # standard errors
+_ZERO = 0.02  # of the largest load: a lifted wheel reads as much, of either sign
 
 
 def demand_possible(value: float, unit: str, *, where: str, U: bool = False) -> None:
@@ -52,6 +57,38 @@ def demand_possible(value: float, unit: str, *, where: str, U: bool = False) -> 
         expected=f"0 to {printed}" if U else f"at most {printed}",
         next_step="correct the cell, or the unit in the header",
         rule="wrong-value",
+    )
+
+
+def load_of(
+    FZ: NDArray[np.float64], *, where: str, rows: Sequence[int] | None = None, spikes: float = 0.0
+) -> NDArray[np.float64]:
+    """Return the load [N], not negative: FZ in whatever sense its axes give it, one sense in all rows.
+
+    Parameters
+    ----------
+    rows : numbers of the rows as the file counts them
+    spikes : part of the rows that may have the other sense, as single samples of a fast recording do
+
+    Raises
+    ------
+    CellError
+        ``mixed-load-signs``: rows of both signs, by more than the zero of a load cell
+    """
+    size = np.abs(FZ)
+    largest = int(np.argmax(size)) if len(FZ) else 0
+    away = np.flatnonzero((np.sign(FZ) == -np.sign(FZ[largest])) & (size > _ZERO * size[largest]))
+    if len(away) <= spikes * len(FZ):
+        return np.asarray(size, dtype=np.float64)
+    number = int(away[0]) + 1 if rows is None else rows[away[0]]
+    raise CellError(
+        "FZ has both signs",
+        where=f"{where}, row {number}",
+        got=f"{FZ[away[0]]:.6g} N, and {FZ[largest]:.6g} N in another row; {len(away)} of {len(FZ)} have "
+        "that sign",
+        expected="one sign in all rows: the load, positive (ISO 8855) or negative (SAE J670)",
+        next_step="correct those rows: no tire pulls at the road",
+        rule="mixed-load-signs",
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from toolkit.channels import AXES, Axes
 from toolkit.errors import ConfigError, FitError
 from toolkit.tires.field_file import FieldFile, read_field_file
+from toolkit.tires.plausibility import load_of
 from toolkit.tires.table import TireTable
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
         ``no-curve``: nothing of it is a sweep
     """
     columns = dict(file.columns)
-    load = np.abs(columns["FZ"])
+    load = load_of(columns["FZ"], where=f"{file.path}, channel FZ", spikes=_LEAST)
     slip = columns.get("KAPPA")
     driven = slip is not None and float(np.quantile(np.abs(slip), 0.99)) > _DRIVEN
     swept = "KAPPA" if driven else "SA"

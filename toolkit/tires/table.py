@@ -3,9 +3,9 @@
     SA [deg],FZ [N],FY [N],MZ [N*m]        optional: IA [deg], P [kPa], V [km/h], FX [N], KAPPA [1], t [s]
 
 Where semicolons or tabs stand between the cells, numbers may have decimal commas. A column is called by its
-channel's symbol, name or alias, in any case. FZ may have either sign and is the load. The axis system is
-declared, never guessed. A column of text, named `calibration` and without a unit, may say how the record
-stands that the numbers rest on: `convert` writes it.
+channel's symbol, name or alias, in any case. FZ may have either sign, one in all rows, and is the load. The
+axis system is declared, never guessed. A column of text, named `calibration` and without a unit, may say how
+the record stands that the numbers rest on: `convert` writes it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from toolkit.findings import Finding
 from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign, first_line
-from toolkit.tires.plausibility import LARGEST
+from toolkit.tires.plausibility import LARGEST, load_of
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -110,7 +110,8 @@ def read_table(
     UnitError
         a unit is unknown or of another dimension
     CellError
-        text, an empty cell, NaN or infinity in a number's place, or a value that no tire can have
+        text, an empty cell, NaN or infinity in a number's place, a value that no tire can have, loads of
+        both signs
     """
     if axes not in AXES:
         raise ConfigError(
@@ -162,7 +163,9 @@ def read_table(
             path,
             [cell_text for cell_text, _ in lines[1:]],
         )
-        columns.append((symbol, np.abs(si) if symbol == "FZ" else si))
+        numbered = [number for number, _ in lines[1:]]
+        where = f"{path}, column {cell.strip()!r}"
+        columns.append((symbol, load_of(si, where=where, rows=numbered) if symbol == "FZ" else si))
     return TireTable(
         path=path,
         axes=_AXES[axes],

@@ -13,7 +13,7 @@ from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.reduction.physics import departures, of_sizes
-from toolkit.tires.conditions import Selection, of_one_condition
+from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.evaluate import slope_estimate_at, value_at
 from toolkit.tires.fit import Curve, fit_curves, why_not
 from toolkit.tires.global_data import load_blocks, loaded_blocks

@@ -148,6 +148,18 @@ def test_what_the_check_loads_cannot_verify_goes_to_the_ledger(
     assert event["unverifiable"] == answer["unverifiable"]
 
 
+def test_copies_of_rows_of_the_fit_verify_no_term(
+    run: Run, registry: Registry, make_session: Callable[..., Path]
+) -> None:
+    values = hub_data(60, 1)
+    copied = np.array([[float(f"{one:.6g}") for one in row] for row in values[:12]])
+    calibrate(make_session(values, check_rows=copied, name="copied"), registry)
+    code, answer = run("approve", "hub-r2", *FROM)
+    assert (code, answer["approved"]) == (0, True)
+    terms = {f"{load}: {cell}" for load in ("FY", "MZ", "MX") for cell in ("D51", "D52", "E5")}
+    assert terms <= set(answer["unverifiable"])
+
+
 def test_show_tells_range_check_loads_and_head(run: Run, registry: Registry) -> None:
     code, answer = run("show", "hub-r1")
     rows, check = hub_data(60, 1).round(7), hub_data(9, 2).round(7)

@@ -122,8 +122,7 @@ def test_what_is_stated_goes_in_by_hand_calculation() -> None:
     )  # fmt: skip
     made = calibration_budget(record, table, None, "F", 500.0, temperature=Temperature(half_range_K=10.0))  # type: ignore[arg-type]
     wanted = {
-        # U is that of the largest load, 1000 N, and the standard's error is in proportion to the load.
-        "reference": 0.15,
+        "reference": 0.3,  # U = 0.6 N with k = 2 is stated of every load
         "resolution": 500 * 1e-4 / math.sqrt(6),  # ISO 376 annex C: r/sqrt(6) of two readings
         "indication": 500 * 2e-4,
         "zero": 500 * 6e-4 / math.sqrt(3),
@@ -135,6 +134,18 @@ def test_what_is_stated_goes_in_by_hand_calculation() -> None:
     assert made.not_stated == ()
     assert made.u == pytest.approx(math.sqrt(sum(part.u**2 for part in made.components)))
     assert sum(made.share(part) for part in made.components) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "U", "expected"), [("N", 0.6, (0.3, 0.3, 0.3)), ("%", 0.06, (0.0, 0.15, 0.3))]
+)
+def test_an_amount_holds_at_every_load_and_a_share_grows(
+    unit: str, U: float, expected: tuple[float, ...]
+) -> None:
+    record, table = simple(reference={"uncertainty": {"F": {"U": U, "k": 2, "unit": unit}}})
+    for at, u in zip((0.0, 500.0, 1000.0), expected, strict=True):
+        made = calibration_budget(record, table, None, "F", at)  # type: ignore[arg-type]
+        assert made.component("reference").u == pytest.approx(u, abs=1e-9)
 
 
 def test_what_is_not_stated_is_listed_with_zero() -> None:

@@ -119,6 +119,15 @@ def test_a_shared_standard_by_dense_algebra(tmp_path: Path, error: str) -> None:
         assert "held by the fit's covariance" in reference.description
 
 
+def test_rows_state_their_own_reference_around_a_load(tmp_path: Path) -> None:
+    y = np.tile(np.linspace(0.0, 800.0, 9), 3)
+    x = (y / 400 + np.random.default_rng(6).normal(0, 1e-3, 27)).round(6)
+    u = np.where(y < 400, 0.2, 0.4)  # the lower range of the standard is the better one
+    case = Case(tmp_path, x, y, method="ols", u=u, run=np.repeat([1, 2, 3], 9).tolist())
+    parts = [case.budget(at).component("reference").u for at in (0.0, 200.0, 350.0, 600.0)]
+    assert parts == pytest.approx([0.2, 0.2, 0.3, 0.4])
+
+
 @pytest.mark.parametrize(("method", "tail"), [("wls", ""), ("odr", "[cells.S]\nu = 1e-4\n")])
 def test_the_parts_of_such_a_budget_add_up(tmp_path: Path, method: str, tail: str) -> None:
     """u^2 is the sum of the parts, U = k u, and the type B fit adds no degrees of freedom."""
@@ -134,8 +143,8 @@ def test_the_parts_of_such_a_budget_add_up(tmp_path: Path, method: str, tail: st
     budget = case.budget(600.0)
     parts = [one for one in budget.components if one.u > 0]
     assert {"reference", "fit", "repeatability"} <= {one.name for one in parts}
-    # U = 0.8 N with k = 2 at the largest load of 800 N, in proportion to the load.
-    assert budget.component("reference").u == pytest.approx(0.3)
+    # U = 0.8 N with k = 2 holds at 600 N as at the largest load of 800 N.
+    assert budget.component("reference").u == pytest.approx(0.4)
     total = math.sqrt(sum(one.u**2 for one in parts))
     assert budget.u == pytest.approx(total, rel=1e-12)
     # What the rows' scatter gives together is one estimate, with degrees of freedom of its own.

@@ -136,14 +136,18 @@ print("left:", input())
 def test_the_same_question_is_asked_once(tmp_path):
     text = (
         START
-        + "global asked\n    asked += 1\n    return pd.DataFrame({'F': inputs['v'] * asked})\nasked = 0\n"
+        + "asked.append(p['mass'])\n    return pd.DataFrame({'F': inputs['v'] * p['mass']})\nasked = []\n"
     )
     case = read_case(write_case(tmp_path, simulator=text))
     model = model_of(case, None)
     assert isinstance(model, PythonModel)
+    asked = model._called.__self__._function.__globals__["asked"]
     first = model.simulate(case.runs[0], {"mass": 1.0}, ())["F"]
+    before = len(asked)
     again = model.simulate(case.runs[0], {"mass": 1.0}, ())["F"]
+    assert len(asked) == before
     other = model.simulate(case.runs[0], {"mass": 2.0}, ())["F"]
+    assert asked[before:].count(2.0) == len(asked) - before > 0
     np.testing.assert_array_equal(first, again)
     np.testing.assert_array_equal(other, 2 * first)
 

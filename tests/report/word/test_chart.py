@@ -180,5 +180,6 @@ def test_a_narrow_chart_has_small_texts_as_a_narrow_picture_has(tmp_path: Path) 
             root = etree.fromstring(archive.read(chart))
         return int(root.findall(f"{C}txPr//{{{NS['a']}}}defRPr")[0].get("sz"))
 
-    assert size("160mm") == 900
-    assert size("80mm") == pytest.approx(450, rel=0.01)
+    # Nine points at the width of a drawn figure, 6.3 inches.
+    assert size("140mm") == pytest.approx(900 * 140 / 160.02, rel=0.01)
+    assert size("70mm") == pytest.approx(900 * 70 / 160.02, rel=0.01)

@@ -50,6 +50,12 @@ FIELD = (
         (sdt("tk:figure.gough", p("")) + p("{{tk:figure.gough}}"), "doubled-tag"),
         (p("{{tk:chart.gough}}") + p("{{tk:chart.gough}}"), "doubled-tag"),
         (p("{{tk:chart.rain}}"), "unknown-tag"),
+        (p("{tk:tire.size}"), "malformed-tag"),
+        (p("[[tk:", "tire.size]]"), "malformed-tag"),
+        (p("｛｛tk:tire.size｝｝"), "malformed-tag"),
+        (p(FIELD.format(' HYPERLINK "http://x.org/{{tk:report.id}}" ')), "wrong-place"),
+        (p('<w:r><w:drawing><wp:inline><wp:docPr id="1" name="x" descr="of {{tk:tire.size}}"/></wp:inline></w:drawing></w:r>'), "wrong-place"),
+        (p('<w:r><w:pict><v:shape xmlns:v="urn:schemas-microsoft-com:vml"><v:textpath string="No {{tk:report.id}}"/></v:shape></w:pict></w:r>'), "wrong-place"),
         (p("{{tk:chart.models_fy}}"), "not-as-chart"),
         (p("{{tk:chart.gough|.2f}}"), "bad-format"),
         (p("{{tk:row.SA}}"), "wrong-place"),
@@ -348,3 +354,21 @@ def test_a_tag_may_ask_for_any_result_as_a_condition(tmp_path: Path) -> None:
     for name in ("figure.gough", "table.pull", "caption.gough", "calibration.FY.E5", "report.opinions"):
         expected = ["unknown-tag"] if name == "report.opinions" else []
         assert rules(tmp_path, sdt(f"tk:if.{name}", p("x"))) == expected, name
+
+
+@pytest.mark.parametrize(
+    ("lost", "rule", "says"),
+    [
+        ("word/_rels/document.xml.rels", "zip-damaged", "a relation that the template lacks"),
+        ("word/document.xml", "not-word", "lacks its main document"),
+    ],
+)
+def test_a_package_with_a_hole_is_refused_for_what_it_lacks(
+    tmp_path: Path, lost: str, rule: str, says: str
+) -> None:
+    def edit(members: dict[str, bytes]) -> None:
+        members.pop(lost)
+
+    with pytest.raises(TemplateError, match=says) as caught:
+        opened(tmp_path, p("{{tk:tire.size}}"), header=p("x"), edit=edit)
+    assert caught.value.rule == rule

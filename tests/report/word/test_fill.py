@@ -253,6 +253,10 @@ def test_pictures_take_the_width_asked_or_of_their_place(tmp_path: Path) -> None
     column = section.page_width - section.left_margin - section.right_margin
     assert extents(result)[1] == pytest.approx(column / 36000, abs=0.1)
     assert "see  here" in texts(result.docx)
+    # No wider than the page, whatever is asked.
+    assert extents(filled(tmp_path, p("{{tk:figure.gough|width=400mm}}"))) == [
+        pytest.approx(column / 36000, abs=0.1)
+    ]
     # A cell of no stated width has its share of the page, and within a cell of the cell.
     shared = filled(
         tmp_path, tbl(["a", p("{{tk:figure.gough}}")], ["b", tbl(["c", p("{{tk:figure.prat}}")])])

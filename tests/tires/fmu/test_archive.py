@@ -14,7 +14,7 @@ import toolkit
 from tests.conftest import SHARED_DATA
 from tests.tires.fmu.fmu_factory import grid, outputs_of
 from toolkit.errors import ConfigError
-from toolkit.tires.conditions import Selection
+from toolkit.reduction.selection import Selection
 from toolkit.tires.fmu import archive
 from toolkit.tires.fmu.archive import fmu_of
 from toolkit.tires.fmu.equations import equations_of_file, equations_of_fit

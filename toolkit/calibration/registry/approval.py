@@ -16,7 +16,7 @@ from toolkit.calibration.registry.judgement import judge_stored, machine_of, rea
 from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.calibration.registry.status import RecordStatus, parse_interval, status_of
 from toolkit.calibration.registry.store import Change
-from toolkit.calibration.registry.stored import stored_check
+from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.errors import RegistryError, ToolkitError
 from toolkit.findings import Finding
 from toolkit.inputs import read_regular
@@ -153,7 +153,8 @@ def approve(
             )  # fmt: skip
         judged = judge_stored(registry, record, ledger, machine=definition, readings=readings, reason=reason)
         failed = judged.failed
-        terms = gates.unverifiable(record, stored_check(registry.folder, record))
+        check, loads = stored_check(registry.folder, record), stored_loads(registry.folder, record)
+        terms = gates.unverifiable(record, check, loads)
         findings = tuple(
             Finding(rule=result.rule, where=result.where, message=result.message) for result in failed
         )

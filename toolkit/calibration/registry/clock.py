@@ -81,6 +81,11 @@ def begun(day: date, at: datetime | None = None) -> bool:
     return day <= ((at or datetime.now(tz=UTC)) + _EARLIEST_ZONE).date()
 
 
+def in_future(day: date) -> str:
+    """Return what is said of a test whose day has not begun."""
+    return f"the test is dated {day.isoformat()}, in the future: what will be in force then cannot be known"
+
+
 def check_begun(day: date, what: str, where: object) -> None:
     """Refuse a day in the future; ``what`` names it, such as "the session".
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.calibration.fit.printed_digits import copies
 from toolkit.calibration.registry.response import (
     Response,
     largest_load,
@@ -180,14 +181,19 @@ def check_loads(record: CalibrationRecord, check: Table) -> tuple[GateResult, ..
     return tuple(failed)
 
 
-def unverifiable(record: CalibrationRecord, check: Table | None) -> tuple[str, ...]:
+def unverifiable(
+    record: CalibrationRecord, check: Table | None, loads: Table | None = None
+) -> tuple[str, ...]:
     """Return the terms that the check loads cannot verify, as "load: term".
 
     A term is verified where the check set has full column rank and the term's contribution over it,
     |c_i| dX_i, exceeds five tolerances: only then would a flipped or lost coefficient show. The intercept
-    has no range; it is verified with the rank alone.
+    has no range; it is verified with the rank alone. Check loads that repeat rows of the fit, ``loads``, were
+    not applied again and verify nothing.
     """
     names: list[str] = []
+    if check is not None and loads is not None:
+        check = _apart(record, check, loads)
     for load in record.loads:
         if check is None:
             names += [f"{load.load}: {term}" for term in load.terms]
@@ -202,6 +208,23 @@ def unverifiable(record: CalibrationRecord, check: Table | None) -> tuple[str, .
             if lost[at] or (term != INTERCEPT and not effect[at] > VERIFIED * tolerance)
         ]
     return tuple(names)
+
+
+def _apart(record: CalibrationRecord, check: Table, loads: Table) -> Table | None:
+    """Return the check loads that are no copies of rows of the fit; None where all are."""
+    names = [*record.indications, *(load.load for load in record.loads)]
+    scatter = []
+    for name in record.indications:
+        moved = [
+            load.residual_sd / abs(c)
+            for load in record.loads
+            for term, c in zip(load.terms, load.coefficients, strict=True)
+            if term == name and c != 0 and load.residual_sd is not None
+        ]
+        scatter.append(min(moved, default=0.0))
+    apart = np.ones(check.rows, dtype=np.bool_)
+    apart[list(copies(check.matrix(names), loads.matrix(names), scatter + [0.0] * len(record.loads)))] = False
+    return check.only(apart) if apart.any() else None
 
 
 def _undetermined(matrix: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> list[bool]:

@@ -15,7 +15,7 @@ from datetime import date
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
-from toolkit.calibration.registry.clock import today
+from toolkit.calibration.registry.clock import in_future, today
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.judgement import judge_stored, machine_of
 from toolkit.calibration.registry.status import parse_interval
@@ -207,10 +207,7 @@ def _reasons(
         text = "the test has no date: which record was in force cannot be told"
         reasons.append(Reason(text=text, next_step="write 'date = YYYY-MM-DD' into test.toml"))
     elif on > today():
-        text = (
-            f"the test is dated {on.isoformat()}, in the future: what will be in force then cannot be known"
-        )
-        reasons.append(Reason(text=text, next_step="correct the date in test.toml"))
+        reasons.append(Reason(text=in_future(on), next_step="correct the date in test.toml"))
     elif not void and status.in_force_from is not None:
         reasons += _by_day(registry, record, status, on, known_on)
     return tuple(reasons)

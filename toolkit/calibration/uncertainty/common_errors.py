@@ -7,9 +7,10 @@ differences where they must. Beside the scatter of the fit, which V_fit holds, f
 - *scale*: had the reference applied (1 + e) times the load it states, least squares, linear in the loads,
   would have returned (1 + e) c: every coefficient, the intercept too. So V_scale = u(e)^2 c c^T, and the
   error of a load is e f(x): it grows with the load, is zero at zero load, and stays in every sum that is
-  not zero. u(e) is u(reference) over the largest calibrated load, where the stated U is meant, whether it
-  was stated as an amount or as a share of the load; the budget reads it so too. Creep, a part of the load as
-  well, is added to it.
+  not zero. u(e) is u(reference) over the largest calibrated load. Of a U that is stated as an amount this is
+  the part that a test's sums and slopes keep: the standard and the cells are zeroed without load, and a shift
+  that is left at every other load alike has no place in a linear equation. The budget of a single load has
+  the amount at every load. Creep, a part of the load as well, is added to it.
 - *offset*: a stated uncertainty of an indication, and the drift of its zero over the session, are taken as
   one shift common to all rows of a test: V_offset has them on the intercept. It cancels in slopes and in
   differences, and with a tare where the record's intercept does (``zero = "included"``).

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.session.known_errors import row_uncertainty
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.common_errors import (
     creep,
@@ -58,7 +59,7 @@ def components_of(
     total += new.variance if scatter.runs.groups > 1 else 0.0
     dof = scatter.dof(curve.gradient + _READING + new.gradient, total)
     return (
-        _reference(statements, load, value),
+        _reference(statements, load, value, loads),
         _fit(record, load, point, curve),
         _repeatability(scatter),
         _reproducibility(scatter, new),
@@ -102,28 +103,39 @@ def _new_run(s: Scatter, share: float) -> _Variance:
     return _Variance(variance=variance, gradient=gradient, dof=s.dof(gradient, variance) if variance else 1.0)
 
 
-def _reference(statements: Statements, load: LoadFit, value: float) -> Component:
+def _reference(statements: Statements, load: LoadFit, value: float, loads: Table) -> Component:
+    """Return what the standard is uncertain by at a load: an amount at every load alike, or a share."""
     stated = statements.reference.of(load.load)
     if stated is None and load.reference_u is not None:
-        size = f"{load.reference_u:.4g} {load.unit}"
-        text = f"u_{load.load} of the rows, at most {size}: u at the largest load, in proportion to the load"
-        u = load.reference_u * abs(value) / load.largest
+        text = f"u_{load.load} of the rows around the load, at most {load.reference_u:.4g} {load.unit}"
+        u = _of_rows_around(loads, load, value)
         return _part("reference", text, "B", "normal", u, math.inf, "session")
     if stated is None:
         return _absent("reference", "no uncertainty of the reference standard is stated", "session")
     if load.method == "gls" and statements.reference.shared_group is not None:
         text = "held by the fit's covariance: its rows share the reference's error (gls)"
         return _part("reference", text, "B", "normal", 0.0, math.inf, "session")
-    # The error of a standard is one scale, as in all that the record computes (`propagation`).
     if stated.relative is None:
-        size = f"{stated.U:.4g} {load.unit} at the largest load, in proportion to the load"
+        size = f"{stated.U:.4g} {load.unit} at every load"
     else:
         size = f"{100 * stated.relative:.4g} % of the load"
     text = f"certificate: U = {size}, with k = {stated.k:g}"
     digital = statements.reference.digital
     if digital is not None and (place := digital.place(load.load)) is not None:
         text += f"; {digital.file} (sha256 {digital.sha256[:12]}) {place}"
-    return _part("reference", text, "B", "normal", stated.u * abs(value) / load.largest, math.inf, "session")
+    u = float(stated.u_at(np.asarray(value, dtype=np.float64)))
+    return _part("reference", text, "B", "normal", u, math.inf, "session")
+
+
+def _of_rows_around(loads: Table, load: LoadFit, value: float) -> float:
+    """Return the standard uncertainty that rows state around a load: between levels in proportion."""
+    u = row_uncertainty(loads, load.load)
+    if u is None:
+        return load.reference_u or 0.0
+    level, place = np.unique(np.abs(loads.column(load.load)), return_inverse=True)
+    most = np.zeros(len(level))
+    np.maximum.at(most, place.ravel(), u)
+    return float(np.interp(abs(value), level, most))
 
 
 def _fit(record: CalibrationRecord, load: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
+from toolkit.diagnosis.law.among_runs import tells_runs_apart_alone
 from toolkit.diagnosis.law.pulses import pulses_of
 from toolkit.diagnosis.law.ranking import p_value, ranked, responses
 from toolkit.diagnosis.law.terms import terms_of
@@ -215,6 +216,13 @@ def _judged(
             for simulated in (held_out.simulated, scores.simulated)
         ]
         share = _taken(problem, *errors)
+        name = str(applied.channel)
+        if search.folds.by_run and name in problem.names:
+            kept = [rows.start + np.flatnonzero(problem.kept[name][rows]) for rows in problem.slices]
+            columns = (held_out.simulated[name], *(each[name] for each in errors))
+            runs = [tuple(column[at] for column in columns) for at in kept if len(at)]
+            if tells_runs_apart_alone(trial, looked, runs):
+                return None
     moved = [
         parameter.name
         for parameter, before, after in zip(problem.free, base.p, made.p, strict=True)

@@ -13,7 +13,7 @@ import numpy as np
 from toolkit.diagnosis.law.shapes import MODE, ONE, REMEMBERING, TONE, TWO, UNLOCKED, Shape, curve, rung
 from toolkit.diagnosis.law.trial import Signal, Trial, bracketed, started, trial_at
 from toolkit.diagnosis.policy import LAWS, STRUCTURE
-from toolkit.diagnosis.search.unexplained import strongest_events, strongest_line
+from toolkit.diagnosis.search.unexplained import beyond_its_past, strongest_events, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.setting import dimension
 from toolkit.effects.law import ITSELF, formula
@@ -109,6 +109,8 @@ def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
     """
     line = strongest_line(problem, output, base.residual[output])
     if line is None or line.p_value >= STRUCTURE.line or line.share <= STRUCTURE.line_share:
+        return None
+    if beyond_its_past(problem, output, base.residual[output], line) >= STRUCTURE.line:
         return None
     longest = max(float(np.ptp(run.t)) for run in problem.runs if run.rows)
 

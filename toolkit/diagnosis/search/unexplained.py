@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit
+from toolkit.diagnosis.fit.noise import Autoregression, fit_noise, log_likelihood, whiten
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE
@@ -26,11 +27,15 @@ _TOO_LARGE = ("more than its stated noise",)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance."""
+    """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance.
+
+    ``width`` is what the shortest run leaves open of its frequency [1/s].
+    """
 
     frequency: float
     p_value: float
     share: float
+    width: float
 
 
 def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
@@ -67,13 +72,50 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
     p = min(1.0, len(power) * _tail(ratio[k], len(runs)))
     line_power = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
     share = max(0.0, float(line_power / max(power[1:].sum(), 1e-300)))
-    return Line(frequency=k / (n * step), p_value=p, share=share)
+    return Line(frequency=k / (n * step), p_value=p, share=share, width=1 / (n * step))
 
 
 def _level(power: NDArray[np.float64], k: int) -> float:
     low, high = max(1, k - STRUCTURE.line_around), min(len(power), k + STRUCTURE.line_around + 1)
     around = np.concatenate([power[low : max(low, k - 2)], power[min(high, k + 3) : high]])
     return float(np.median(around)) if len(around) else 0.0
+
+
+def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], line: Line) -> float:
+    """Return the chance that coloured noise has waves as large, each run's of its own phase.
+
+    Noise that came through a resonance of the plant has a peak in its spectrum as well, as narrow as the line
+    of a short run. But its own past foretells it, and beside that past a wave explains nothing more.
+    """
+    from scipy.stats import chi2
+
+    where = problem.layout(name)
+    values = residual[where.index]
+    noise = fit_noise(values, where, floor=problem.floor[name])
+    columns = 2 * len(problem.runs)
+
+    def likelihood(frequency: float) -> float:
+        """Return the log-likelihood beside waves by ordinary or by generalised least squares."""
+        waves = np.zeros((problem.rows, columns))
+        for k, (run, place) in enumerate(zip(problem.runs, problem.slices, strict=True)):
+            angle = 2 * np.pi * frequency * (run.t - run.t[0])
+            waves[place, 2 * k], waves[place, 2 * k + 1] = np.cos(angle), np.sin(angle)
+        reached = -math.inf
+        for weights in (Autoregression(reflection=(), sd=1.0), noise):
+            white = whiten(np.column_stack([waves[where.index], values]), where, weights)
+            left = values - waves[where.index] @ np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=None)[0]
+            there = fit_noise(left, where, floor=problem.floor[name], used=columns)
+            reached = max(reached, log_likelihood(left, where, there))
+        return reached
+
+    best, frequency = -math.inf, line.frequency
+    for reach in (line.width, line.width / 8):
+        near = [(likelihood(at), at) for at in frequency + reach * np.linspace(-1, 1, 17)]
+        best, frequency = max((best, frequency), *near)
+    gain = 2 * (best - log_likelihood(values, where, noise))
+    # As many frequencies were looked at as half the rows of a run.
+    looked = 0.5 / (line.width * float(np.median(np.diff(problem.runs[0].t))))
+    return min(1.0, looked * float(chi2.sf(max(gain, 0.0), columns + 1)))
 
 
 def _tail(ratio: float, runs: int) -> float:

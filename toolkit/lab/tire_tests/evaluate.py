@@ -30,6 +30,7 @@ def evaluate_grid(
     forces, findings = evaluate_tir(
         file, SA=turn["SA"] * table["SA"], FZ=table["FZ"], angles=angles, **optional
     )
+    turned = forces.in_axes(table.axes)
     if mark is not None:
         findings = (*findings, Finding(rule="draft", where=file.where, message=mark, level="error"))
     replaced = [name for name in COMPUTED if table.get(name) is not None]
@@ -40,9 +41,9 @@ def evaluate_grid(
             Finding(rule="grid-columns", where=str(table.path), message=text, level="note"),
         )
     values = {
-        "FX": forces.FX.tolist(),
-        "FY": (turn["FY"] * forces.FY).tolist(),
-        "MZ": (turn["MZ"] * forces.MZ).tolist(),
+        "FX": turned.FX.tolist(),
+        "FY": turned.FY.tolist(),
+        "MZ": turned.MZ.tolist(),
     }
     return values, findings
 

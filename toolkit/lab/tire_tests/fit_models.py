@@ -96,6 +96,31 @@ def fit_table_models(
     return replace(fitted, sweeps=sweeps)
 
 
+_NEXT_STEPS = {
+    ".tdx": "make a table of it: toolkit convert {name} {stem}.csv",
+    ".tir": "a tire file is a fit already: toolkit evaluate {name} GRID.csv",
+    ".txt": "give a table the name {stem}.csv",
+    ".tsv": "give a table the name {stem}.csv",
+}
+
+
+def refuse_other_files(source: Path) -> None:
+    """Refuse a file that is neither a test nor a table, with the way to one.
+
+    Raises
+    ------
+    ConfigError
+        ``fit-source``
+    """
+    step = _NEXT_STEPS.get(source.suffix.lower())
+    if step is not None and source.is_file():
+        raise ConfigError(
+            "models are not fitted to a file of this kind", where=source, got=f"a {source.suffix} file",
+            expected="a test (its folder, or reduced as .xlsx), a table (.csv), a belt test (.mat, .dat)",
+            next_step=step.format(name=source.name, stem=source.stem), rule="fit-source",
+        )  # fmt: skip
+
+
 def fit_test_models(
     test: Path,
     names: Sequence[str],

@@ -139,7 +139,7 @@ class Tire(Face):
 
         Parameters
         ----------
-        data : ``SA`` and ``FZ``, optional ``IA``, ``KAPPA``, ``P``, ``V``, with their units
+        data : ``SA`` and ``FZ`` of one sign, optional ``IA``, ``KAPPA``, ``P``, ``V``, with their units
         units : unit by column name, for columns without
         axes : of the data and of the answer
         angles : ``star`` for tan(alpha) and sin(gamma), ``raw`` for MF-Tyre's
@@ -154,14 +154,16 @@ class Tire(Face):
         import pandas as pd
 
         from toolkit.channels import CHANNELS, signs
+        from toolkit.tires.plausibility import load_of
         from toolkit.tires.tir_evaluate import evaluate_tir
 
         columns = columns_of(data, ("SA", "FZ"), units=units, optional=("IA", "KAPPA", "P", "V"))
         si = {name: column.to(CHANNELS[name].si, where=name) for name, column in columns.items()}
         turn = signs(axes, "ISO-W")
-        forces, _ = evaluate_tir(self.result, angles=angles, **si | {"SA": turn["SA"] * si["SA"]})
+        turned = si | {"SA": turn["SA"] * si["SA"], "FZ": load_of(si["FZ"], where="FZ")}
+        forces = evaluate_tir(self.result, angles=angles, **turned)[0].in_axes(axes)
         return pd.DataFrame(
-            {"FX [N]": forces.FX, "FY [N]": turn["FY"] * forces.FY, "MZ [N*m]": turn["MZ"] * forces.MZ},
+            {"FX [N]": forces.FX, "FY [N]": forces.FY, "MZ [N*m]": forces.MZ},
             index=getattr(data, "index", None),
         )
 

@@ -81,7 +81,7 @@ def collect(
         loads,
         check,
         rule=stated.rule if check is not None else None,
-        unverifiable=unverifiable(record, check),
+        unverifiable=unverifiable(record, check, loads),
         found=None if as_found_result is None else _found_session(registry, as_found_result),
         as_left=statements.phase == "as_left",
     )

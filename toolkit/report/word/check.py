@@ -27,6 +27,7 @@ from toolkit.report.word.scan import (
     row_in,
     scan,
     table_of,
+    unbraced,
 )
 from toolkit.report.word.xml import (
     SDT_CONTENT,
@@ -75,7 +76,7 @@ def check_stories(
     findings = [
         *_tags(sites, style, words),
         *_tables(sites, words),
-        *_broken(parts),
+        *_broken(parts, words),
         *surroundings(package, parts, style),
         *placeholders(parts, style),
     ]
@@ -325,7 +326,7 @@ def _untagged(site: Site, table: Element, columns: list[str]) -> Iterator[LintFi
         )
 
 
-def _broken(parts: list[Story]) -> Iterator[LintFinding]:
+def _broken(parts: list[Story], words: Vocabulary) -> Iterator[LintFinding]:
     for story in parts:
         for paragraph in broken_literals(story):
             yield LintFinding(
@@ -343,6 +344,15 @@ def _broken(parts: list[Story]) -> Iterator[LintFinding]:
                 place=place_of(element, story),
                 message=f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters",
             )
+        for element, path in unbraced(story):
+            if words.entry(path) is not None:
+                yield LintFinding(
+                    rule="malformed-tag",
+                    level="error",
+                    part=story.name,
+                    place=place_of(element, story),
+                    message=f"tk:{path} would be printed as it stands: write {{{{tk:{path}}}}}",
+                )
 
 
 __all__ = ["RULES", "LintFinding", "check_stories", "check_template"]

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
+from urllib.parse import unquote
 
 from lxml import etree
 
@@ -116,6 +117,8 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
                     "styles or of captions, in the body, are",
                 )
     yield from _unreached(package, parts)
+    for story in parts:
+        yield from _aside(story)
     names = _style_names(package)
     for use, name in style.styles:
         if name.lower() not in names:
@@ -165,6 +168,32 @@ def _unreached(package: Any, parts: list[Story]) -> Iterator[LintFinding]:
                 place="part",
                 message="a literal tag stands in a formula, a diagram or a chart, where nothing is filled",
             )
+
+
+def _aside(story: Story) -> Iterator[LintFinding]:
+    """Find literal tags beside the text: in alternative texts, drawn words, codes of fields, links."""
+    found = [
+        (element, "an alternative text, a drawn word or another property")
+        for element in story.root.iter(etree.Element)
+        if element.tag != q("w:alias") and any(_TAG.search(str(value)) for value in element.attrib.values())
+    ]
+    found += [
+        (element, "the code of a field") for element, code in walk_fields(story.root) if _TAG.search(code)
+    ]
+    targets = {rel.rId for rel in story.part.rels.values() if _TAG.search(unquote(rel.target_ref))}
+    found += [
+        (element, "the address of a link")
+        for element in story.root.iter(q("w:hyperlink"))
+        if element.get(q("r:id")) in targets
+    ]
+    for element, where in {id(element): (element, where) for element, where in found}.values():
+        yield LintFinding(
+            rule="wrong-place",
+            level="error",
+            part=story.name,
+            place=place_of(element, story),
+            message=f"a literal tag stands in {where}, where nothing is filled",
+        )
 
 
 # Which fonts a template asks for, and which of them this machine cannot show as they are.

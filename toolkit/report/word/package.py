@@ -84,6 +84,7 @@ def read_template(path: Path) -> Template:
     _check_relationships(path, members)
     for name, data in members.items():
         _check_member(path, name, data)
+    _check_references(path, members)
     return Template(path=path, sha256=sha256, data=_document(members) if kind == TEMPLATE else raw)
 
 
@@ -243,8 +244,13 @@ def _main_part(path: Path, members: dict[str, bytes]) -> str:
         if (rel.get("Type") or "").endswith("/officeDocument"):
             name = (rel.get("Target") or "").lstrip("/")
             kind = overrides.get(name, "")
-            if kind in (DOCUMENT, TEMPLATE) and name in members:
-                return kind
+            if kind in (DOCUMENT, TEMPLATE):
+                if name in members:
+                    return kind
+                raise _refuse(
+                    path, "not-word", "the template lacks its main document", got=f"no part {name}",
+                    expected="a file as Word saves it",
+                )  # fmt: skip
             raise _refuse(
                 path,
                 "not-word",
@@ -330,6 +336,25 @@ def _check_member(path: Path, name: str, data: bytes) -> None:
                 where=name,
                 got=code.strip()[:80],
             )
+
+
+def _check_references(path: Path, members: dict[str, bytes]) -> None:
+    """Refuse a part that refers to a relation it has not: Word would not open what is made of it."""
+    for name, data in members.items():
+        folder, file = posixpath.split(name)
+        if folder != "word" or not file.endswith(".xml"):
+            continue
+        relations = members.get(f"word/_rels/{file}.rels", b"<none/>")
+        known = {rel.get("Id") for rel in _xml(path, f"word/_rels/{file}.rels", relations).iter(_REL)}
+        asked = _xml(path, name, data).iterfind(f".//*[@{q('r:id')}]")
+        lost = [
+            str(element.get(q("r:id"))) for element in asked if element.get(q("r:id")) not in {*known, ""}
+        ]
+        if lost:
+            raise _refuse(
+                path, "zip-damaged", "a part refers to a relation that the template lacks", where=name,
+                got=lost[0], expected="a file as Word saves it",
+            )  # fmt: skip
 
 
 def _check_drawing(path: Path, name: str, root: Element) -> None:

@@ -114,7 +114,8 @@ def chart_run(
 def _size(at: Element, story: Story, width: int | None, slope: float) -> tuple[int, int]:
     """Return width and height [EMU] of a drawing whose height is ``slope`` times its width."""
     room, tall = _room(at, story)
-    cx = width or _placeholder_width(at) or room
+    page = max(_section(at, story)[0], 144) * EMU_TWIP
+    cx = min(width, page) if width else _placeholder_width(at) or room
     cy = round(cx * slope)
     return (round(cx * tall / cy), tall) if cy > tall else (cx, cy)
 

@@ -27,6 +27,7 @@ LITERAL = re.compile(r"\{\{\s*(tk:[^{}]*?)\s*\}\}")
 BROKEN = re.compile(r"\{\{\s*tk:(?![^{}]*\}\})")
 # Word's autocorrection makes {{Tk: of it at the start of a sentence; it would be printed as it stands.
 MISSPELT = re.compile(r"(?!tk:)[tT][kK]\s*:")
+UNBRACED = re.compile(r"\btk:([\w.]*\w)")
 MISSPELT_LITERAL = re.compile(r"\{\{\s*" + MISSPELT.pattern)
 
 
@@ -104,6 +105,14 @@ def misspelt(story: Story) -> Iterator[tuple[Element, str]]:
             text = "".join(t.text or "" for t in visible_texts(element))
             if found := MISSPELT_LITERAL.search(text):
                 yield element, text[found.start() : found.start() + 40]
+
+
+def unbraced(story: Story) -> Iterator[tuple[Element, str]]:
+    """Yield (paragraph, path) of texts such as ``{tk:tire.size}`` that stand in no double braces."""
+    for paragraph in story.root.iter(W_P):
+        text = "".join(t.text or "" for t in visible_texts(paragraph))
+        for match in UNBRACED.finditer(BROKEN.sub("", LITERAL.sub("", text))):
+            yield paragraph, match[1]
 
 
 def table_of(site: Site) -> Element | None:

@@ -1,10 +1,11 @@
-"""Which rows of a measurement a model can be fitted to: those alike in all that it does not read.
+"""Which rows of a measurement make one curve: those alike in all that its model does not read.
 
 A model declares what it reads beside slip angle and load (`reads`). What else was recorded, longitudinal
 slip, inclination, pressure, speed and temperature, moves a tire's forces too: rows in which it differs beyond
 its scatter are rows of another curve, and no mean of two curves is a curve of the tire. They are parted here,
-the one gate of every model and reader: the rows of one condition are kept, free rolling, the most upright, at
-the pressure, the speed and the temperature of most rows; the others are left out and named.
+the one gate of reduced tests, of every model and every reader: the rows of one condition are kept, free
+rolling, the most upright, at the pressure, the speed and the temperature of most rows; the others are left
+out and named.
 """
 
 from __future__ import annotations
