@@ -11,6 +11,7 @@ from typing import Any
 
 from proof import log, proof_file
 from proof.batch import draw_batch, redrawn, seed_of
+from proof.draw import counts_of
 from proof.real import run_real
 from proof.running import run_batch
 from proof.score import open_batch, score_of
@@ -53,7 +54,7 @@ def _draw(given: argparse.Namespace) -> None:
     found = draw_batch(
         given.out,
         seed=seed_of(given.seed),
-        cases=given.cases,
+        counts=counts_of(given.cases),
         workers=given.workers,
         progress=lambda n: _say(f"{n} drawn"),
     )

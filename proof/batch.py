@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -30,12 +31,17 @@ def _one(job: tuple[int, int, str, str, Path]) -> tuple[str, dict[str, Any], lis
 
 
 def draw_batch(
-    folder: Path, *, seed: int, cases: int, workers: int, progress: Callable[[int], None] = lambda _: None
+    folder: Path,
+    *,
+    seed: int,
+    counts: Mapping[str, int],
+    workers: int,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Draw and seal a batch into a new folder; return what batch.json holds."""
     folder.mkdir(parents=True)
     (folder / "cases").mkdir()
-    buckets = mix(cases, np.random.default_rng([seed, 2**32 - 1]))
+    buckets = mix(counts, np.random.default_rng([seed, 2**32 - 1]))
     jobs = [(seed, i, bucket, f"case{i + 1:04d}", folder) for i, bucket in enumerate(buckets)]
     answers: dict[str, Any] = {}
     predicted: dict[str, list[dict[str, Array]]] = {}
@@ -52,9 +58,8 @@ def redrawn(proof: Proof, folder: Path, *, workers: int, progress: Callable[[int
     Raises SealError where the data's hash or an answer differs; the reason may be another state of the
     generator or of its libraries, which are named.
     """
-    controls = sum(row["bucket"] == "control" for row in proof.sealed.values())
-    count = len(proof.sealed) - controls
-    made = draw_batch(folder, seed=proof.seed, cases=count, workers=workers, progress=progress)
+    counts = Counter(row["bucket"] for row in proof.sealed.values())
+    made = draw_batch(folder, seed=proof.seed, counts=counts, workers=workers, progress=progress)
     again, _ = opened(folder)
     other = [k for k in ("generator_sha256", "versions") if made[k] != proof.batch.get(k)]
     hint = f" ({' and '.join(other)} differ from the batch's)" if other else ""

@@ -42,6 +42,7 @@ def _rates(score: dict[str, Any]) -> list[list[str]]:
         ["mismatch shown in the right output", str(score["located"])],
         ["gap closed, from refitted to oracle", gap(score["gap"])],
         ["the same where the answer is right", gap(score["gap where right"])],
+        ["gap closed where what is missing has no name", gap(score["gap outside"])],
         ["gap closed, from declared to oracle", gap(score["gap from declared"])],
         ["misses above the size that the tool says it sees", str(score["misses above detectable"])],
     ]

@@ -17,8 +17,16 @@ from proof.instruments import DIGITAL, digital
 from proof.model import Array, EffectSpec, Params, Scenario
 from proof.noise import coloured, converter, spikes
 from proof.outside import LARGEST_SHARE, ONE_SIDED, REASONS
+from proof.process_noise import stirred
 
-MIX = {"single": 0.34, "two": 0.10, "null": 0.38, "outside": 0.10, "confounded": 0.08}
+MIX = {
+    "single": 0.32, "two": 0.09, "null": 0.28, "outside": 0.12, "confounded": 0.06,
+    "three": 0.05, "stirred null": 0.04, "stirred single": 0.04,
+}  # fmt: skip
+"""Shares of the kinds of case. What is stirred has process noise beside the sensor's."""
+STIRRED = ("pendulum", "drive", "tank", "thermal")
+"""Families with states, which process noise can move."""
+SEVERAL = {"two": 2, "three": 3}
 CONTROLS = 0.06
 """Negative controls, beyond the mix."""
 LARGEST_MODEL_ERROR = 1.0
@@ -56,14 +64,19 @@ class RedrawError(Exception):
     """The draw does not meet its own conditions; another is drawn."""
 
 
-def mix(n: int, rng: np.random.Generator) -> list[str]:
-    """Return the kinds of `n` cases in drawn order (shares by largest remainder), and controls beyond
+def counts_of(n: int) -> dict[str, int]:
+    """Return how many of `n` cases are of each kind (shares by largest remainder), and controls beyond
     them."""
     exact = {k: n * v for k, v in MIX.items()}
     count = {k: int(v) for k, v in exact.items()}
     for k in sorted(exact, key=lambda k: count[k] - exact[k])[: n - sum(count.values())]:
         count[k] += 1
-    kinds = [k for k, m in count.items() for _ in range(m)] + ["control"] * round(CONTROLS * n)
+    return count | {"control": round(CONTROLS * n)}
+
+
+def mix(counts: Mapping[str, int], rng: np.random.Generator) -> list[str]:
+    """Return the kinds of the cases in drawn order."""
+    kinds = [k for k in (*MIX, "control") for _ in range(counts.get(k, 0))]
     return [kinds[i] for i in rng.permutation(len(kinds))]
 
 
@@ -82,23 +95,25 @@ def _pick(
         group = CONFOUNDED[str(rng.choice(list(CONFOUNDED)))]
         return group.family, group, (str(rng.choice(group.present)),)
     names = [k for k, f in FAMILIES.items() if bucket != "outside" or f.outside]
-    if bucket == "two":
+    if bucket in SEVERAL:
         names = [k for k in names if k not in ("thermal", "tank", "labview")]
+    if bucket.startswith("stirred"):
+        names = [k for k in names if k in STIRRED]
     weight = np.array([FAMILIES[k].weight for k in names])
     family = str(rng.choice(names, p=weight / weight.sum()))
     inside = FAMILIES[family].inside
-    if bucket == "null":
+    if bucket in ("null", "stirred null"):
         return family, None, ()
     if bucket == "outside":
         return family, None, (str(rng.choice(FAMILIES[family].outside)),)
-    if bucket == "single":
+    if bucket in ("single", "stirred single"):
         share = np.array([share_of(name) for name in inside])
         return family, None, (str(rng.choice(inside, p=share / share.sum())),)
     graded = [name for name in inside if name not in ONE_SIZE]
-    first, second = (str(x) for x in rng.choice(graded, 2, replace=False))
-    if any({first, second} <= group for group in _SHADOWS):
+    several = tuple(str(x) for x in rng.choice(graded, SEVERAL[bucket], replace=False))
+    if any(len(group & {*several}) > 1 for group in _SHADOWS):
         raise RedrawError
-    return family, None, (first, second)
+    return family, None, several
 
 
 def _alike(
@@ -287,6 +302,8 @@ def _draw(
         "outside": (0.5, 8.0),
         "confounded": (1.0, 8.0),
         "two": (0.7, 6.0),
+        "three": (0.7, 6.0),
+        "stirred single": (1.0, 8.0),
         "control": (1.5, 6.0),
     }.get(bucket, (0.1, 8.0))
     effects, rows = {}, []
@@ -317,6 +334,14 @@ def _draw(
         near = _alike(s, names[0], truth, without, slopes, total.distance)
     s = dataclasses.replace(s, runs=sizing.driven_of(s, s.runs, effects))
     lost = 0.01 if rng.random() < 0.2 else 0.0
+    more = {}
+    if bucket.startswith("stirred"):
+        wanted = _log_uniform(rng, 0.3, 1.0)
+        s, added = stirred(s, p, effects, wanted, rng)
+        if not 0.7 < added / wanted < 1.4:
+            raise RedrawError
+        more["process_noise"] = round(added, 4)
+        truth = sizing.truth_of(s, s.runs, p, effects)
     measured = [_recorded(s, row, effects, lost, rng) for row in _before_converter(s, p, effects)]
     _check(s, measured, truth, effects)
     answer = {
@@ -336,6 +361,7 @@ def _draw(
         "noise": {k: {"sd": v.sd, "ar": list(v.ar), "outliers": v.outliers} for k, v in s.noise.items()},
         "parameters": {q.name: q.true for q in s.free()},
         "lost": lost,
+        **more,
     }
     predicted = sizing.truth_of(s, s.predict, p, effects)
     drawn = Drawn(scenario=s, measured=measured, predicted=predicted, answer=answer, effects=effects)

@@ -69,7 +69,7 @@ def _motion(
 
     def rhs(time: float, x: Array, u: dict[str, float]) -> Array:
         added, bristle_rate = left_out(x[0], x[1], x[2], e, presliding)
-        a = rates(x[0], x[1], u) + added
+        a = rates(x[0], x[1], u) + added + u.get("push", 0.0)
         if gust:
             a += gust["force"] * sum(math.exp(-(((time - at) / gust["seconds"]) ** 2)) for at in gust["at"])
         q_rate, w_rate = 0.0, 0.0
@@ -81,7 +81,8 @@ def _motion(
         return np.array([x[1], a, bristle_rate, q_rate, w_rate])
 
     t = run.fine["t"]
-    x = ode.truth(rhs, np.zeros(5), t, dict(inputs), longest=float(t[1] - t[0]) * 2)
+    driven = dict(inputs) | {k: run.fine[k] for k in ("push",) if k in run.fine}
+    x = ode.truth(rhs, np.zeros(5), t, driven, longest=float(t[1] - t[0]) * 2)
     return x[:, 0], x[:, 1]
 
 

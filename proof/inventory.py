@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from proof.catalogue import CONFOUNDED, FAMILIES, share_of
+from proof.draw import MIX
 from proof.intervals import rate
 from proof.judge import Judgment
 from proof.outside import REASONS
@@ -49,7 +50,12 @@ def mean_share(bucket: float) -> dict[str, float]:
 
 def inventory(judged: list[Judgment], sealed: dict[str, Any]) -> dict[str, Any]:
     """Return what was put in how often, what never was, and the rates by kind from outside and by class."""
-    count = Counter(t for j in judged if j.bucket in ("single", "two", "confounded") for t in j.truth)
+    count = Counter(
+        t
+        for j in judged
+        if j.bucket in ("single", "stirred single", "two", "three", "confounded")
+        for t in j.truth
+    )
     outside: dict[str, list[Judgment]] = defaultdict(list)
     classes: dict[tuple[str, ...], list[Judgment]] = defaultdict(list)
     for j in judged:
@@ -57,7 +63,7 @@ def inventory(judged: list[Judgment], sealed: dict[str, Any]) -> dict[str, Any]:
             outside[j.truth[0]].append(j)
         elif j.bucket == "confounded":
             classes[tuple(sealed[j.case]["class"])].append(j)
-    there, share = hosts(), mean_share(0.34)
+    there, share = hosts(), mean_share(MIX["single"])
     reason = {tuple(row["class"]): row.get("reason", "") for row in sealed.values()}
     return {
         "put in": {

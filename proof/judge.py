@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from proof.laws import judged_law
+
 SILENT = ("nothing", "unknown", "untestable")
+NULLS = ("null", "stirred null")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +28,7 @@ class Judgment:
     false_name: bool
     """Something was named that is not there: on a null, from outside the catalogue, or beside the truth."""
     partly: bool = False
-    """One of two effects was found, and nothing else named."""
+    """All of several effects but one were found, and nothing else named."""
     excused: bool = False
     """What was named is not there, but this recording cannot tell it from what is."""
     overconfident: bool = False
@@ -40,6 +43,8 @@ class Judgment:
     distance: float = 0.0
     minimum_detectable: float | None = None
     """What the tool says that it would have seen, over what was there (missed effects only)."""
+    law: dict[str, bool] | None = None
+    """Of an effect from outside: whether its law was learned, and is right; None: not asked."""
 
 
 def sets_of(answer: dict[str, Any]) -> tuple[frozenset[str], ...]:
@@ -55,7 +60,7 @@ def _right(sealed: dict[str, Any], verdict: str, reported: tuple[frozenset[str],
     truth = [e["name"] for e in sealed["effects"]]
     bucket = sealed["bucket"]
     stray = [r for r in reported if not any(t in r for t in truth)]
-    if bucket == "null":
+    if bucket in NULLS:
         return verdict == "nothing", bool(reported)
     if bucket in ("outside", "control"):
         wanted = ("unknown",) if bucket == "outside" else ("unknown", "nothing")
@@ -146,10 +151,10 @@ def judge(case: str, sealed: dict[str, Any], answer: dict[str, Any] | None) -> J
     found = [t for t in truth if any(t in r for r in reported)]
     return Judgment(
         **common, verdict=verdict, reported=reported, right=right, false_name=false_name,
-        partly=sealed["bucket"] == "two" and len(found) == 1 and not stray,
+        partly=len(truth) > 1 and len(found) == len(truth) - 1 and not stray,
         excused=bool(stray) and all(r & alike for r in stray),
         overconfident=sealed["bucket"] == "confounded" and not right and bool(found),
         column=_column(verdict, reported, truth), covered=_coverage(sealed, answer),
-        located=_located(sealed, answer), minimum_detectable=_detectable(sealed,
-            answer) if not found else None,
+        located=_located(sealed, answer), law=judged_law(sealed, answer),
+        minimum_detectable=None if found else _detectable(sealed, answer),
     )  # fmt: skip

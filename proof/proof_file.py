@@ -63,8 +63,10 @@ def judged_part(answer: dict[str, Any] | None) -> dict[str, Any] | None:
         | {"parameters": [keep(p, "name value unit ci95 runs") for p in e.get("parameters") or []]}
         for e in answer.get("effects") or []
     ]
+    laws = [keep(law, "place form acts variables memory_s") for law in answer.get("laws") or []]
     return keep(answer, "verdict remaining complete") | {
         "effects": effects,
+        "laws": laws,
         "mismatch": [keep(row, "channel share_of_variance") for row in answer.get("mismatch") or []],
         "not_found": [
             keep(row, "name minimum_detectable observable") for row in answer.get("not_found") or []

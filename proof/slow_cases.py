@@ -42,10 +42,11 @@ def tank(rng: np.random.Generator) -> Scenario:
                 out += 4.0 * max(x[0] - weir["level"] * (1 - weir["cut"]), 0.0) ** 1.5
             if hatch and any(at < time < at + hatch["seconds"] for at in hatch["at"]):
                 out += hatch["outlet"] * math.sqrt(max(x[0], 0.0))
-            return np.array([(u["Q"] * 1e-3 - out) / p["area"]])
+            return np.array([(u["Q"] * 1e-3 - out) / p["area"] + u.get("push", 0.0)])
 
         t = run.fine["t"]
-        x = ode.truth(rhs, np.array([level0]), t, {"Q": run.fine["Q"]}, longest=1.0)
+        driven = {k: run.fine[k] for k in ("Q", "push") if k in run.fine}
+        x = ode.truth(rhs, np.array([level0]), t, driven, longest=1.0)
         return sampled(run, {"H": x[:, 0]}, e, cutoff_Hz=0.4, compensated=True)
 
     def table(peak: dict[str, float]) -> dict[str, Any]:
@@ -89,7 +90,7 @@ def thermal(rng: np.random.Generator) -> Scenario:
         mass = e.get("hidden_mass")
 
         def rhs(_t: float, x: Array, u: dict[str, float]) -> Array:
-            flow = np.array([u["P"], 0.0, 0.0, 0.0])
+            flow = np.array([u["P"] + p["C"] * u.get("push", 0.0), 0.0, 0.0, 0.0])
             for a, b in ((0, 1), (1, 2)):
                 q = p["g"] * (x[a] - x[b])
                 flow[a] -= q
@@ -106,7 +107,8 @@ def thermal(rng: np.random.Generator) -> Scenario:
             return flow / np.array([p["C"], p["C"], p["C"], 900.0])
 
         f = run.fine
-        x = ode.truth(rhs, np.full(4, 20.0), f["t"], {"P": f["P"], "TA": f["TA"]}, longest=20.0)
+        driven = {k: f[k] for k in ("P", "TA", "push") if k in f}
+        x = ode.truth(rhs, np.full(4, 20.0), f["t"], driven, longest=20.0)
         return sampled(run, {"T1": x[:, 0], "T3": x[:, 2]}, e, cutoff_Hz=0.1, compensated=True)
 
     def table(peak: dict[str, float]) -> dict[str, Any]:

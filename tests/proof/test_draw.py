@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
+import itertools
+import json
 import re
 import tomllib
 from collections import Counter
@@ -11,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proof import controls, draw, files, inventory, outside
+from proof import controls, draw, files, inventory, outside, proof_file
 from proof import size as sizing
 from proof.catalogue import CONFOUNDED, FAMILIES
-from proof.draw import draw_case, mix
+from proof.draw import counts_of, draw_case, mix
 
 # the contract's table of names
 CATALOGUE = set(
@@ -32,6 +35,8 @@ QUICK: list[tuple[str, tuple[str, tuple[str, ...]] | None]] = [
     ("outside", ("beam-python", ("hidden_slip",))),
     ("confounded", ("pull by load", ("conicity",))),
     ("two", ("tire-columns", ("zero_offset", "turn_slip"))),
+    ("three", ("drive-force", ("coulomb_friction", "filter_lag", "zero_drift"))),
+    ("stirred single", ("drive", ("constant_force",))),
     ("control", None),
     ("single", ("tire-machine", ("load_lag",))),
     ("single", ("labview", ("wrong_calibration",))),
@@ -40,13 +45,17 @@ QUICK: list[tuple[str, tuple[str, tuple[str, ...]] | None]] = [
 
 
 def test_the_mix_of_a_batch_is_the_contracts() -> None:
-    count = Counter(mix(400, np.random.default_rng(1)))
-    assert count == {"single": 136, "two": 40, "null": 152, "outside": 40, "confounded": 32, "control": 24}
+    count = Counter(mix(counts_of(400), np.random.default_rng(1)))
+    assert count == {
+        "single": 128, "two": 36, "three": 20, "null": 112, "outside": 48, "confounded": 24,
+        "stirred null": 16, "stirred single": 16, "control": 24,
+    }  # fmt: skip
 
 
 def test_a_small_mix_still_adds_up() -> None:
     for n in (1, 7, 33):
-        assert sum(v for k, v in Counter(mix(n, np.random.default_rng(2))).items() if k != "control") == n
+        kinds = mix(counts_of(n), np.random.default_rng(2))
+        assert sum(kind != "control" for kind in kinds) == n
 
 
 def test_every_effect_of_the_catalogue_can_be_put_in() -> None:
@@ -95,6 +104,34 @@ def test_a_case_is_drawn_the_same_again_and_tells_nothing(
     for run in case["recording"]["predict"]:
         head = (tmp_path / "a" / run["file"]).read_text(encoding="utf-8").splitlines()[0].split(",")
         assert not outputs & set(head)
+
+
+@pytest.mark.parametrize("family", draw.STIRRED)
+def test_process_noise_is_another_in_every_run_and_no_effect(family: str) -> None:
+    drawn = draw_case(17, 0, "stirred null", picked=(family, ()))
+    s, p = drawn.scenario, drawn.scenario.true_parameters()
+    assert drawn.answer["effects"] == []
+    assert 0.2 < drawn.answer["process_noise"] < 1.4
+    still = tuple(dataclasses.replace(run, fine={**run.fine, "push": 0 * run.fine["push"]}) for run in s.runs)
+    added = sizing.difference(sizing.truth_of(s, s.runs, p, {}), sizing.truth_of(s, still, p, {}))
+    sizes = [
+        np.sqrt(np.mean(np.concatenate([row[k] for row in added]) ** 2)) / s.noise[k].sd for k in s.outputs
+    ]
+    assert max(sizes) == pytest.approx(drawn.answer["process_noise"], abs=1e-3)
+    for first, second in itertools.combinations([run.fine["push"] for run in s.runs], 2):
+        assert abs(np.corrcoef(first, second)[0, 1]) < 0.5
+    # Where nothing was recorded yet nothing is pushed: what is to be predicted is what the plant does.
+    assert all("push" not in run.fine for run in s.predict)
+
+
+def test_a_batch_of_before_is_drawn_again_from_its_seed() -> None:
+    proof = proof_file.read(Path("proof/proof-252a86e074e9b1d9.jsonl.gz"))
+    rows = proof.sealed.values()
+    order = mix(Counter(row["bucket"] for row in rows), np.random.default_rng([proof.seed, 2**32 - 1]))
+    assert order == [row["bucket"] for row in sorted(rows, key=lambda row: row["index"])]
+    case = next(row for row in rows if row["bucket"] == "two" and row["family"] == "drive-force")
+    again = draw_case(proof.seed, case["index"], "two").answer | {"index": case["index"]}
+    assert json.loads(json.dumps(again)) == case
 
 
 @pytest.mark.parametrize("family", ["tire-machine", "tire-python", "drive-force", "thermal", "beam-python"])

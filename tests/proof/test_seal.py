@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from proof.batch import draw_batch, seed_of
+from proof.draw import counts_of
 from proof.seal import SealError, opened, verify
 
 pytestmark = pytest.mark.usefixtures("light_families")
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("light_families")
 def batch(light_families: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three small cases, sealed."""
     folder = tmp_path_factory.mktemp("sealed") / "batch"
-    draw_batch(folder, seed=41, cases=3, workers=1)
+    draw_batch(folder, seed=41, counts=counts_of(3), workers=1)
     return folder
 
 
@@ -46,7 +47,7 @@ def test_the_seal_is_the_sha256_of_the_answers_file(batch: Path) -> None:
 
 
 def test_the_salt_differs_from_draw_to_draw_and_the_data_does_not(batch: Path, tmp_path: Path) -> None:
-    again = draw_batch(tmp_path / "again", seed=41, cases=3, workers=1)
+    again = draw_batch(tmp_path / "again", seed=41, counts=counts_of(3), workers=1)
     first = json.loads((batch / "batch.json").read_text())
     assert again["data_sha256"] == first["data_sha256"]
     assert again["answers_sha256"] != first["answers_sha256"]

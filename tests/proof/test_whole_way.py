@@ -110,8 +110,8 @@ def test_a_scored_batch_is_scored_again_from_its_small_file(
     batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = _small(batch, tmp_path)
-    bars = [x for x in capsys.readouterr().out.splitlines() if "(at " in x or "(90" in x]
-    assert len(bars) == 5
+    bars = [x for x in capsys.readouterr().out.splitlines() if "(at " in x or "(93" in x]
+    assert len(bars) == 8
     assert main(["verify", "--answers", str(path)]) == 0
     shown = capsys.readouterr().out
     assert all(line in shown for line in bars)
