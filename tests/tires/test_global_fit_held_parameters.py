@@ -43,7 +43,7 @@ def test_a_stiffness_is_uncertain_by_what_was_held():
     share = np.exp(-((5e-4 / width) ** 2))
     expected = np.hypot(own, share * 12_000 / np.sqrt(12))
     assert fit.slope_at_zero.u == pytest.approx(expected, rel=0.01)
-    assert "contains their spread" in fit.message
+    assert "contain what the parameters held at their default may be" in fit.message
 
 
 def test_defaults_together_cost_no_more_than_a_thousandth():
