@@ -11,7 +11,6 @@ the record stands that the numbers rest on: `convert` writes it.
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 import re
@@ -23,6 +22,7 @@ from typing import TYPE_CHECKING, NoReturn, get_args
 import numpy as np
 
 from toolkit.channels import AXES, CHANNELS, Axes, channel_of
+from toolkit.declared import nearest
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
 from toolkit.headers import split_header
@@ -228,11 +228,11 @@ def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
     name, text = split_header(cell, lambda name: channel_of(name) is not None)
     channel = channel_of(name)
     if channel is None:
-        symbols = {symbol.upper(): symbol for symbol in CHANNELS}
-        near = difflib.get_close_matches(name.upper(), symbols, n=1, cutoff=0.5)
+        known = "SA FZ FY MZ, optional IA P V FX KAPPA t"
+        near = nearest(name, [*CHANNELS])
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
-            f"{symbols[near[0]]} [unit]" if near else "SA FZ FY MZ, optional IA P V FX KAPPA t",
+            f"{near} [unit]; known are {known}" if near else known,
         )  # fmt: skip
     if text is None:
         _refuse(
