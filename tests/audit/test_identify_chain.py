@@ -95,7 +95,7 @@ def test_inspection_of_a_candidate_alone_corrects_nothing(chain):
     assert found.slip_angle_rad == pytest.approx(recording["SA"].si.mean())
     assert found.identification.record == chain[2].id
     assert found.corrected_by is None  # nobody has approved the record
-    assert [finding.rule for finding in found.findings] == ["identified-sign_variant"]
+    assert [finding.rule for finding in found.findings] == ["identified-sign_variant", "not-corrected"]
 
 
 def test_a_damaged_record_is_refused_as_a_candidate(chain, tmp_path):
@@ -108,4 +108,6 @@ def test_a_damaged_record_is_refused_as_a_candidate(chain, tmp_path):
     found = inspect_file(path, Registry(tmp_path / "calibrations"))
     assert found.identification.grade == "unknown"
     assert [one.id for one in found.choice.refused] == [chain[2].id]
-    assert {finding.rule for finding in found.findings} == {"refused-record", "identified-unknown"}
+    assert {finding.rule for finding in found.findings} == {
+        "refused-record", "identified-unknown", "not-corrected",
+    }  # fmt: skip

@@ -29,8 +29,8 @@ OTHER_MEANINGS = {
         {"conicity", "creep"},
         "what a test is planned for, and what acts on the cells of a session",
     ),
-    "lab/plan_session.py": ({"creep"}, "as in the planning"),
-    "lab/protocol_plan.py": (PULL, "what a test is planned for"),
+    "lab/plans/plan_session.py": ({"creep"}, "as in the planning"),
+    "lab/plans/protocol_plan.py": (PULL, "what a test is planned for"),
     "cli/plan_runs.py": ({"conicity"}, "examples of what a test is planned for"),
     "simulation/plan_file.py": (
         PULL,
