@@ -82,7 +82,9 @@ def judged_law(sealed: dict[str, Any], answer: dict[str, Any]) -> dict[str, bool
 
 
 def _held(true: Law, law: dict[str, Any]) -> dict[str, bool]:
-    place, variables = law.get("place") or {}, frozenset(law.get("variables") or ())
+    place = law.get("place") or {}
+    # The answer's word for the time is `time`, whatever its column is called.
+    variables = frozenset("t" if name == "time" else name for name in law.get("variables") or ())
     channels = true.channels
     form = str(law.get("form"))
     # An event and a tone are of the time whether it is said or not.

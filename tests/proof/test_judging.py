@@ -223,6 +223,7 @@ def law(kind: str, channel: str, form: str, *variables: str, memory_s: float | N
         ("thermal", "hidden_radiation", [law("output", "T1", "static", "T1", "T3")], (False, True, True)),
         ("thermal", "hidden_radiation", [law("state", "T3", "static", "T3")], (True, False, True)),
         ("pendulum", "hidden_gust", [law("state", "om", "event")], (True, True, True)),
+        ("pendulum", "hidden_gust", [law("state", "om", "event", "time")], (True, True, True)),
         ("pendulum", "hidden_gust", [law("state", "om", "static", "th")], (True, False, True)),
         ("drive", "hidden_resonance", [law("state", "v", "mode", "v", memory_s=0.4)], (True, True, True)),
         ("beam-python", "hidden_ambient", [law("output", "W", "tone"), law("output", "S", "static", "T")],
