@@ -259,7 +259,8 @@ def closing() -> list[str]:
     """Return what is not covered."""
     return [
         "The Gaussian process names nothing by its nature. The sparse regression is the algorithm of pysindy,"
-        " written here. Localisation is asked of the output only. Parameters whose meaning the contract"
-        " leaves open (phases, quadratic terms, heat and wear rates) are not asked to be covered.",
+        " written here. Localisation is asked of outputs, and of the place of a law. Parameters whose meaning"
+        " the contract leaves open (phases, quadratic terms, heat and wear rates) are not asked to be"
+        " covered.",
         "A gap below 0.1 noise sd is not asked to be closed; without predictions nothing is closed.",
     ]

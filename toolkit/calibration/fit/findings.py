@@ -15,7 +15,7 @@ from toolkit.calibration.fit.balance_report import balance_findings
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, loadings, replicate_groups
 from toolkit.calibration.fit.forward_search import contradicting, deviating
-from toolkit.calibration.fit.printed_digits import copies
+from toolkit.calibration.fit.printed_digits import copies, own_scatter
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.run_scale import RunScale, run_scales
 from toolkit.calibration.fit.session_fit import fit_session, session_statements
@@ -154,20 +154,6 @@ def _beyond(session: Session, check: Table) -> list[Finding]:
     ]
 
 
-def _scatter_of_columns(fit: SessionFit) -> list[float]:
-    """Return each indication's own scatter, at most, by what it moves; then 0 for each reference load."""
-    at = {
-        name: fit.session.terms.index(name) for name in fit.session.indications if name in fit.session.terms
-    }
-    scatter = []
-    for name in fit.session.indications:
-        slopes = [
-            (load.fit.residual_sd, abs(load.fit.coefficients[at[name]])) for load in fit.loads if name in at
-        ]
-        scatter.append(min((sd / slope for sd, slope in slopes if slope > 0), default=0.0))
-    return scatter + [0.0] * len(fit.loads)
-
-
 def _data_findings(fit: SessionFit) -> list[Finding]:
     findings: list[Finding] = []
     session = fit.session
@@ -192,7 +178,9 @@ def _data_findings(fit: SessionFit) -> list[Finding]:
     else:
         check = session.check.matrix(names)
         findings += [*_repeated(check, f"{where}, check loads"), *_beyond(session, session.check)]
-        for at, row in copies(check, rows, _scatter_of_columns(fit)).items():
+        equations = [(fit.session.terms, load.fit.coefficients, load.fit.residual_sd) for load in fit.loads]
+        scatter = own_scatter(fit.session.indications, equations) + [0.0] * len(fit.loads)
+        for at, row in copies(check, rows, scatter).items():
             message = f"equals row {row + 1} of the fit, digit by digit: it checks nothing"
             findings.append(Finding(rule="check-not-apart", where=f"check row {at + 1}", message=message))
     if session.reference_due is not None and session.reference_due < session.date:

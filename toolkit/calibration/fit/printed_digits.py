@@ -60,6 +60,17 @@ def _half_place(value: float) -> float:
     return 0.5 * 10.0**exponent if len(digits) < FULL_DIGITS and isinstance(exponent, int) else 0.0
 
 
+def own_scatter(
+    indications: Sequence[str], equations: Sequence[tuple[Sequence[str], Sequence[float], float]]
+) -> list[float]:
+    """Return each indication's own scatter, at most: the scatter of a load over what it moves of it.
+
+    ``equations`` are terms, coefficients and the standard deviation of residuals, one for each load.
+    """
+    moved = [(dict(zip(terms, values, strict=True)), sd) for terms, values, sd in equations]
+    return [min((sd / abs(c[name]) for c, sd in moved if c.get(name)), default=0.0) for name in indications]
+
+
 def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Sequence[float]) -> dict[int, int]:
     """Return which rows of a check (from 0) repeat a row of the fit (from 0) within their printed digits.
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from toolkit.calibration.fit.printed_digits import copies
+from toolkit.calibration.fit.printed_digits import copies, own_scatter
 from toolkit.calibration.registry.response import (
     Response,
     largest_load,
@@ -213,15 +213,12 @@ def unverifiable(
 def _apart(record: CalibrationRecord, check: Table, loads: Table) -> Table | None:
     """Return the check loads that are no copies of rows of the fit; None where all are."""
     names = [*record.indications, *(load.load for load in record.loads)]
-    scatter = []
-    for name in record.indications:
-        moved = [
-            load.residual_sd / abs(c)
-            for load in record.loads
-            for term, c in zip(load.terms, load.coefficients, strict=True)
-            if term == name and c != 0 and load.residual_sd is not None
-        ]
-        scatter.append(min(moved, default=0.0))
+    equations = [
+        (load.terms, load.coefficients, load.residual_sd)
+        for load in record.loads
+        if load.residual_sd is not None
+    ]
+    scatter = own_scatter(record.indications, equations)
     apart = np.ones(check.rows, dtype=np.bool_)
     apart[list(copies(check.matrix(names), loads.matrix(names), scatter + [0.0] * len(record.loads)))] = False
     return check.only(apart) if apart.any() else None
