@@ -17,6 +17,7 @@ import rfc8785
 from tests.benchmarks.seal_time import _SIGN
 from tests.benchmarks.timing import pairs, row
 from tests.calibration.registry.test_signatures import KEYS, RECORD, _found, _registry
+from tests.trust.seal.authority import to_pem
 from tests.trust.seal.seal_factory import authority, key, plain_pdf, trust
 from toolkit.calibration.registry.issuing import issue
 from toolkit.lab.home import packaged_home
@@ -25,7 +26,6 @@ from toolkit.lab.signatures.proofs import registry_ledger
 from toolkit.lab.signatures.verification import verify_file
 from toolkit.trust.anchor import anchor_of
 from toolkit.trust.people import NAMESPACE
-from toolkit.trust.seal.authority import to_pem
 from toolkit.trust.seal.pdf import proved_pdf, seal_pdf
 from toolkit.trust.seal.qr import Place
 

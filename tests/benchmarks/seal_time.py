@@ -12,8 +12,8 @@ from pathlib import Path
 
 from tests.benchmarks.timing import pairs, row
 from tests.calibration.dcc.dcc_factory import plain_dcc
+from tests.trust.seal.authority import to_pem
 from tests.trust.seal.seal_factory import authority, key, plain_pdf, trust
-from toolkit.trust.seal.authority import to_pem
 from toolkit.trust.seal.pdf import check_pdf, seal_pdf
 from toolkit.trust.seal.xml import check_xml, seal_xml
 

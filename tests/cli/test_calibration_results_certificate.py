@@ -135,10 +135,10 @@ def _with_country(tmp_path: Path) -> Path:
 
 @office_needed
 def test_a_sealed_certificate_is_a_pdf_a_3_with_its_proof_and_a_sealed_xml(run: Run, tmp_path: Path) -> None:
+    from tests.trust.seal.authority import to_pem
     from tests.trust.seal.seal_factory import key, trust
     from toolkit.files import sha256_file
     from toolkit.recording.marks import refuse_original
-    from toolkit.trust.seal.authority import to_pem
     from toolkit.trust.seal.pdf import check_pdf
     from toolkit.trust.seal.xml import check_xml
 

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 import typer
 
+from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import authority, flipped, key, plain_pdf, sealed_pdf
 from toolkit.cli import verify
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
-from toolkit.trust.seal.authority import make_authority
 from toolkit.trust.seal.pdf import seal_pdf
 from toolkit.trust.seal.xml import seal_xml
 

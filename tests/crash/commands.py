@@ -12,8 +12,8 @@ from tests.crash.bench import Command
 from tests.diagnosis.answer.test_model_text import offset_machine
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from tests.faults import Runner
+from tests.trust.seal.authority import to_pem
 from tests.trust.seal.seal_factory import authority, key
-from toolkit.trust.seal.authority import to_pem
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "toolkit" / "examples" / "virtual"

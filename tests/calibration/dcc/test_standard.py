@@ -21,6 +21,7 @@ from tests.calibration.dcc.dcc_factory import (
     write_dcc,
 )
 from tests.conftest import SHARED_DATA
+from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import DAY, NOW, authority, key
 from toolkit.calibration.dcc.standard import Standards, certificate_of
 from toolkit.calibration.registry.candidate import calibrate
@@ -31,7 +32,6 @@ from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.uncertainty.budget import calibration_budget
 from toolkit.errors import RecordError, SessionError, ToolkitError
 from toolkit.files import sha256_bytes
-from toolkit.trust.seal.authority import make_authority
 from toolkit.trust.seal.x509 import Trust, fingerprint
 from toolkit.trust.seal.xml import seal_xml
 

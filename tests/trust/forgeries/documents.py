@@ -17,6 +17,7 @@ from lxml import etree
 from tests.calibration.calibration_factory import write_session
 from tests.calibration.dcc.dcc_factory import REFERENCE, STANDARDS, plain_dcc, write_dcc
 from tests.trust.forgeries.changes import Forgery, bytes_changed
+from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import (
     DAY,
     DCC,
@@ -30,7 +31,6 @@ from tests.trust.seal.seal_factory import (
 )
 from toolkit.calibration.session.read import read_session
 from toolkit.errors import ToolkitError
-from toolkit.trust.seal.authority import make_authority
 from toolkit.trust.seal.key import SealKey
 from toolkit.trust.seal.pdf import check_pdf, seal_pdf
 from toolkit.trust.seal.xml import DS, check_xml, seal_xml

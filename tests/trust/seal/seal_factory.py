@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from functools import cache
 
-from toolkit.trust.seal.authority import Authority, make_authority
+from tests.trust.seal.authority import Authority, make_authority
 from toolkit.trust.seal.key import SealKey
 from toolkit.trust.seal.pdf import seal_pdf
 from toolkit.trust.seal.x509 import Trust

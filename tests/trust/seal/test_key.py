@@ -9,9 +9,9 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import ed25519, rsa
 from cryptography.hazmat.primitives.serialization import Encoding
 
+from tests.trust.seal.authority import make_authority, to_pem, to_pkcs12
 from tests.trust.seal.seal_factory import DAY, NOW, authority, key
 from toolkit.errors import TrustError
-from toolkit.trust.seal.authority import make_authority, to_pem, to_pkcs12
 from toolkit.trust.seal.key import open_key
 
 

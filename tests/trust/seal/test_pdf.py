@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 
+from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import PROOF, XMP, authority, key, plain_pdf, sealed_pdf, trust
 from toolkit.errors import TrustError
-from toolkit.trust.seal.authority import make_authority
 from toolkit.trust.seal.pdf import check_pdf, seal_pdf
 from toolkit.trust.seal.x509 import Trust, fingerprint
 

@@ -12,6 +12,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 
+from tests.trust.seal.authority import Authority, make_authority
 from tests.trust.seal.seal_factory import (
     DAY,
     NOW,
@@ -23,7 +24,6 @@ from tests.trust.seal.seal_factory import (
     spread,
     trust,
 )
-from toolkit.trust.seal.authority import Authority, make_authority
 from toolkit.trust.seal.check import SealCheck
 from toolkit.trust.seal.key import SealKey
 from toolkit.trust.seal.pdf import check_pdf, seal_pdf

@@ -11,6 +11,7 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from lxml import etree
 
+from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import (
     DAY,
     DCC,
@@ -25,7 +26,6 @@ from tests.trust.seal.seal_factory import (
 )
 from toolkit.errors import TrustError
 from toolkit.recording.marks import OWN_OUTPUT
-from toolkit.trust.seal.authority import make_authority
 from toolkit.trust.seal.check import SealCheck
 from toolkit.trust.seal.key import SealKey
 from toolkit.trust.seal.x509 import Trust

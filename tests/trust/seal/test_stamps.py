@@ -18,12 +18,12 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from pyhanko.sign.timestamps import DummyTimeStamper
 
+from tests.trust.seal.authority import Authority, make_authority
 from tests.trust.seal.seal_factory import key, plain_pdf
 from toolkit.cli.main import run
 from toolkit.errors import TrustError
 from toolkit.lab.home import packaged_home
 from toolkit.lab.signatures.sealing import Sealing
-from toolkit.trust.seal.authority import Authority, make_authority
 from toolkit.trust.seal.key import SealKey
 from toolkit.trust.seal.pdf import check_pdf
 from toolkit.trust.seal.stamps import StampServer, check_stamp, stamp

@@ -8,9 +8,9 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding
 
+from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import DAY, NOW, authority, key, plain_pdf, trust
 from toolkit.errors import TrustError
-from toolkit.trust.seal.authority import make_authority
 from toolkit.trust.seal.key import SealKey
 from toolkit.trust.seal.pdf import check_pdf, seal_pdf
 from toolkit.trust.seal.x509 import Trust, judge, read_trust, with_files
