@@ -232,6 +232,28 @@ class _Unseen:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Following:
+    """What the prediction errors of an equation along its recording propose."""
+
+    least: float = _set(
+        0.1, "of the prediction errors' square", "what takes less is left to the screen of free simulations"
+    )
+    later: float = _set(
+        0.03, "of what the terms before leave", "a second term beside a large one is fitted with it"
+    )
+    together: int = _set(2, "terms", "are fitted at once; a third is looked for beside them")
+    near: float = _set(0.5, "of the best gain", "what takes less than half of what another does is not it")
+    hopeless: float = _set(
+        0.05, "of the best gain", "what takes as little is not simulated beside one that takes all of it"
+    )
+    rival: float = _set(
+        0.5,
+        "of the gain reached",
+        "a candidate that promises as much by its free simulation is fitted as well",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Lattice:
     """Whether recorded values stand on coarse steps."""
 
@@ -384,10 +406,10 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER = _Scatter()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
-UNSEEN = _Unseen()
+UNSEEN, FOLLOWING = _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN, LATTICE,
+    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN, FOLLOWING, LATTICE,
     STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -125,15 +125,17 @@ class CandidateEffect:
         return self.active.effect.name
 
 
-def candidates(problem: Problem) -> tuple[CandidateEffect, ...]:
-    """Return every candidate of a case."""
+def candidates(
+    problem: Problem, *, view: Callable[[Problem, str | None, str | None], CaseView] = CaseView
+) -> tuple[CandidateEffect, ...]:
+    """Return every candidate of a case, scaled by how the case is seen at each place."""
     listed = []
     for effect in (*effects().values(), INPUT_NOISE):
         if effect.in_time and not problem.case.has_time:
             continue
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
-            case = CaseView(problem, channel, source)
+            case = view(problem, channel, source)
             confined = effect.in_case(case)
             starts = _starts(case, confined)
             for runs in subsets if starts else ():

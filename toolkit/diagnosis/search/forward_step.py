@@ -48,7 +48,7 @@ class Joint:
 
 
 def step_groups(
-    ranked: Sequence[Scored], hinted: Sequence[Scored], hidden: frozenset[EffectKey], least: float
+    significant: Sequence[Scored], hinted: Sequence[Scored], hidden: frozenset[EffectKey], least: float
 ) -> list[tuple[Sequence[Scored], float]]:
     """Return candidates in the order of joint fits, with the least share of the error that each must take.
 
@@ -57,17 +57,17 @@ def step_groups(
     whose own model is never exact. What is only hinted at comes last, and has to explain nearly all.
     """
     last = [(hinted[: STEP.refined], STEP.shown)] if hinted else []
-    if not ranked:
+    if not significant:
         return last
-    near = min(STEP.far_behind * ranked[0].gain, ranked[0].gain - STEP.near)
-    first = [scored for scored in ranked if scored.gain > near][: STEP.refined]
+    near = min(STEP.far_behind * significant[0].gain, significant[0].gain - STEP.near)
+    first = [scored for scored in significant if scored.gain > near][: STEP.refined]
     # What the refit may have absorbed is fitted with the first, however small it looks from there.
     first += [
         scored
-        for scored in ranked
+        for scored in significant
         if scored.candidate.key in hidden and all(scored is not near_best for near_best in first)
     ]
-    behind = [scored for scored in ranked if all(scored is not near_best for near_best in first)][
+    behind = [scored for scored in significant if all(scored is not near_best for near_best in first)][
         : STEP.refined
     ]
     return [(first, least), *([(behind, STEP.least_behind)] if behind else []), *last]
@@ -83,10 +83,15 @@ def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tupl
     weight = _weight(problem)
     joints = []
     for scored in promising:
-        fitted = joint_fit(problem, base, (scored.active,))
+        fitted = joint_fit(problem, base, (scored.active,), begin=scored.p)
         if fitted is not None:
             penalty = weight * sum(not parameter.ends_count for parameter in scored.active.searched)
             joints.append(Joint(scored=scored, fit=fitted, score=fitted.log_posterior - penalty))
+    return ranked(problem, joints)
+
+
+def ranked(problem: Problem, joints: Sequence[Joint]) -> tuple[Joint, ...]:
+    """Return joint fits in their order, the best first; of equals the likeliest."""
     best = max((joint.score for joint in joints), default=0.0)
 
     def order(joint: Joint) -> tuple[bool, float]:
@@ -196,17 +201,23 @@ def _weight(problem: Problem) -> float:
 
 
 def joint_fit(
-    problem: Problem, base: Fit, added: Sequence[AppliedEffect], *, plain: bool | None = None
+    problem: Problem,
+    base: Fit,
+    added: Sequence[AppliedEffect],
+    *,
+    plain: bool | None = None,
+    begin: tuple[float, ...] | None = None,
 ) -> Fit | None:
     """Return the joint fit with effects more, None where the simulation runs with no part of them.
 
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
     true one is not. An effect that changes an answer's shape begins at the declared parameters as well, where
-    a refit without it has moved them: they may have gone where it no longer helps.
+    a refit without it has moved them: they may have gone where it no longer helps. Where it was seen with
+    parameters of its own, it begins at these (``begin``).
     """
-    starts = [base.p]
+    starts = [base.p if begin is None else begin]
     moved = float(np.abs(problem.off_priors(base.p)).max(initial=0.0))
-    if moved > PRIORS.moved and any(effect.effect.misleads for effect in added):
+    if begin is None and moved > PRIORS.moved and any(effect.effect.misleads for effect in added):
         starts.append(tuple(parameter.value for parameter in problem.free))
     fits = [_fitted(problem, base, added, start, plain) for start in starts]
     return max((fitted for fitted in fits if fitted), key=lambda fitted: fitted.log_posterior, default=None)

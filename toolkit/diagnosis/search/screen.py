@@ -19,6 +19,7 @@ from toolkit.diagnosis.fit.fit import Fit, jacobian, log_prior
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood, whiten
 from toolkit.diagnosis.policy import SCREENING
 from toolkit.diagnosis.search.candidates import CandidateEffect, Start
+from toolkit.diagnosis.simulators.simulator import TermPattern
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
@@ -37,6 +38,7 @@ class Scored:
     ``directions`` are its responses over all rows of each output, one column for each amplitude; ``block``
     the same whitened, off the nominal parameters, orthonormal. A gain is first a quick one, at the noise of
     the fit or at white noise, whichever is larger; `LinearisedFit.sharpened` makes the best ones exact.
+    ``p`` are free parameters with which it was seen, where those are not the fit's.
     """
 
     candidate: CandidateEffect
@@ -46,6 +48,7 @@ class Scored:
     directions: Stacked
     block: NDArray[np.float64]
     trust: float
+    p: tuple[float, ...] | None = None
 
     @property
     def dof(self) -> int:
@@ -129,7 +132,7 @@ class LinearisedFit:
         listed = [
             replace(candidate.active, values=values)
             for candidate in candidates
-            if not candidate.has_pattern
+            if not candidate.has_pattern and not self._is_pushed(candidate)
             for start in candidate.starts
             for values in start.directions
         ]
@@ -172,6 +175,12 @@ class LinearisedFit:
             except FitError:
                 yield from ({} for _ in candidate.starts)
             return
+        if self._is_pushed(candidate):
+            try:
+                yield from self._pushed(candidate)
+            except FitError:
+                yield from ({} for _ in candidate.starts)
+            return
         for start in candidate.starts:
             responses = []
             try:
@@ -186,6 +195,27 @@ class LinearisedFit:
                 name: np.stack([response[name] for response in responses], axis=1)
                 for name in self.problem.names
             }
+
+    def _is_pushed(self, candidate: CandidateEffect) -> bool:
+        """Tell whether a candidate's response is taken along the motion, and not simulated.
+
+        Friction that turns takes many times a smooth term's time, for a response that is linear while it is
+        small; what it does where it is large, the equation along the recording tells.
+        """
+        term, moving = candidate.active.effect.term, self.problem.model.capability.motion
+        return term is not None and term.bristle is not None and moving is not None and moving.integrates
+
+    def _pushed(self, candidate: CandidateEffect) -> Iterator[Stacked]:
+        """Give the linear responses of every start to small forces."""
+        values = [values for start in candidate.starts for values in start.directions]
+        pattern = TermPattern(((candidate.active.effect, tuple(values)),))
+        base = self.base
+        moved = self.problem.pushed(base.p, base.active, candidate.active, pattern, len(values))
+        at = 0
+        for start in candidate.starts:
+            columns = slice(at, at + len(start.directions))
+            at = columns.stop
+            yield {name: -response[:, columns] for name, response in moved.items()}
 
     def quick(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, NDArray[np.float64]]:
         """Return twice the gain at a fixed noise, the better of two, and the responses' orthonormal block."""

@@ -20,6 +20,7 @@ from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, s
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise
 from toolkit.diagnosis.search.pairs import best_pair
+from toolkit.diagnosis.search.proposed_step import beside_rivals, proposed_step
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -161,8 +162,21 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     structure: tuple[StructureFound, ...] = ()
     try:
         for turn in range(STEP.most_effects + 1):
-            budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
-            view = look(problem, base, listed, turn=turn, seed=seed + turn)
+            share = STEP.later if turn else STEP.first
+
+            def fitting(scored: Sequence[Scored], turn: int = turn) -> None:
+                names = ", ".join(dict.fromkeys(trial.candidate.name for trial in scored))
+                budget.check(f"step {turn + 1}: joint fits of {names}")
+
+            led = None
+            if turn < STEP.most_effects:
+                budget.check(f"step {turn + 1}: the equation along the recording")
+                led = proposed_step(
+                    problem, folds, base, held_base, least=share, refitted=held_refitted, tell=fitting
+                )
+            sought = listed if led is None else led.sought(listed)
+            budget.check(f"step {turn + 1}: screening {len(sought)} candidates")
+            view = look(problem, base, sought, turn=turn, seed=seed + turn)
             view = from_declared(problem, base, view)
             screen, scored = view.screen, view.scored
             budget.check(f"step {turn + 1}: structure of the residual")
@@ -172,15 +186,20 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 before = structure
             if turn == STEP.most_effects:
                 break
+            if led is not None:
+                base, held_base, more = beside_rivals(
+                    problem, folds, base, held_base, led, view,
+                    least=share, refitted=held_refitted, tell=fitting,
+                )  # fmt: skip
+                steps += [step for step in more if not _is_nuisance(step, steps)]
+                continue
             budget.check(f"step {turn + 1}: unseen runs")
             outcome = shown_on_unseen_runs(problem, folds, base, held_base, view)
             hidden = masked(problem, base, view.candidates) if view.significant else frozenset()
             hinted = view.hinted if folds.by_run and len(problem.runs) >= STEP.runs else ()
-            share = STEP.later if turn else STEP.first
             groups = step_groups(view.significant, hinted, hidden, share) if outcome is None else []
             for promising, least in groups:
-                names = ", ".join(dict.fromkeys(trial.candidate.name for trial in promising))
-                budget.check(f"step {turn + 1}: joint fits of {names}")
+                fitting(promising)
                 joint = joint_fits(problem, base, promising)
                 outcome = best_step(problem, folds, base, held_base, joint, view.p_of, least, held_refitted)
                 if outcome is not None:

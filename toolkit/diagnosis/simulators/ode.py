@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.channels import channel_places, slopes, through_channels
+from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.equation import Equation, failed
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
-from toolkit.diagnosis.simulators.linear_response import propagated
 from toolkit.diagnosis.simulators.ode_apart import OdeApart, handlers_of
+from toolkit.diagnosis.simulators.ode_following import followed
+from toolkit.diagnosis.simulators.ode_responses import pushed
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
@@ -25,7 +27,7 @@ from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.filters import STRAIGHT
-from toolkit.effects.law import ITSELF, POSITION, TIME, is_law
+from toolkit.effects.law import is_law
 from toolkit.effects.signals import Setting
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import ConfigError, FitError
@@ -37,11 +39,11 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
-    from toolkit.diagnosis.simulators.simulator import Largest, Pattern
+    from toolkit.diagnosis.simulators.simulator import Largest
     from toolkit.worker.serve import Handlers
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
-_FINER = 4
+FINER = 4  # rows between two rows, one of them among them
 _MISSED = 3  # times in turn: an equation that is not smooth enough
 _LEVELS = 41  # quantiles of a state
 _MOST_HELD = 200_000_000  # bytes of simulations to remember
@@ -53,10 +55,10 @@ class OdeModel:
     def __init__(
         self, case: Case, rhs: Callable[..., Any], outputs: Callable[..., Any], initial: Callable[..., Any]
     ) -> None:
-        self.case, self._equation = case, Equation(case, rhs, outputs, initial)
+        self.case, self.equation = case, Equation(case, rhs, outputs, initial)
         self.parameters = case.parameters
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
-        self._drivers = tuple(driver.name for driver in case.drivers)
+        self.drivers = tuple(driver.name for driver in case.drivers)
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
         self._held = 0  # bytes of what is kept
@@ -67,7 +69,7 @@ class OdeModel:
         self._slopes: dict[tuple[Run, ...], NDArray[np.float64] | None] = {}
         self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
         p = {parameter.name: parameter.value for parameter in case.parameters}
-        start = self._equation.start(case.runs[0], p)
+        start = self.equation.start(case.runs[0], p)
         names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
         if len(names) != len(start):
             raise ConfigError(
@@ -83,9 +85,9 @@ class OdeModel:
                 "a force term names no state", where=f"{case.path}: simulation.force_terms",
                 got=", ".join(unknown), expected=", ".join(names), next_step="correct the name", rule="case",
             )  # fmt: skip
-        self._derivative_of = self._equation.kinematics(p)
+        self.derivative_of = self.equation.kinematics(p)
         self.force_units = terms or {
-            name: "" for i, name in enumerate(names) if i not in self._derivative_of.values()
+            name: "" for i, name in enumerate(names) if i not in self.derivative_of.values()
         }
         self.scale: dict[str, tuple[float, float]] = {}
         self.scale = self._sizes(p)
@@ -99,18 +101,18 @@ class OdeModel:
             motion=Moving(
                 integrates=True, sizes=self._motion_sizes, units=self._motion_units, way=self._way,
                 position=lambda channel: self.position_of(str(channel)), states=self._ranges(),
-                pushed=self._pushed,
+                pushed=functools.partial(pushed, self), followed=functools.partial(followed, self),
             ),
         )  # fmt: skip
 
     def _sizes(self, p: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """Return for every state that a term may enter: size of its rate, and spread of itself."""
         runs = self.case.runs
-        first = self._equation.start(runs[0], p)
-        self._equation.try_columns(runs[0], np.repeat(first[:, None], runs[0].rows, axis=1), p)
-        states = [self._integrate(run, p, ()) for run in runs]
-        self._equation.try_columns(runs[0], states[0], p)
-        self._dimensions = dimensions(states[0], self._equation.shown(runs[0], p, states[0]), self.outputs)
+        first = self.equation.start(runs[0], p)
+        self.equation.try_columns(runs[0], np.repeat(first[:, None], runs[0].rows, axis=1), p)
+        states = [self.integrated(run, p, ()) for run in runs]
+        self.equation.try_columns(runs[0], states[0], p)
+        self._dimensions = dimensions(states[0], self.equation.shown(runs[0], p, states[0]), self.outputs)
         x = np.concatenate(states, axis=1)
         rates = [
             np.gradient(state, run.t, axis=1) if run.rows > 2 else np.zeros_like(state)
@@ -118,7 +120,7 @@ class OdeModel:
         ]
         fastest = np.abs(np.concatenate(rates, axis=1)).max(axis=1)
         steps = [np.abs(np.diff(state, axis=1)) for state in states]
-        self._ways = {
+        self.ways = {
             name: (
                 max(float(np.ptp(state[i])) for state in states),
                 float(np.median(np.concatenate([step[i] for step in steps] or [np.zeros(1)]))),
@@ -129,7 +131,7 @@ class OdeModel:
         self._largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
         farthest = np.abs(x).max(axis=1)
         self._reach = {
-            name: (float(farthest[i]) or 1.0, float(farthest[self._derivative_of.get(i, i)]) or 1.0)
+            name: (float(farthest[i]) or 1.0, float(farthest[self.derivative_of.get(i, i)]) or 1.0)
             for i, name in enumerate(self.states)
         }
         return {
@@ -183,62 +185,16 @@ class OdeModel:
 
     def _way(self, channel: str | None) -> tuple[float, float]:
         position = self.position_of(str(channel))
-        return (0.0, 0.0) if position is None else self._ways[position]
+        return (0.0, 0.0) if position is None else self.ways[position]
 
-    def _pushed(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        active: Sequence[AppliedEffect],
-        channel: str | None,
-        pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return linear responses of every output to small forces of a pattern along the motion.
-
-        They have the shape (rows, forces).
-        """
-        at = self.states.index(str(channel))
-        forces = [
-            applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
-        ]
-        acting, own_states = self._forces(forces), len(self.states)
-        x = self._integrate(run, p, forces)
-        if run.rows < 2:
-            return {}
-        fine = self._between(run, p, forces, x)
-        rates_at = self._equation.rates_at(run, p, acting, len(self.states))
-        sizes = np.array([*(self.scale[name][1] for name in self.states), *acting.sizes])
-        try:
-            with silenced():
-                moved = propagated(
-                    rates_at, self._finer(run).t, fine,
-                    pattern(self._signals(run, fine, at)), at=at, sizes=sizes,
-                )[::_FINER]  # fmt: skip
-        except (Exception, SystemExit) as error:
-            raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
-        outputs = self._equation.shown(run, p, x[:own_states])
-        responses = {name: np.zeros((run.rows, moved.shape[2])) for name in outputs}
-        for i in range(own_states):
-            shifted = x[:own_states].copy()
-            shifted[i] += 1e-6 * sizes[i]
-            there = self._equation.shown(run, p, shifted)
-            for name, column in responses.items():
-                column += ((there[name] - outputs[name]) / (1e-6 * sizes[i]))[:, None] * moved[:, i]
-        shown = slopes(outputs, active, run, self.setting(run), run.columns)
-        return {name: shown[name][:, None] * column for name, column in responses.items()}
-
-    def _signals(self, run: Run, fine: NDArray[np.float64], at: int) -> dict[str, NDArray[np.float64]]:
-        """Return what a term in the equation of a state may read, between the rows too."""
-        finer = self._finer(run)
-        inputs = {name: finer.columns[name] for name in self._drivers}
-        return {
-            **inputs, **dict(zip(self.states, fine, strict=False)), TIME: finer.t,
-            ITSELF: fine[at], POSITION: fine[self._derivative_of.get(at, at)],
-        }  # fmt: skip
+    def steps(self, runs: Sequence[Run]) -> NDArray[np.intp]:
+        """Return the steps of every interval of runs behind one another, as the simulation needed them."""
+        parts = [np.append(np.broadcast_to(self._steps.get(run, 1), run.rows - 1), 1) for run in runs]
+        return np.concatenate(parts)[:-1].astype(np.intp)
 
     def position_of(self, name: str) -> str | None:
         """Return the state whose rate is this state, None where there is none."""
-        at = self._derivative_of.get(self.states.index(name))
+        at = self.derivative_of.get(self.states.index(name))
         return None if at is None else self.states[at]
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
@@ -253,7 +209,7 @@ class OdeModel:
         """Return every output of a free simulation over the whole run."""
         key, forces = self._key(run, p, active)
         if key not in self._kept:
-            states = self._integrate(run, p, forces, alone=key in self._alone)
+            states = self.integrated(run, p, forces, alone=key in self._alone)
             self._keep(key, self._made(run, p, forces, states, between=key[1]))
         simulated = self._kept[key]
         if isinstance(simulated, FitError):
@@ -265,9 +221,9 @@ class OdeModel:
             replace(applied, values={**applied.values, STRAIGHT: 1.0}) if _between_rows(applied) else applied
             for applied in active
         ]
-        finer = self._finer(run)
+        finer = self.finer(run)
         shown = through_channels(simulated, fine, finer, self.setting(finer), finer.columns)
-        return {name: values[::_FINER] for name, values in shown.items()}
+        return {name: values[::FINER] for name, values in shown.items()}
 
     def _prepare(
         self,
@@ -276,7 +232,7 @@ class OdeModel:
     ) -> None:
         """Integrate several runs, sets of parameters and effects at once, for `simulate` to find."""
         runs = [run for run in runs if run.rows > 1]
-        if self._equation.columns is None or not runs:
+        if self.equation.columns is None or not runs:
             return
         listed = {}
         for p, active in points:
@@ -323,11 +279,11 @@ class OdeModel:
 
         The states that forces bring along stand where `Forces` of all of a set's effects puts them.
         """
-        columns, own = self._equation.columns, len(self.states)
+        columns, own = self.equation.columns, len(self.states)
         assert columns is not None  # noqa: S101  asked by whoever calls
-        forces = [self._forces(active) for _, active in listed]
-        together, rows = ForcesTogether(forces, own, runs), Rows(runs, self._drivers)
-        starts = [np.stack([self._equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
+        forces = [self.forces(active) for _, active in listed]
+        together, rows = ForcesTogether(forces, own, runs), Rows(runs, self.drivers)
+        starts = [np.stack([self.equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
         atol = np.stack([self._tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
         p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
         x = np.zeros((own + together.added, len(listed), len(rows.t)))
@@ -358,10 +314,10 @@ class OdeModel:
         self._slopes[tuple(runs)] = path.slopes
         return [path.x[:, :, at] for at in rows.slices], reached
 
-    def _finer(self, run: Run) -> Run:
+    def finer(self, run: Run) -> Run:
         """Return a run with rows between its rows, the inputs there as the equation sees them: linear."""
         if run not in self._fine:
-            at = np.arange(_FINER * (run.rows - 1) + 1) / _FINER
+            at = np.arange(FINER * (run.rows - 1) + 1) / FINER
             rows = np.arange(run.rows)
             columns = {name: np.interp(at, rows, values) for name, values in run.columns.items()}
             self._fine[run] = replace(run, t=np.interp(at, rows, run.t), columns=columns)
@@ -388,15 +344,16 @@ class OdeModel:
             0 if isinstance(simulated, FitError) else sum(column.nbytes for column in simulated.values())
         )
 
-    def _integrate(
+    def integrated(
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool = False
     ) -> NDArray[np.float64]:
-        acting = self._forces(forces)
-        rate = self._equation.rates(run, dict(p), acting, len(self.states))
-        start = self._equation.start(run, p)
+        """Return the states of a run, (states, rows), those that forces bring along behind the own ones."""
+        acting = self.forces(forces)
+        rate = self.equation.rates(run, dict(p), acting, len(self.states))
+        start = self.equation.start(run, p)
         if run.rows == 1:
             return start[:, None]
-        if self._equation.columns is not None and not alone:
+        if self.equation.columns is not None and not alone:
             with contextlib.suppress(Exception):  # whatever it is, row by row it is raised by name
                 (states,), reached = self._solved([run], [(p, forces)])
                 if reached[0]:
@@ -422,8 +379,9 @@ class OdeModel:
             [*sizes, *(10 * size for size in acting.sizes), *[1.0] * (added - acting.added)]
         )
 
-    def _forces(self, active: Sequence[AppliedEffect]) -> Forces:
-        return Forces.of(active, self.states, self._derivative_of, self.scale, self._drivers)
+    def forces(self, active: Sequence[AppliedEffect]) -> Forces:
+        """Return effects as forces on the equation's states."""
+        return Forces.of(active, self.states, self.derivative_of, self.scale, self.drivers)
 
     def _made(
         self,
@@ -436,35 +394,35 @@ class OdeModel:
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs of integrated states, also ``between`` the rows."""
         if between:
-            x, run = self._between(run, p, forces, x), self._finer(run)
-        return self._equation.shown(run, p, x[: len(self.states)])
+            x, run = self.between(run, p, forces, x), self.finer(run)
+        return self.equation.shown(run, p, x[: len(self.states)])
 
-    def _between(
+    def between(
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], x: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return states also between the rows, by their rates at the rows: those have no corner there."""
         from scipy.interpolate import CubicHermiteSpline
 
-        acting = self._forces(forces)
+        acting = self.forces(forces)
         x = x[: len(self.states) + acting.added]
         try:
             with silenced():
-                rates = self._equation.rates_at(run, p, acting, len(self.states))(run.t, x)
+                rates = self.equation.rates_at(run, p, acting, len(self.states))(run.t, x)
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
-        return np.asarray(CubicHermiteSpline(run.t, x, rates, axis=1)(self._finer(run).t))
+        return np.asarray(CubicHermiteSpline(run.t, x, rates, axis=1)(self.finer(run).t))
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the states and outputs on which an effect could act."""
-        drivers = set(self._drivers)
+        drivers = set(self.drivers)
         if effect.term is not None:
             if is_law(effect.name):
                 return [(state, None) for state in term_places(self.places)]
             if effect.term.of == "state":
-                return [(name, None) for i, name in enumerate(self.states) if i not in self._derivative_of]
+                return [(name, None) for i, name in enumerate(self.states) if i not in self.derivative_of]
             at = [self.states.index(name) for name in self.force_units]
             dimensions = {} if self.case.simulation.force_terms else self._dimensions
-            return [(self.states[i], None) for i in fitting(effect.term, at, self._derivative_of, dimensions)]
+            return [(self.states[i], None) for i in fitting(effect.term, at, self.derivative_of, dimensions)]
         others = [(driver.name, driver.unit) for driver in self.case.drivers]
         return channel_places(
             effect, [(output.name, output.unit) for output in self.outputs], others, drivers

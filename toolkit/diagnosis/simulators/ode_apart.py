@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.diagnosis.simulators.channels import channel_places
-from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange, TermPattern
+from toolkit.diagnosis.simulators.following import Followed, following_shapes, padded
+from toolkit.diagnosis.simulators.simulator import (
+    Capability,
+    Following,
+    Moving,
+    Output,
+    StateRange,
+    TermPattern,
+)
 from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effect as named_effect
@@ -32,6 +40,8 @@ if TYPE_CHECKING:
     Crossing = tuple[tuple[Any, ...], ...]
     Place = tuple[str | None, str | None]
 
+_ANSWERS = "\0answers"  # of the parameters
+_MOST_ADDED = 2  # states that an effect brings along
 _USABLE = "\0usable"  # one for each set that could be simulated; no channel has such a name
 _SIZES = ("force", "speed", "place", "fastest", "farthest", "level")
 
@@ -47,6 +57,7 @@ class OdeApart:
         )
         # Asked once and at the start: what an answer needs is then there, whatever has become of the worker.
         self._places, self._motions, states = _facts_of(code.value("facts"))
+        self._own = len(states)
         self._prepared: dict[Run, dict[Any, Arrays]] = {}
         self.capability = Capability(
             nominal_load_N=None,
@@ -63,6 +74,7 @@ class OdeApart:
                 position=lambda channel: self._motions[str(channel)].position,
                 states=states,
                 pushed=self._pushed,
+                followed=self._followed,
             ),
         )
 
@@ -130,6 +142,22 @@ class OdeApart:
         terms = [(effect.name, tuple(map(dict, starts))) for effect, starts in pattern.terms]
         return self._code.arrays("pushed", run, p, shapes, _crossing(active), channel, terms)
 
+    def _followed(
+        self,
+        runs: Sequence[Run],
+        p: Mapping[str, float],
+        active: Sequence[AppliedEffect],
+        asked: Following,
+    ) -> tuple[Followed, NDArray[np.float64]]:
+        rows, outputs = sum(run.rows for run in runs), len(self.outputs)
+        shapes = following_shapes(rows, self._own, self._own + _MOST_ADDED * len(active), outputs)
+        shapes[_ANSWERS] = (rows, outputs, len(asked.steps))
+        made = self._code.arrays(
+            "followed", runs[0], p, shapes, _crossing(active), [self._code.number(run) for run in runs],
+            [dict(asked.steps), dict(asked.sensor), {name: list(at) for name, at in asked.unread.items()}],
+        )  # fmt: skip
+        return Followed(**{name: made[name] for name in shapes if name != _ANSWERS}), made[_ANSWERS]
+
 
 def handlers_of(case: Case, model: Model) -> Handlers:
     """Return what a worker answers of an equation."""
@@ -186,7 +214,26 @@ def handlers_of(case: Case, model: Model) -> Handlers:
         pattern = TermPattern(tuple((named_effect(name), starts) for name, starts in terms))
         return Numbers(moving.pushed(runs[run], p, _crossed(active), channel, pattern))
 
+    def followed(
+        _: int, p: Mapping[str, float], active: Crossing, numbers: Sequence[int], question: Sequence[Any]
+    ) -> Any:
+        steps, sensor, unread = question
+        asked = Following(steps=steps, sensor=sensor, unread={name: tuple(at) for name, at in unread.items()})
+        chosen = [runs[number] for number in numbers]
+        assert moving.followed is not None  # noqa: S101  of every equation
+        made, answers = moving.followed(chosen, p, _crossed(active), asked)
+        shapes = following_shapes(
+            len(made.errors),
+            made.entry.shape[2],
+            made.entry.shape[2] + _MOST_ADDED * len(active),
+            made.errors.shape[1],
+        )
+        arrays = Numbers({name: padded(getattr(made, name), shape) for name, shape in shapes.items()})
+        arrays[_ANSWERS] = answers
+        return arrays
+
     return {
+        "followed": followed,
         "simulate": lambda run, p, active: Numbers(model.simulate(runs[run], p, _crossed(active))),
         "together": prepared,
         "pushed": pushed,

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Run
+    from toolkit.diagnosis.simulators.following import Followed
     from toolkit.effects.applied import AppliedEffect
     from toolkit.effects.effect import Effect
     from toolkit.effects.surroundings import MotionSizes
@@ -83,6 +84,20 @@ class StateRange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Following:
+    """What is asked of an equation that is led along its recording.
+
+    ``steps`` are the steps of parameters to which prediction errors are to answer; ``sensor`` is the largest
+    that the noise of each output's sensor can be; ``unread`` are rows of an output that do not count, over
+    all runs.
+    """
+
+    steps: Mapping[str, float]
+    sensor: Mapping[str, float]
+    unread: Mapping[str, tuple[int, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Moving:
     """What moves in a simulation, and what forces do to it; channels are those that a force may act on.
 
@@ -96,6 +111,9 @@ class Moving:
     states : what a law in an equation may read beside the inputs and the time; none where none is integrated
     pushed : (run, parameters, effects, channel, pattern) -> linear responses of every output to small forces
         of a pattern over the position, (rows, forces); none where none move
+    followed : (runs, parameters, effects, what is asked) -> the equation along the recording, and how its
+        prediction errors answer to the parameters, (rows, outputs, parameters); FitError where there is no
+        following it. None where nothing is integrated
     """
 
     integrates: bool
@@ -105,6 +123,13 @@ class Moving:
     position: Callable[[str | None], str | None]
     states: tuple[StateRange, ...]
     pushed: Callable[[Run, Parameters, Sequence[AppliedEffect], str | None, Pattern], Arrays]
+    followed: (
+        Callable[
+            [Sequence[Run], Parameters, Sequence[AppliedEffect], Following],
+            tuple[Followed, NDArray[np.float64]],
+        ]
+        | None
+    ) = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,7 +204,7 @@ class Supervised:
             known,
             repeats=None if repeats is None else guarded(repeats),
             together=None if together is None else guarded(together),
-            motion=None if motion is None else dataclasses.replace(motion, pushed=guarded(motion.pushed)),
+            motion=None if motion is None else _guarded(motion, guarded),
         )
 
     def observed(self, run: Run) -> Arrays:
@@ -197,3 +222,8 @@ class Supervised:
     def release(self) -> None:
         """Let every further question through as it is."""
         self._simulate, self.capability = self._plain.simulate, self._plain.capability
+
+
+def _guarded(motion: Moving, guarded: Callable[[Callable[..., Any]], Callable[..., Any]]) -> Moving:
+    followed = None if motion.followed is None else guarded(motion.followed)
+    return dataclasses.replace(motion, pushed=guarded(motion.pushed), followed=followed)

@@ -102,7 +102,7 @@ def _converged(
         if slopes is None:
             # At first those of one set stand for all: they are seldom far from each other.
             chosen = slice(0, 1) if kept is None else slice(None)
-            slopes = _slopes(flow, there[:, chosen], ends[:, chosen], steps, at[chosen], sizes)
+            slopes = flow_slopes(flow, there[:, chosen], ends[:, chosen], steps, at[chosen], sizes)
             kept = slopes[:, :1] if kept is None or len(active) == len(sets) else kept
         off_rows = ends - there[:, :, 1:]
         moved = recursion(slopes, off_rows)
@@ -129,7 +129,7 @@ def _converged(
     return errors, kept, solved
 
 
-def _slopes(flow: RowFlow, x: Array, ends: Array, steps: Places, sets: Places, sizes: Array) -> Array:
+def flow_slopes(flow: RowFlow, x: Array, ends: Array, steps: Places, sets: Places, sizes: Array) -> Array:
     """Return the derivatives of the flow at every row, (rows, sets, states, states)."""
     n = len(x)
     slopes = np.empty((len(steps), len(sets), n, n))

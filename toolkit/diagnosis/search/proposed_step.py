@@ -1,0 +1,164 @@
+"""A forward step from what the recording itself proposes, and what free simulations put beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from toolkit.diagnosis.fit.fit import Fit
+from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out, matters
+from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import FOLLOWING, PAIRS, STEP
+from toolkit.diagnosis.search.forward_step import (
+    Joint,
+    Rival,
+    Step,
+    at_bound,
+    best_step,
+    joint_fit,
+    joint_fits,
+    ranked,
+)
+from toolkit.diagnosis.search.proposals import Proposals, proposals
+from toolkit.diagnosis.search.screen import Scored
+from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.search.candidates import CandidateEffect
+    from toolkit.diagnosis.search.screen_step import Look
+
+    Outcome = tuple[Fit, HeldOut, tuple[Step, ...]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProposedStep:
+    """What stands on unseen rows: its outcome, the joint fits that it was chosen of, and the proposals."""
+
+    outcome: Outcome
+    joint: tuple[Joint, ...]
+    proposed: Proposals
+
+    def sought(self, listed: Sequence[CandidateEffect]) -> list[CandidateEffect]:
+        """Return the candidates that are worth a free simulation beside the step.
+
+        One that turns or runs against a limit costs many times another: it is left out where it takes next to
+        none of the prediction errors.
+        """
+        return [
+            candidate
+            for candidate in listed
+            if candidate.key not in self.proposed.hopeless or not _is_abrupt(candidate)
+        ]
+
+
+def proposed_step(
+    problem: Problem,
+    folds: Folds,
+    base: Fit,
+    held_base: HeldOut,
+    *,
+    least: float,
+    refitted: HeldOut,
+    tell: Callable[[Sequence[Scored]], None],
+) -> ProposedStep | None:
+    """Return the step that the recording proposes, None where it proposes none that stands.
+
+    Parameters
+    ----------
+    least : share of an output's held-out mean square that it must take away
+    refitted : the held-out rows without any effect
+    tell : is told what is fitted
+    """
+    proposed = proposals(problem, base)
+    if not proposed.scored:
+        return None
+    for count in range(len(proposed.together), 1, -1):
+        tell(proposed.together[:count])
+        outcome = _joined(problem, folds, base, held_base, proposed, count, least)
+        if outcome is not None:
+            return ProposedStep(outcome, (), proposed)
+    promising = proposed.scored[: STEP.refined]
+    tell(promising)
+    joint = joint_fits(problem, base, promising)
+    single = best_step(problem, folds, base, held_base, joint, proposed.p_of, least, refitted)
+    return None if single is None else ProposedStep((*single[:2], (single[2],)), joint, proposed)
+
+
+def _joined(
+    problem: Problem,
+    folds: Folds,
+    base: Fit,
+    held_base: HeldOut,
+    proposed: Proposals,
+    count: int,
+    least: float,
+) -> Outcome | None:
+    """Return several terms fitted at once, None where they do not stand; the steps end on the largest.
+
+    Whether each of them is needed beside the others is asked of every step at the end of the search.
+    """
+    members = proposed.together[:count]
+    joint = joint_fit(problem, base, [scored.active for scored in members], begin=members[0].p)
+    if joint is None or any(at_bound(applied) for applied in joint.active):
+        return None
+    try:
+        held_out = hold_out(problem, folds, joint.active, joint)
+    except FitError:
+        return None
+    gained = held_out.total - held_base.total
+    if gained < count * STEP.least_gain or not matters(problem, held_base, held_out, max(least, PAIRS.least)):
+        return None
+    # What would take as much of the prediction errors as the largest is fitted in its place.
+    rivals = []
+    for scored in proposed.scored:
+        if scored.candidate.key in {member.candidate.key for member in members}:
+            continue
+        others = [scored.active, *(member.active for member in members[1:])]
+        instead = joint_fit(problem, base, others, begin=members[0].p)
+        if instead is not None:
+            difference = instead.log_posterior - joint.log_posterior
+            rivals.append(Rival(active=instead.active[-count], difference=difference))
+    steps = [
+        Step(
+            active=active, p_value=proposed.p_of[id(scored)], held_out_gain=gained,
+            gain=joint.log_posterior - base.log_posterior,
+            rivals=tuple(rivals) if scored is members[0] else (),
+        )
+        for scored, active in zip(members, joint.active[-count:], strict=True)
+    ]  # fmt: skip
+    return joint, held_out, tuple(reversed(steps))
+
+
+def beside_rivals(
+    problem: Problem,
+    folds: Folds,
+    base: Fit,
+    held_base: HeldOut,
+    led: ProposedStep,
+    view: Look,
+    *,
+    least: float,
+    refitted: HeldOut,
+    tell: Callable[[Sequence[Scored]], None],
+) -> Outcome:
+    """Return a proposed step, or a better one, with what free simulations promise in its place."""
+    fitted = {joint.scored.candidate.key for joint in led.joint}
+    promising = [
+        scored
+        for scored in view.significant
+        if scored.candidate.key not in fitted
+        and 0.5 * scored.gain > FOLLOWING.rival * led.outcome[2][-1].gain
+    ][: STEP.refined]
+    if not promising or not led.joint:
+        return led.outcome
+    tell(promising)
+    joint = ranked(problem, (*led.joint, *joint_fits(problem, base, promising)))
+    p_of = led.proposed.p_of | view.p_of
+    single = best_step(problem, folds, base, held_base, joint, p_of, least, refitted)
+    return led.outcome if single is None else (*single[:2], (single[2],))
+
+
+def _is_abrupt(candidate: CandidateEffect) -> bool:
+    term = candidate.active.effect.term
+    return term is not None and (term.limit is not None or term.bristle is not None)
