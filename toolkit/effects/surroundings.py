@@ -105,6 +105,10 @@ class Surroundings(Protocol):
         """Return the recorded values of a channel over all runs, (n,) without gaps; none where it was not."""
         ...
 
+    def widest(self, name: str | None) -> float | None:
+        """Return a channel's range in the run where it is widest, None where it was not recorded."""
+        ...
+
     def recorded_range(self, *names: str) -> float:
         """Return the range of the first of these channels that was recorded, 1 where none was."""
         ...

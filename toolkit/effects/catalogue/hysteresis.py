@@ -24,6 +24,7 @@ def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArra
 
     Play operators with half gaps spread evenly over (0, reach x span]; after a reversal a small reach turns
     at once (dry friction in a joint), a large one along the lens of a strained solid (Rayleigh's loop).
+    Before the recording the channel was loaded from zero for the first time.
     """
     span = values.get("_span") or 0.5 * float(np.ptp(y)) if len(y) else 0.0
     if not span:
@@ -32,8 +33,7 @@ def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArra
     height = float(np.mean(2 * np.minimum(halves, np.maximum(span - halves, 0.0))))
     if height <= 0:
         return y
-    middle = values.get("_middle", 0.5 * float(np.max(y) + np.min(y)))
-    loop = (plays(y, halves) - y + _line(halves, span) * (y - middle)) / height
+    loop = (plays(y, halves) - (1 - _line(halves, span)) * y) / height
     return y + values["gain"] * y + values["width"] * loop
 
 
@@ -47,12 +47,9 @@ def _line(halves: NDArray[np.float64], span: float) -> float:
 
 
 def _span(case: Surroundings) -> dict[str, float]:
-    """Return half the range of the channel and its middle, over all runs: its loops have one shape."""
-    values = case.values(case.channel)
-    if not len(values):
-        return {}
-    low, high = float(values.min()), float(values.max())
-    return {"_span": 0.5 * (high - low), "_middle": 0.5 * (high + low)}
+    """Return half the range of the run with the widest: no cycle goes from one run to another."""
+    widest = case.widest(case.channel)
+    return {} if widest is None else {"_span": 0.5 * widest}
 
 
 def _half_loop(values: Values) -> float:
@@ -66,7 +63,8 @@ EFFECT = Effect(
     rank=5,
     in_time=False,
     statement="The channel reads differently on the way up and on the way down.",
-    equation="y = (1 + gain) y_model + width * z, z: play operators with gaps up to reach, less their line",
+    equation="y = (1 + gain) y_model + width * z, z: play operators with gaps up to reach, first loaded from"
+    " zero, less their line",
     reference="Brokate and Sprekels, Hysteresis and Phase Transitions, 1996, ch. 2 (Prandtl and Ishlinskii)",
     signature="a loop over the channel's own value that does not depend on the rate",
     separates="load up and down at two rates",
@@ -74,7 +72,7 @@ EFFECT = Effect(
         EffectParameter(
             name="width",
             unit="{channel}",
-            text="full height of the loop",
+            text="full height of the loop over the range of the widest run",
             typical=(0.002, 0.1),
             scale=of_channel,
             bounds=(0.0, float("inf")),
@@ -89,7 +87,7 @@ EFFECT = Effect(
         EffectParameter(
             name="reach",
             unit="1",
-            text="of half the recorded range, within which a reversal is completed",
+            text="of half the range of the widest run, within which a reversal is completed",
             typical=(0.05, 1.0),
             off=None,
             bounds=(0.01, 1.5),
