@@ -90,8 +90,8 @@ class AppliedEffect:
 
     @property
     def searched(self) -> tuple[EffectParameter, ...]:
-        """Parameters that a fit moves: none of an effect that is there or not."""
-        return () if self.effect.discrete else self.effect.parameters
+        """Parameters that a fit moves: none of an effect that is there or not, or is read off the digits."""
+        return () if self.effect.discrete or self.effect.from_digits else self.effect.parameters
 
     def log_prior(self, case: Surroundings) -> float:
         """Return how likely its size is before the recording speaks; 0 of an effect that is there or not."""
