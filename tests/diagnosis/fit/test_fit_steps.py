@@ -1,4 +1,4 @@
-"""A step that was read off the digits is fitted by nothing: beside it a fit is that of the smooth simulation."""
+"""A step that was read off the digits is moved by no fit: what is fitted beside it is smooth."""
 
 import numpy as np
 import pytest
