@@ -40,7 +40,7 @@ class Case:
         return np.linspace(-700.0, 700.0, 30)
 
     def widest(self, _name):
-        return 1400.0
+        return -700.0, 700.0
 
     def recorded_range(self, *_names):
         return 3.0

@@ -105,8 +105,8 @@ class Surroundings(Protocol):
         """Return the recorded values of a channel over all runs, (n,) without gaps; none where it was not."""
         ...
 
-    def widest(self, name: str | None) -> float | None:
-        """Return a channel's range in the run where it is widest, None where it was not recorded."""
+    def widest(self, name: str | None) -> tuple[float, float] | None:
+        """Return the ends of a channel in the run where its range is widest, None where it has none."""
         ...
 
     def recorded_range(self, *names: str) -> float:

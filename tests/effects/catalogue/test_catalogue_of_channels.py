@@ -102,9 +102,9 @@ def test_a_hysteresis_that_reaches_over_the_whole_range_is_the_lens_of_Rayleigh(
 
 def test_a_recording_that_begins_on_the_first_loading_has_the_same_hysteresis():
     y = 2.0 * np.sin(0.8 * T)
-    whole = act("hysteresis", y, width=0.1, reach=1.0, gain=0.0, _span=2.0)
+    whole = act("hysteresis", y, width=0.1, reach=1.0, gain=0.0, _span=2.0, _middle=0.0)
     late = slice(200, None)  # at 1 s, before the first reversal
-    cut = act("hysteresis", y[late], t=T[late], width=0.1, reach=1.0, gain=0.0, _span=2.0)
+    cut = act("hysteresis", y[late], t=T[late], width=0.1, reach=1.0, gain=0.0, _span=2.0, _middle=0.0)
     np.testing.assert_allclose(cut, whole[late], atol=1e-12)
 
 

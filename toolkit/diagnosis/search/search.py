@@ -129,14 +129,10 @@ class Search:
     def variance(self, at: int) -> float:
         """Return the variance of a parameter of the augmented fit, by its place among them.
 
-        What a short series leaves open of its noise's colour widens it as it shortens a gain; and what the
-        form of an effect's law leaves open of its size stands beside the noise.
+        What a short series leaves open of its noise's colour widens it as it shortens a gain.
         """
         fit = self.augmented
-        forms = [0.0] * len(self.problem.free)
-        for applied in fit.active:
-            forms += [applied.form_uncertainty(parameter) for parameter in applied.searched]
-        return float(fit.covariance[at, at]) / self.screen.trust(fit.noise) + forms[at] ** 2
+        return float(fit.covariance[at, at]) / self.screen.trust(fit.noise)
 
 
 def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from toolkit.effects.signals import Setting
 
-_OPERATORS = 10
+_OPERATORS = 20  # of half as many the corners are so far apart that a fit of reach ends between them
 
 
 def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
@@ -33,7 +33,8 @@ def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArra
     height = float(np.mean(2 * np.minimum(halves, np.maximum(span - halves, 0.0))))
     if height <= 0:
         return y
-    loop = (plays(y, halves) - (1 - _line(halves, span)) * y) / height
+    middle = values.get("_middle", 0.5 * float(np.max(y) + np.min(y)))
+    loop = (plays(y, halves) - y + _line(halves, span) * (y - middle)) / height
     return y + values["gain"] * y + values["width"] * loop
 
 
@@ -47,9 +48,12 @@ def _line(halves: NDArray[np.float64], span: float) -> float:
 
 
 def _span(case: Surroundings) -> dict[str, float]:
-    """Return half the range of the run with the widest: no cycle goes from one run to another."""
-    widest = case.widest(case.channel)
-    return {} if widest is None else {"_span": 0.5 * widest}
+    """Return half the widest range of a run and its middle: no cycle goes from one run to another."""
+    ends = case.widest(case.channel)
+    if ends is None:
+        return {}
+    low, high = ends
+    return {"_span": 0.5 * (high - low), "_middle": 0.5 * (high + low)}
 
 
 def _half_loop(values: Values) -> float:
