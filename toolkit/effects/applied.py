@@ -114,8 +114,18 @@ class AppliedEffect:
 
     @property
     def searched(self) -> tuple[EffectParameter, ...]:
-        """Parameters that a fit moves: none of an effect that is there or not."""
-        return () if self.effect.discrete else self.effect.parameters
+        """Parameters that a fit moves: none of an effect that is there or not, or is read off the digits."""
+        return () if self.effect.discrete or self.effect.from_digits else self.effect.parameters
+
+    def form_uncertainty(self, parameter: EffectParameter) -> float:
+        """Return the standard uncertainty of a size whose law may be off by a share of what it does.
+
+        The share is a limit to both sides and nothing is known between them: GUM (JCGM 100) 4.3.7.
+        """
+        if parameter.off is None:
+            return 0.0
+        size = abs(self.values[parameter.name] - parameter.off)
+        return self.effect.form_error * size / math.sqrt(3)
 
     def log_prior(self, case: Surroundings) -> float:
         """Return how likely its size is before the recording speaks; 0 of an effect that is there or not."""
