@@ -64,7 +64,7 @@ def drawn(design: Design, seed: int) -> TestResult:
 @pytest.mark.parametrize("design", [PROTOCOL, PLAN], ids=["protocol", "plan"])
 def test_the_uncertainty_that_is_predicted_is_that_of_tests_of_the_design(design: Design) -> None:
     known = dataclasses.replace(earlier(), load_spread=0.0)
-    question = Question(earlier=known, demands=DEMANDS, loads_N=LOADS)
+    question = Question(tires=(known,), demands=DEMANDS, loads_N=LOADS)
     predicted = {(reach.demand.label, round(reach.load_N)): reach.u for reach in question.reaches(design)}
     seen: dict[tuple[str, float], list[float]] = {}
     for seed in range(12):

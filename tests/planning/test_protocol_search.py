@@ -14,6 +14,7 @@ from toolkit.errors import ConfigError
 from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import Design, Pace, standard
 from toolkit.planning.protocol_search import ProtocolSearch, Question, least_plan, load_sets
+from toolkit.planning.screen import criterion
 from toolkit.planning.tread import Tread
 
 PACE = Pace(condition_s=5.0, between_files_s=30.0)
@@ -22,12 +23,12 @@ PROTOCOL = standard(M15, M15.rotations)
 
 
 def tread(*, energy_J: float = math.inf, rise_K: float = math.inf) -> Tread:
-    return Tread(earlier=earlier(), pace=PACE, speed_m_s=SPEED, energy_J=energy_J, rise_K=rise_K)
+    return Tread(tires=(earlier(),), pace=PACE, speed_m_s=SPEED, energy_J=energy_J, rise_K=rise_K)
 
 
 def question(*demands: str, loads: tuple[float, ...] = LOADS) -> Question:
     parsed = tuple(map(parse_demand, demands))
-    return Question.beside(PROTOCOL, earlier=earlier(), demands=parsed, loads_N=loads)
+    return Question.beside(PROTOCOL, tires=(earlier(),), demands=parsed, loads_N=loads)
 
 
 def test_the_uncertainties_of_the_protocol_are_reached_in_fewer_rows() -> None:
@@ -45,7 +46,7 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
     search = ProtocolSearch(asked, tread(), LOADS)
     for size in (8, 11, 14):
         found = search.best(size)
-        screened = search._screen.criterion(np.array([search._best[size]]))[0]
+        screened = criterion(search._screens, np.array([search._best[size]]))[0]
         assert screened == pytest.approx(found.worst, rel=0.05)
 
 

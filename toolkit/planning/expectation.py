@@ -28,7 +28,7 @@ from toolkit.planning.demands import PEAK, Demand
 from toolkit.planning.design import Design
 from toolkit.reduction.common_load import slopes
 from toolkit.reduction.model import Condition
-from toolkit.tires.evaluate import value_at
+from toolkit.tires.evaluate import estimate_at, slope_estimate_at, value_at
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.pipeline import TestResult
+    from toolkit.tires.model import CurveFit
 
     Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ class EarlierTest:
 
     ``variances`` (4,) and ``variances_u`` (4,) are those of the sources of scatter with their standard
     uncertainties, ``load_spread`` how far blocks stood off their common load, as a share; ``mirrored`` names
-    directions that it lacks, whose curves are those of the other one.
+    directions that it lacks, whose curves are those of the other one; ``tire`` names its tire in a class.
     """
 
     machine: Machine
@@ -67,6 +68,7 @@ class EarlierTest:
     variances_u: Array
     load_spread: float = 0.0
     mirrored: tuple[Rotation, ...] = ()
+    tire: str = ""
 
     @property
     def loads_N(self) -> tuple[float, ...]:
@@ -84,6 +86,25 @@ class EarlierTest:
     def force(self, SA: ArrayLike, load_N: float, rotation: Rotation) -> Array:
         """Return FY [N] of the curve of a nominal load at slip angles [rad]."""
         return _values(self.curves[load_N, rotation].fit, "FY", SA)
+
+    def similar(self, *, stiffness: float, friction: float, tire: str) -> EarlierTest:
+        """Return this test on a similar tire: stiffness and friction times these.
+
+        Forces are F'(SA) = friction F(SA stiffness / friction), as Pacejka's similarity method has them (Tire
+        and Vehicle Dynamics, 3rd ed. 2012, 4.2); the shifts of the curves stay, so that plysteer follows the
+        stiffness and conicity stays. Scatter and what all rows share are this test's.
+        """
+
+        def scaled(fit: CurveFit | None) -> CurveFit | None:
+            return None if fit is None else _similar(fit, {"B": stiffness / friction, "D": friction})
+
+        curves = {
+            key: dataclasses.replace(
+                curve, fit=dataclasses.replace(curve.fit, FY=scaled(curve.fit.FY), MZ=scaled(curve.fit.MZ))
+            )
+            for key, curve in self.curves.items()
+        }
+        return dataclasses.replace(self, curves=curves, tire=tire)
 
     def directions(self, design: Design) -> tuple[Direction, ...]:
         """Return the directions of a design, its conditions on the curves of this test."""
@@ -243,6 +264,24 @@ def pooled(tests: Sequence[EarlierTest]) -> EarlierTest:
         tests[0],
         variances=np.mean([test.variances for test in tests], axis=0),
         variances_u=np.sqrt(np.sum([test.variances_u**2 for test in tests], axis=0)) / count,
+    )
+
+
+def _similar(fit: CurveFit, factors: Mapping[str, float]) -> CurveFit:
+    """Return a curve with some of its parameters times factors."""
+    sizes = np.array([factors.get(parameter.name, 1.0) for parameter in fit.parameters])
+    changed = dataclasses.replace(
+        fit,
+        parameters=tuple(
+            dataclasses.replace(parameter, value=parameter.value * size)
+            for parameter, size in zip(fit.parameters, sizes.tolist(), strict=True)
+        ),
+        covariance=tuple(map(tuple, (np.asarray(fit.covariance) * np.outer(sizes, sizes)).tolist())),
+    )
+    return dataclasses.replace(
+        changed,
+        value_at_zero=None if fit.value_at_zero is None else estimate_at(changed, 0.0),
+        slope_at_zero=None if fit.slope_at_zero is None else slope_estimate_at(changed, 0.0),
     )
 
 

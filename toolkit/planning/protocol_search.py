@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, steps_of
 from toolkit.planning.exchange import Points, PointSearch
 from toolkit.planning.reach import Reach, is_of, worst
-from toolkit.planning.screen import screen_of
+from toolkit.planning.screen import criterion, screen_of
 from toolkit.planning.tread import Exposure, Tread
 from toolkit.tires.fit import MIN_POINTS
 
@@ -39,30 +40,33 @@ _ALIKE = 1.05
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Question:
-    """What is asked: demands at nominal loads [N]; an earlier test says what a design will reach.
+    """What is asked: demands at nominal loads [N]; earlier tests say what a design will reach.
 
-    ``protocol_U`` is what the machine's own protocol reaches, by demand and load, and a twentieth more: the
-    limit of a demand without one.
+    ``tires`` are those tests, one a tire of the class: a demand is to be met on each of them. ``protocol_U``
+    is what the machine's own protocol reaches, by tire, demand and load, and a twentieth more: the limit of
+    a demand without one.
     """
 
-    earlier: EarlierTest
+    tires: tuple[EarlierTest, ...]
     demands: tuple[Demand, ...]
     loads_N: tuple[float, ...]
-    protocol_U: Mapping[tuple[Demand, float], float] = field(default_factory=dict)
+    protocol_U: Mapping[tuple[str, Demand, float], float] = field(default_factory=dict)
 
     @classmethod
     def beside(
         cls,
         protocol: Design,
         *,
-        earlier: EarlierTest,
+        tires: tuple[EarlierTest, ...],
         demands: tuple[Demand, ...],
         loads_N: tuple[float, ...],
     ) -> Question:
         """Return a question that knows what the machine's protocol reaches."""
-        bare = cls(earlier=earlier, demands=demands, loads_N=loads_N)
+        bare = cls(tires=tires, demands=demands, loads_N=loads_N)
         bare.refuse_what_no_design_has()
-        reached = {(reach.demand, reach.load_N): _ALIKE * reach.U for reach in bare.reaches(protocol)}
+        reached = {
+            (reach.tire, reach.demand, reach.load_N): _ALIKE * reach.U for reach in bare.reaches(protocol)
+        }
         return dataclasses.replace(bare, protocol_U=reached)
 
     @property
@@ -73,33 +77,37 @@ class Question:
 
     @cached_property
     def candidates_rad(self) -> tuple[float, ...]:
-        """The slip angles at which the machine can stand and the earlier test measured [rad]."""
-        low, high = self.earlier.reach_rad
-        slack = self.earlier.machine.protocol.slip_angle_tolerance_rad
-        steps = steps_of(self.earlier.machine.protocol)
+        """The slip angles at which the machine can stand and every earlier test measured [rad]."""
+        low = max(earlier.reach_rad[0] for earlier in self.tires)
+        high = min(earlier.reach_rad[1] for earlier in self.tires)
+        protocol = self.tires[0].machine.protocol
+        slack, steps = protocol.slip_angle_tolerance_rad, steps_of(protocol)
         return tuple(step for step in steps if low - slack <= step <= high + slack)
 
     def reaches(self, design: Design, *, shift: float = 0.0) -> tuple[Reach, ...]:
-        """Return what a design reaches of every demand at every load asked for; empty where it lacks one."""
-        rows = self.earlier.rows(design, self.demands, shift=shift)
+        """Return what a design reaches of every demand at every load asked for, on each tire; empty where it
+        lacks one.
+        """
         reaches = []
-        for demand in self.demands:
-            for load in self.loads_N:
-                at_load = self.earlier.curves[load, "forward"].fit.load_N
+        for earlier in self.tires:
+            rows = earlier.rows(design, self.demands, shift=shift)
+            for demand, load in itertools.product(self.demands, self.loads_N):
+                at_load = earlier.curves[load, "forward"].fit.load_N
                 mine = [row for row in rows if is_of(row, demand, at_load)]
-                reach = worst(demand, mine, load, self.protocol_U.get((demand, load), math.inf))
+                limit = self.protocol_U.get((earlier.tire, demand, load), math.inf)
+                reach = worst(demand, mine, load, limit)
                 if reach is None:
                     return ()
-                reaches.append(reach)
+                reaches.append(dataclasses.replace(reach, tire=earlier.tire))
         return tuple(reaches)
 
     @cached_property
     def _at_peak(self) -> NDArray[np.bool_]:
-        """Which candidates measure the peak: (loads and sides, candidates)."""
+        """Which candidates measure the peak: (tires, loads and sides, candidates)."""
         angles = np.array(self.candidates_rad)
         rows = []
-        for load in self.loads_N:
-            force = np.abs(self.earlier.force(angles, load, "forward"))
+        for earlier, load in itertools.product(self.tires, self.loads_N):
+            force = np.abs(earlier.force(angles, load, "forward"))
             rows += [
                 side & (force >= _PEAK_SHARE * force[side].max(initial=0.0))
                 for side in (angles < 0, angles > 0)
@@ -183,7 +191,10 @@ class ProtocolSearch:
             minutes_limit=minutes,
         )
         self.full = self.judged(full)
-        self._screen = screen_of(question.earlier, full, self.full.reaches)
+        self._screens = [
+            screen_of(earlier, full, [reach for reach in self.full.reaches if reach.tire == earlier.tire])
+            for earlier in question.tires
+        ]
         self._points = PointSearch(self._criterion, len(self.candidates))
         self._best: dict[int, Points] = {}
 
@@ -233,7 +244,7 @@ class ProtocolSearch:
         losses = np.full(len(designs), math.inf)
         serves = np.array([self.question.covers(points) for points in designs])
         if serves.any():
-            losses[serves] = self._screen.criterion(np.array(designs)[serves])
+            losses[serves] = criterion(self._screens, np.array(designs)[serves])
             losses += [_BEYOND * self.exposure.excess(points) for points in designs]
         return losses
 
@@ -281,11 +292,16 @@ def least_plan(
     return met or cast("Judged", missed)
 
 
+def shared_loads(tires: Sequence[EarlierTest]) -> tuple[float, ...]:
+    """Return the nominal loads that every earlier test measured [N]."""
+    return tuple(load for load in tires[0].loads_N if all(load in other.loads_N for other in tires))
+
+
 def load_sets(question: Question) -> tuple[tuple[float, ...], ...]:
     """Return the loads that are asked for, then with one more each time, the nearest first."""
     asked = question.loads_N
     remaining = sorted(
-        (load for load in question.earlier.loads_N if load not in asked),
+        (load for load in shared_loads(question.tires) if load not in asked),
         key=lambda load: min(abs(load - wished) for wished in asked),
     )
     return tuple(tuple(sorted((*asked, *remaining[:count]))) for count in range(len(remaining) + 1))

@@ -54,16 +54,21 @@ class Screen:
     fixed: Array
     limits: Array
 
-    def criterion(self, designs: NDArray[np.intp]) -> Array:
-        """Return the largest U over its limit (designs,), where many are alike a little more.
+    def ratios(self, designs: NDArray[np.intp]) -> Array:
+        """Return U of each reading over its limit (designs, readings).
 
         ``designs`` (designs, points) are candidates by their numbers.
         """
         pseudo = np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA)  # (curves, designs, p, points)
         weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
         own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
-        ratios = _COVERAGE * np.sqrt(self.fixed + own) / self.limits
-        return np.asarray(np.sum(ratios**_POWER, axis=1) ** (1 / _POWER))
+        return np.asarray(_COVERAGE * np.sqrt(self.fixed + own) / self.limits)
+
+
+def criterion(screens: Sequence[Screen], designs: NDArray[np.intp]) -> Array:
+    """Return the largest U over its limit (designs,) of all screens, where many are alike a little more."""
+    ratios = np.concatenate([screen.ratios(designs) for screen in screens], axis=1)
+    return np.asarray(np.sum(ratios**_POWER, axis=1) ** (1 / _POWER))
 
 
 def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> Screen:
