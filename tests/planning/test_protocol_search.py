@@ -13,7 +13,7 @@ from tests.planning.planning_factory import LOADS, earlier
 from toolkit.errors import ConfigError
 from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import Design, Pace, standard
-from toolkit.planning.protocol_search import ProtocolSearch, Question, least_plan, load_sets
+from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan, load_sets
 from toolkit.planning.screen import criterion
 from toolkit.planning.tread import Tread
 
@@ -142,3 +142,26 @@ def test_a_demand_without_a_size_is_the_protocols() -> None:
         assert reach.ratio == pytest.approx(1 / 1.05)
     stricter = dataclasses.replace(asked, demands=(parse_demand("conicity=0.5 N"),))
     assert {reach.limit for reach in stricter.reaches(PROTOCOL)} == {0.5}
+
+
+def test_no_plan_leaves_a_curve_open_between_its_slip_angles() -> None:
+    asked = question("plysteer", loads=LOADS[2:3])
+    search = ProtocolSearch(asked, tread(), LOADS[2:3])
+
+    def judged(*degrees: float) -> Judged:
+        return search.judged(search.design(tuple(search.candidates.index(a) for a in map(nearest, degrees))))
+
+    def nearest(degrees: float) -> float:
+        return min(search.candidates, key=lambda angle: abs(angle - math.radians(degrees)))
+
+    # The zero is measured, and by derivatives that is all that plysteer needs; but nothing says how the curve
+    # comes to it, and the wheel stands a little beside it.
+    lopsided = judged(-10, -9, -8, -7, -6, 0, 10)
+    assert lopsided.worst <= 1
+    assert lopsided.openness > 10
+    assert not lopsided.feasible
+    planned = least_plan(asked, tread())
+    assert planned.feasible
+    assert planned.openness <= 1
+    even = judged(-10, -7, -3, 0, 3, 7, 10)
+    assert even.openness <= 1

@@ -56,7 +56,8 @@ class EarlierTest:
     """What a plan takes from a test.
 
     ``variances`` (4,) and ``variances_u`` (4,) are those of the sources of scatter with their standard
-    uncertainties, ``load_spread`` how far blocks stood off their common load, as a share; ``mirrored`` names
+    uncertainties, ``load_spread`` how far blocks stood off their common load, as a share; ``offset_rad`` by
+    how much the wheel stood beyond its step on average, which is the steering's zero; ``mirrored`` names
     directions that it lacks, whose curves are those of the other one; ``tire`` names its tire in a class.
     """
 
@@ -67,6 +68,7 @@ class EarlierTest:
     variances: Array
     variances_u: Array
     load_spread: float = 0.0
+    offset_rad: float = 0.0
     mirrored: tuple[Rotation, ...] = ()
     tire: str = ""
 
@@ -108,7 +110,8 @@ class EarlierTest:
 
     def directions(self, design: Design) -> tuple[Direction, ...]:
         """Return the directions of a design, its conditions on the curves of this test."""
-        angles = np.sort(np.asarray(design.slip_angles_rad))
+        steps = np.sort(np.asarray(design.slip_angles_rad))
+        angles = steps + self.offset_rad
         loads = sorted(design.loads_N)
         directions = {}
         for rotation in (rotation for rotation in ROTATIONS if rotation in design.rotations):
@@ -118,7 +121,7 @@ class EarlierTest:
             for place, (load, curve) in enumerate(zip(loads, curves, strict=True)):
                 y = {c: values[c][place] for c in CHANNELS}
                 u = {c: own[c][place] for c in CHANNELS}
-                directions[load, rotation] = self._direction(curve, load, rotation, angles, y, u)
+                directions[load, rotation] = self._direction(curve, load, rotation, steps, y, u)
         return tuple(
             directions[key] for key in sorted(directions, key=lambda k: (k[0], ROTATIONS.index(k[1])))
         )
@@ -138,25 +141,26 @@ class EarlierTest:
         curve: _Curve,
         load: float,
         rotation: Rotation,
-        angles: Array,
+        steps: Array,
         y: Mapping[Channel, Array],
         u: Mapping[Channel, Array],
     ) -> Direction:
         FZ = curve.fit.load_N
         sign = signs(self.machine.axes, "SAE", seen_by_cells(rotation, self.shared.reversal))
-        seen = np.column_stack([sign["FY"] * y["FY"], sign["MZ"] * y["MZ"], np.full(len(angles), FZ)])
-        shown = np.column_stack([seen, np.ones(len(angles))]) @ self.cells
+        seen = np.column_stack([sign["FY"] * y["FY"], sign["MZ"] * y["MZ"], np.full(len(steps), FZ)])
+        shown = np.column_stack([seen, np.ones(len(steps))]) @ self.cells
         conditions = tuple(
             dataclasses.replace(
                 curve.pattern,
-                file=f"{rotation} {place}", step_SA=float(SA), SA=float(SA), FZ=FZ, FZ_common=FZ,
+                file=f"{rotation} {place}", step_SA=float(step), SA=float(step) + self.offset_rad,
+                FZ=FZ, FZ_common=FZ,
                 FY=float(y["FY"][place]), FY_common=float(y["FY"][place]),
                 MZ=float(y["MZ"][place]), MZ_common=float(y["MZ"][place]),
                 u_FY=float(u["FY"][place]), u_FY_common=float(u["FY"][place]),
                 u_MZ=float(u["MZ"][place]), u_MZ_common=float(u["MZ"][place]),
                 indications=tuple(shown[place].tolist()), rotation=rotation, step_FZ=load,
             )
-            for place, SA in enumerate(angles)
+            for place, step in enumerate(steps)
         )  # fmt: skip
         fit = dataclasses.replace(curve.fit, rotation=rotation)
         return Direction(group=Group(load_N=FZ, rotation=rotation, conditions=conditions), fit=fit)
@@ -247,6 +251,9 @@ def earlier_test(result: TestResult, *, machine: Machine, record: CalibrationRec
         cells=_cells(reduced.used(), machine, result),
         variances=scatter.variances,
         variances_u=np.sqrt(np.maximum(np.diag(scatter.covariance), 0.0)),
+        offset_rad=float(
+            np.mean([c.SA - c.step_SA for c in reduced.used() if c.step_SA is not None] or [0.0])
+        ),
         load_spread=float(np.sqrt(np.mean([(c.FZ_common / c.FZ - 1) ** 2 for c in reduced.used()]))),
         mirrored=mirrored,
     )

@@ -39,6 +39,7 @@ class PlannedValue:
     value: Annotated[float, Entry("by the earlier test")]
     demanded_U: Annotated[float, Entry("largest expanded uncertainty, 95 %")]
     planned_U: Annotated[float, Entry("by the plan")]
+    planned_U_in_nine_of_ten: Annotated[float, Entry("no more in nine of ten tests")]
     planned_U_low: Annotated[float, Entry("where the scatter is one standard uncertainty smaller")]
     planned_U_high: Annotated[float, Entry("where it is one larger")]
     protocol_U: Annotated[float | None, Entry("by the machine's protocol")]
@@ -193,6 +194,9 @@ def _values(
             value=reach.value,
             demanded_U=reach.limit,
             planned_U=reach.U,
+            planned_U_in_nine_of_ten=_in_nine_of_ten(
+                reach, low.get(_key(reach), reach.U), high.get(_key(reach), reach.U)
+            ),
             planned_U_low=low.get(_key(reach), reach.U),
             planned_U_high=high.get(_key(reach), reach.U),
             protocol_U=by_protocol.get(_key(reach)),
@@ -201,6 +205,22 @@ def _values(
         )
         for reach in nearest.values()
     )
+
+
+def _in_nine_of_ten(reach: Reach, low: float, high: float) -> float:
+    """Return the U that nine of ten tests keep.
+
+    A variance of n degrees of freedom scatters with twice its square over n; n is that of the test's own
+    residuals (Welch and Satterthwaite), less where the earlier test leaves the scatter itself in doubt.
+    """
+    from scipy.special import chdtri
+
+    doubt = (high**2 - low**2) / (2 * reach.U**2) if reach.U > 0 else 0.0
+    relative = 2 / reach.dof + doubt**2
+    if relative <= 0:
+        return reach.U
+    freedoms = 2 / relative
+    return reach.U * math.sqrt(float(chdtri(freedoms, 0.1)) / freedoms)
 
 
 def _key(reach: Reach) -> tuple[str, str, float]:

@@ -19,7 +19,7 @@ from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, steps_of
 from toolkit.planning.exchange import Points, PointSearch
 from toolkit.planning.reach import Reach, is_of, worst
-from toolkit.planning.screen import criterion, screen_of
+from toolkit.planning.screen import Screen, criterion, openness, screen_of
 from toolkit.planning.tread import Exposure, Tread
 from toolkit.tires.fit import MIN_POINTS
 
@@ -151,12 +151,16 @@ class Question:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth."""
+    """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth.
+
+    ``openness`` of the curves between its slip angles, over what is allowed (`screen`).
+    """
 
     design: Design
     reaches: tuple[Reach, ...]
     minutes: float
     excess: float = 0.0
+    openness: float = 0.0
 
     @property
     def worst(self) -> float:
@@ -165,8 +169,8 @@ class Judged:
 
     @property
     def feasible(self) -> bool:
-        """Whether every demand is met within the limits."""
-        return self.worst <= 1 and self.excess <= 0
+        """Whether every demand is met within the limits, and every curve is known between its slip angles."""
+        return self.worst <= 1 and self.excess <= 0 and self.openness <= 1
 
 
 class ProtocolSearch:
@@ -190,6 +194,7 @@ class ProtocolSearch:
             energy_limit_J=tread.energy_J,
             minutes_limit=minutes,
         )
+        self._screens: list[Screen] = []
         self.full = self.judged(full)
         self._screens = [
             screen_of(earlier, full, [reach for reach in self.full.reaches if reach.tire == earlier.tire])
@@ -209,6 +214,7 @@ class ProtocolSearch:
         return Judged(
             design=design, reaches=self.question.reaches(design), minutes=self.tread.minutes(design),
             excess=self.exposure.excess(points),
+            openness=openness(self._screens, points) if self._screens else 0.0,
         )  # fmt: skip
 
     def best(self, size: int) -> Judged:
@@ -280,7 +286,7 @@ def least_plan(
             met = least if met is None or least.minutes < met.minutes else met
         elif met is None:
             nearest = search.best(points)
-            nearer = missed is None or (nearest.excess, nearest.worst) < (missed.excess, missed.worst)
+            nearer = missed is None or _distance(nearest) < _distance(missed)
             missed = nearest if nearer else missed
     if met is None and missed is None:
         raise ConfigError(
@@ -290,6 +296,10 @@ def least_plan(
             next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
         )  # fmt: skip
     return met or cast("Judged", missed)
+
+
+def _distance(judged: Judged) -> tuple[float, float]:
+    return judged.excess, max(judged.worst, judged.openness)
 
 
 def shared_loads(tires: Sequence[EarlierTest]) -> tuple[float, ...]:

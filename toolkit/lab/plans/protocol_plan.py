@@ -339,6 +339,13 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
         for name, values in by_name.items()
     ]
     limit = "" if math.isinf(minutes) else f" in {minutes:g} min"
+    if not missed:
+        return ConfigError(
+            f"no test{limit} knows its curves between the slip angles", where="--minutes",
+            got=f"{len(plan.plan.slip_angles_deg)} slip angles at {len(plan.plan.loads_N)} loads",
+            expected="slip angles that leave no part of a curve open",
+            next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
+        )  # fmt: skip
     angles = ", ".join(f"{angle:g}" for angle in sorted(plan.plan.slip_angles_deg))
     return ConfigError(
         f"no test{limit} reaches what is demanded", where="--u",
@@ -390,7 +397,7 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
             title_of(value.name), *([str(value.tire)] if several else []),
             f"{units.shown(value.load_N, 'N')[0]:.0f}",
             f"{plus_minus(size, units.shown(value.planned_U, value.unit)[0])} {unit}", U(value.demanded_U),
-            f"{U(value.planned_U_low)} to {U(value.planned_U_high)}", U(value.protocol_U),
+            U(value.planned_U_in_nine_of_ten), U(value.protocol_U),
             U(value.same_time_U),
         ]  # fmt: skip
 
@@ -401,7 +408,7 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
         f"FZ [{units.force}]",
         "expected, ± U",
         "U demanded",
-        "U, how sure",
+        "in 9 of 10",
         "U by protocol",
         "U in its time",
     ]
