@@ -81,7 +81,7 @@ def protocol(
 ) -> int:  # fmt: skip
     """Plan the shortest test that reaches stated uncertainties.
 
-    Slip angles, repeats, loads and directions, by the budget that `toolkit process` prints. A demand that no
+    Slip angles, loads and directions, by the budget that `toolkit process` prints. A demand that no
     test meets ends with 2 and the nearest plan that is feasible.
 
     Example: toolkit plan test --like tests/2019-06-04 --u "conicity=2 N" --load "833 lbf" --out plan

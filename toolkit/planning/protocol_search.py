@@ -1,4 +1,10 @@
-"""The least test that meets demands: slip angles, repeats and loads, judged by `expectation`."""
+"""The least test that meets demands: slip angles and loads, judged by `expectation`.
+
+No slip angle is planned twice. A repeat has in common with the first what the form of the curve misses there
+and the way to the common load; how much of the scatter about the curves that is, an earlier test of each
+slip angle does not tell. A design of repeats takes all of it for chance: its curves are less sure than it
+says, and its own residuals, mostly between repeats, do not show it.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +37,6 @@ if TYPE_CHECKING:
 # A curve that a report prints is measured to its peak, or to the end of the range: within this part of it.
 _PEAK_SHARE = 0.99
 _SAME_RAD = 1e-9
-_LARGEST = 30  # slip angles in each direction
 _BEYOND = 1e3  # what a design that goes beyond its limits pays for as much again
 _STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
@@ -122,9 +127,9 @@ class Question:
         return np.asarray(np.abs(steps - np.array(angles)[:, None]) < _SAME_RAD)
 
     def covers(self, points: Points) -> bool:
-        """Tell whether candidates give a curve: enough places, to the peak on either side, all demanded."""
+        """Tell whether candidates give a curve: enough, none twice, to either peak, all that are demanded."""
         places = list(dict.fromkeys(points))
-        if len(places) < MIN_POINTS:
+        if len(places) < max(MIN_POINTS, len(points)):
             return False
         needed = np.concatenate([self._at_peak, self._at_angles])
         return bool(needed[:, places].any(axis=1).all())
@@ -230,11 +235,15 @@ class ProtocolSearch:
         """Yield designs of a size drawn at random, the same for the same size."""
         rng = np.random.default_rng([_SEED, size])
         for _ in range(_STARTS):
-            yield tuple(rng.integers(len(self.candidates), size=size).tolist())
+            yield tuple(rng.choice(len(self.candidates), size=size, replace=False).tolist())
 
     def least(self, largest: int) -> Judged | None:
         """Return the best design of the fewest slip angles, at most so many, that meets every demand."""
         low, high = MIN_POINTS, largest
+        if min(self.tread.energy_J, self.tread.rise_K) < math.inf:
+            # Slip angles are not all as gentle: of those that a limit leaves, more are not always better.
+            sizes = (self.best(size) for size in range(low, high + 1))
+            return next((judged for judged in sizes if judged.feasible), None)
         if high < low or not self.best(high).feasible:
             return None
         while low < high:
@@ -242,9 +251,13 @@ class ProtocolSearch:
             low, high = (low, middle) if self.best(middle).feasible else (middle + 1, high)
         return self.best(high)
 
+    def nearest(self) -> Judged:
+        """Return the design that was nearest to its limits and then to the demands."""
+        return min((self.best(size) for size in tuple(self._best)), key=_distance)
+
     def most_within(self, minutes: float) -> int:
         """Return how many slip angles fit into a time."""
-        return int(min(minutes / self.exposure.minutes.min() + 1e-9, _LARGEST))
+        return int(min(minutes / self.exposure.minutes.min() + 1e-9, len(self.candidates)))
 
     def _criterion(self, designs: Sequence[Points]) -> NDArray[np.float64]:
         losses = np.full(len(designs), math.inf)
@@ -285,7 +298,7 @@ def least_plan(
         if least is not None:
             met = least if met is None or least.minutes < met.minutes else met
         elif met is None:
-            nearest = search.best(points)
+            nearest = search.nearest()
             nearer = missed is None or _distance(nearest) < _distance(missed)
             missed = nearest if nearer else missed
     if met is None and missed is None:
