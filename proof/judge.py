@@ -7,7 +7,6 @@ from typing import Any
 
 from proof.laws import judged_law
 
-SILENT = ("nothing", "unknown", "untestable")
 NULLS = ("null", "stirred null")
 
 

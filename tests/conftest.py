@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,10 @@ from toolkit.simulation.plan import Plan, read_plan
 settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("toolkit")
 hold_to_declarations()
+
+# The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "toolkit" / "examples"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

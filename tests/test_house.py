@@ -9,6 +9,7 @@ from pathlib import Path
 import grimp
 
 import toolkit
+from tests.house.structure import NO_COMMAND_ASKED
 
 ROOT = Path(toolkit.__file__).parent
 TESTS = Path(__file__).parent
@@ -80,9 +81,9 @@ def test_every_module_of_the_command_line_holds_a_command() -> None:
     _register()
     groups = [app, *(group.typer_instance for group in app.registered_groups)]
     commands = [command.callback for group in groups for command in group.registered_commands]
-    homes = {callback.__module__.rpartition(".")[2] for callback in commands if callback is not None}
-    modules = {path.stem for path in (ROOT / "cli").glob("*.py")}
-    assert modules - homes == {"__init__", "console", "groups", "main", "options"}
+    homes = {callback.__module__ for callback in commands if callback is not None}
+    modules = {f"toolkit.cli.{path.stem}".removesuffix(".__init__") for path in (ROOT / "cli").glob("*.py")}
+    assert modules - homes == NO_COMMAND_ASKED
 
 
 def mirrored(test: Path) -> bool:

@@ -388,33 +388,31 @@ def _remove_empty(folders: list[Path]) -> None:
 
 
 def _unwritable(folder: Path, error: OSError | ValueError) -> OutputError:
-    return OutputError(
-        "the results cannot be written",
-        where=folder,
-        got=getattr(error, "strerror", None) or str(error),
-        expected="a folder with write permission and free space",
-        next_step="free space there, or choose another folder with --out; nothing was changed",
-        rule="not-writable",
-    )
+    return _disk_error(
+        "the results cannot be written", folder, error, "a folder with write permission and free space",
+        "free space there, or choose another folder with --out; nothing was changed",
+    )  # fmt: skip
 
 
 def _unsure(folder: Path, error: OSError) -> OutputError:
-    return OutputError(
-        "the results are whole and in their place, but a power cut may undo it",
-        where=folder,
-        got=error.strerror or str(error),
-        expected="a disk that keeps what is written",
-        next_step="mend the disk, and run the command again",
-        rule="not-writable",
-    )
+    return _disk_error(
+        "the results are whole and in their place, but a power cut may undo it", folder, error,
+        "a disk that keeps what is written", "mend the disk, and run the command again",
+    )  # fmt: skip
 
 
 def _not_in_place(folder: Path, error: OSError) -> OutputError:
+    return _disk_error(
+        "the results are whole and on the disk, but not all in their place yet", folder, error,
+        "a folder in which files can be moved",
+        "mend that and run any command that reads or writes this folder: it puts them in place",
+    )  # fmt: skip
+
+
+def _disk_error(
+    problem: str, folder: Path, error: OSError | ValueError, expected: str, next_step: str
+) -> OutputError:
     return OutputError(
-        "the results are whole and on the disk, but not all in their place yet",
-        where=folder,
-        got=error.strerror or str(error),
-        expected="a folder in which files can be moved",
-        next_step="mend that and run any command that reads or writes this folder: it puts them in place",
-        rule="not-writable",
-    )
+        problem, where=folder, got=getattr(error, "strerror", None) or str(error), expected=expected,
+        next_step=next_step, rule="not-writable",
+    )  # fmt: skip

@@ -95,8 +95,8 @@ def entries(seed: int) -> tuple[Entry, ...]:
     made: list[Entry] = []
     for text, part in LOADS.items():
         loads = earlier.loads_N[part]
-        question = Question.beside(own, earlier=earlier, demands=demands, loads_N=loads)
-        found = least_plan(question, Tread.of(MACHINE, earlier))
+        question = Question.beside(own, tires=(earlier,), demands=demands, loads_N=loads)
+        found = least_plan(question, Tread.of(MACHINE, (earlier,)))
         size = len(found.design.slip_angles_rad)
         even = tuple(math.radians(a) for a in np.linspace(-10, 10, size))
         for name, design in (

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests.cli import one_command
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli import calibrate, calibration
@@ -35,14 +34,8 @@ DAY = dt.date(2026, 1, 5)
 HEADER = "A [mV/V],B [mV/V],FY [lbf],MZ [lbf*ft]"
 
 
-def run(*arguments: object, of: Any = calibrate.command) -> tuple[int, str]:
-    app = typer.Typer()
-    app.command()(of)
-    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
-    if isinstance(result.exception, ToolkitError):
-        raise result.exception
-    assert result.exception is None, result.exception
-    return result.return_value, result.stdout
+def run(*words: object, of: Any = calibrate.command) -> tuple[int, str]:
+    return one_command.run(of, *words)
 
 
 def rows(count: int, seed: int, noise: float = 1e-5) -> np.ndarray:

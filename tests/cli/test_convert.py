@@ -1,11 +1,11 @@
 """`toolkit convert`: what comes back, what is named, what is refused."""
 
+import functools
 import json
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests.cli import one_command
 from tests.cli.test_evaluate import TIRE
 from toolkit.cli import convert
 from toolkit.errors import ToolkitError
@@ -13,15 +13,7 @@ from toolkit.tires.table import read_table
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tydex import read_tydex
 
-
-def run(*arguments):
-    app = typer.Typer()
-    app.command()(convert.command)
-    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
-    if isinstance(result.exception, ToolkitError):
-        raise result.exception
-    assert result.exception is None, result.exception
-    return result.return_value, result.stdout
+run = functools.partial(one_command.run, convert.command)
 
 
 @pytest.fixture

@@ -1,12 +1,12 @@
 """`toolkit evaluate`: a grid with forces, in every axis system, and what is refused."""
 
 import csv
+import functools
 import json
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests.cli import one_command
 from toolkit.channels import AXES, signs
 from toolkit.cli import evaluate
 from toolkit.errors import ToolkitError
@@ -41,14 +41,7 @@ QDZ1 = 0.1
 """
 
 
-def run(*arguments):
-    app = typer.Typer()
-    app.command()(evaluate.command)
-    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
-    if isinstance(result.exception, ToolkitError):
-        raise result.exception
-    assert result.exception is None, result.exception
-    return result.return_value, result.stdout
+run = functools.partial(one_command.run, evaluate.command)
 
 
 @pytest.fixture

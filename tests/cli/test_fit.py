@@ -1,12 +1,12 @@
 """`toolkit fit` on tables: the JSON contract, exit codes, what is refused."""
 
+import functools
 import json
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests.cli import one_command
 from toolkit.cli import fit
 from toolkit.errors import ToolkitError
 from toolkit.tires.models.magic_formula import value
@@ -17,14 +17,7 @@ KEYS = (
 ).split()
 
 
-def run(*arguments):
-    app = typer.Typer()
-    app.command()(fit.command)
-    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
-    if isinstance(result.exception, ToolkitError):
-        raise result.exception
-    assert result.exception is None, result.exception
-    return result.return_value, result.stdout
+run = functools.partial(one_command.run, fit.command)
 
 
 @pytest.fixture

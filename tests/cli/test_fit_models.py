@@ -1,12 +1,12 @@
 """`toolkit fit` with models over all loads: the contract's keys, comparison, figures, what is refused."""
 
+import functools
 import json
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests.cli import one_command
 from toolkit.cli import fit
 from toolkit.errors import ToolkitError
 from toolkit.lab.tire_tests.fit_models import model_choice
@@ -20,14 +20,7 @@ KEYS = (
 FAST = ("pacejka94", "mf52", "brush")
 
 
-def run(*arguments):
-    app = typer.Typer()
-    app.command()(fit.command)
-    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
-    if isinstance(result.exception, ToolkitError):
-        raise result.exception
-    assert result.exception is None, result.exception
-    return result.return_value, result.stdout
+run = functools.partial(one_command.run, fit.command)
 
 
 def write(path, *, loads=(1100.0, 2500.0, 3700.0, 4900.0), angles=None, noise=0.003, turn=1.0, FZ_sign=1.0):

@@ -5,25 +5,14 @@ import json
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests.cli.one_command import run
 from tests.tires.fmu.fmu_factory import outputs_of
 from toolkit.cli import convert, evaluate, fit
 from toolkit.errors import ToolkitError
 from toolkit.tires.models.magic_formula import value
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_evaluate import evaluate_tir
-
-
-def run(command, *arguments):
-    app = typer.Typer()
-    app.command()(command)
-    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
-    if isinstance(result.exception, ToolkitError):
-        raise result.exception
-    assert result.exception is None, result.exception
-    return result.return_value, result.stdout
 
 
 @pytest.fixture

@@ -37,7 +37,7 @@ def run(tmp_path, monkeypatch):
 @pytest.fixture
 def quick(monkeypatch):
     """An earlier test that takes no time to simulate."""
-    monkeypatch.setattr(protocol_plan, "_virtual", lambda _order: earlier())
+    monkeypatch.setattr(protocol_plan, "_virtual", lambda _order, _like: earlier())
 
 
 def test_the_plan_of_a_tire_file_is_simulated_and_processed_without_a_finding(run, tmp_path):
@@ -220,3 +220,33 @@ def test_limits_that_no_run_keeps_name_the_nearest_that_one_does(run, diagnosed,
     limit = re.search(r"--limit ([^\s;]+)", str(error.next_step))
     assert limit is not None
     assert run("plan", "next", diagnosed, "--limit", limit[1]).return_value == 0
+
+
+def test_a_class_is_planned_for_each_of_its_tires(run, quick):
+    asked = ["--u", "slope_cornering=3 %", "--load", "833 lbf", "--spread", "stiffness=0.5..1.2"]
+    planned = run("plan", "test", *asked, "--json")
+    assert planned.return_value == 0, planned
+    answer = json.loads(planned.stdout)
+    assert len(answer["tires"]) == 3
+    assert [value["name"] for value in answer["values"]] == ["slope_cornering"]
+    shown = run("plan", "test", *asked).stdout
+    assert "0.5 of its stiffness" in shown
+
+
+def test_no_earlier_test_is_the_class_of_passenger_tires(run, quick):
+    planned = run("plan", "test", "--u", "slope_cornering=3 %", "--load", "833 lbf", "--json")
+    assert [part for part in ("0.41", "1.11") if part not in str(json.loads(planned.stdout)["tires"])] == []
+
+
+def test_a_tire_file_of_other_loads_than_the_machines_is_refused(run, tmp_path):
+    text = (ROOT / "toolkit" / "examples" / "virtual" / "tire.tir").read_text(encoding="utf-8")
+    heavy = text.replace("FZMIN = 500", "FZMIN = 9000").replace("FZMAX = 8000", "FZMAX = 40000")
+    (tmp_path / "heavy.tir").write_text(heavy, encoding="utf-8")
+    failed = run("plan", "test", "--like", "heavy.tir", "--calibrations", CALIBRATIONS)
+    assert failed.exception.rule == "plan-like"
+    assert "FZMIN 9000 N" in str(failed.exception.got)
+
+
+def test_a_tire_that_is_named_twice_is_refused(run, quick):
+    failed = run("plan", "test", "--like", "a.tir", "--like", "a.tir")
+    assert failed.exception.rule == "plan-like"

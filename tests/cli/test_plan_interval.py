@@ -95,3 +95,6 @@ def test_what_cannot_be_planned_is_an_error(tmp_path: Path) -> None:
             run(home, *arguments)
         assert refused.value.rule == "plan-demand"
         assert refused.value.exit_code == 2
+    with pytest.raises(ToolkitError) as unknown:
+        run(home, "--load", "XX")
+    assert (unknown.value.rule, unknown.value.exit_code) == ("load", 2)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import functools
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -50,10 +52,18 @@ def read_module(path: Path, root: Path = ROOT) -> Module:
     return Module(place, ".".join(parts), path.read_text(encoding="utf-8"))
 
 
-def read_package(root: Path = ROOT) -> list[Module]:
-    """Return every module of the package in a checkout, by name."""
-    paths = sorted((root / PACKAGE).rglob("*.py"))
-    return [read_module(path, root) for path in paths]
+def read_package(root: Path = ROOT) -> Sequence[Module]:
+    """Return every module of the package in a checkout, by name; this one is read and parsed once."""
+    return _checkout() if root == ROOT else _read(root)
+
+
+@functools.cache
+def _checkout() -> Sequence[Module]:
+    return _read(ROOT)
+
+
+def _read(root: Path) -> Sequence[Module]:
+    return tuple(read_module(path, root) for path in sorted((root / PACKAGE).rglob("*.py")))
 
 
 def layers(root: Path = ROOT) -> list[str]:

@@ -11,8 +11,10 @@ from typing import Any
 
 from tests.house.source import PACKAGE, Module, contracts, layers
 
-NO_COMMAND_ASKED = ("toolkit.cli", "toolkit.cli.main", "toolkit.cli.console", "toolkit.cli.options")
-"""The package itself, its entry, and the options and the printing that all commands share."""
+NO_COMMAND_ASKED = frozenset(
+    f"toolkit.cli{name}" for name in ("", ".main", ".groups", ".console", ".options")
+)
+"""The package itself, its entry, and what all commands share: how they are built, options, printing."""
 ROOMS = ("report", "diagnosis")
 """Packages whose inside has an order of its own."""
 
@@ -84,7 +86,8 @@ def _is_future(statement: ast.stmt) -> bool:
 
 
 def without_command(modules: Sequence[Module]) -> list[str]:
-    """Return the modules of ``cli`` that hold no command: no function ``command``, nothing registered."""
+    """Return the modules of ``cli`` that hold no command: nothing is registered, declares its answer, or is
+    called ``command``."""
     return [
         module.name
         for module in modules
@@ -93,12 +96,10 @@ def without_command(modules: Sequence[Module]) -> list[str]:
 
 
 def _has_command(tree: ast.Module) -> bool:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef) and node.name == "command":
-            return True
-        if isinstance(node, ast.Attribute) and node.attr in ("command", "add_typer", "callback"):
-            return True
-    return False
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    calls = [mark.func for node in functions for mark in node.decorator_list if isinstance(mark, ast.Call)]
+    marks = {call.attr if isinstance(call, ast.Attribute) else getattr(call, "id", "") for call in calls}
+    return bool(marks & {"answers", "command"}) or any(node.name == "command" for node in functions)
 
 
 def import_graph() -> Any:

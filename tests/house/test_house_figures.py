@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests.house import __main__ as house
 from tests.house import citations, structure, words
 from tests.house.__main__ import main, measure, names_text
 from tests.house.source import ROOT, Module, read_module, read_package
@@ -18,7 +19,7 @@ from tests.house.source import ROOT, Module, read_module, read_package
 # A figure may fall below its limit and never rise above it; a step that lowers a figure lowers its limit.
 LIMITS = {
     "percent of vague names": 2.5,
-    "modules of cli without a command": 2,
+    "modules of cli without a command": 0,
     "effects named outside their file": 0,
     "imports up in report": 0,
     "imports up in diagnosis": 0,
@@ -54,7 +55,7 @@ def write(root: Path, files: dict[str, str]) -> list[Module]:
         path = root / "toolkit" / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    return read_package(root)
+    return list(read_package(root))
 
 
 NAMES = '''
@@ -125,6 +126,7 @@ def test_modules_of_the_command_line_without_a_command(tmp_path: Path) -> None:
     files = {
         "cli/__init__": "", "cli/main": "", "cli/console": "", "cli/fit": "def command(): ...\n",
         "cli/machine": "app = 1\n@app.command()\ndef show(): ...\n", "cli/resolve": "def resolve(): ...\n",
+        "cli/budget": "@answers(int)\ndef budget(): ...\n", "cli/groups": "",
         "lab/resolve": "",
     }  # fmt: skip
     modules = write(tmp_path, files)
@@ -230,7 +232,10 @@ layers = ["high | side", "low"]
     assert len(structure.arrows_up(graph, "diagnosis", tmp_path)) == 1  # the circle has to be cut once
 
 
-def test_json_holds_what_the_text_counts(capsys: pytest.CaptureFixture[str], figures: dict[str, Any]) -> None:
+def test_json_holds_what_the_text_counts(
+    capsys: pytest.CaptureFixture[str], figures: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(house, "measure", lambda: figures)
     assert main(["--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(figures))
     assert main([]) == 0

@@ -19,6 +19,7 @@ from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import Design, standard
 from toolkit.planning.expectation import earlier_test, pooled
 from toolkit.planning.protocol_search import Question
+from toolkit.tires.evaluate import value_at
 
 NAMES = ("conicity", "plysteer", "slope_cornering", "FY@8deg")
 DEMANDS = tuple(parse_demand(name) for name in NAMES)
@@ -64,7 +65,7 @@ def drawn(design: Design, seed: int) -> TestResult:
 @pytest.mark.parametrize("design", [PROTOCOL, PLAN], ids=["protocol", "plan"])
 def test_the_uncertainty_that_is_predicted_is_that_of_tests_of_the_design(design: Design) -> None:
     known = dataclasses.replace(earlier(), load_spread=0.0)
-    question = Question(earlier=known, demands=DEMANDS, loads_N=LOADS)
+    question = Question(tires=(known,), demands=DEMANDS, loads_N=LOADS)
     predicted = {(reach.demand.label, round(reach.load_N)): reach.u for reach in question.reaches(design)}
     seen: dict[tuple[str, float], list[float]] = {}
     for seed in range(12):
@@ -83,6 +84,21 @@ def test_the_uncertainty_that_is_predicted_is_that_of_tests_of_the_design(design
     # The scatter has some 60 to 100 freedoms in a test: the mean of twelve is sure to 5 %.
     ratios = [math.sqrt(np.mean(seen[key])) / predicted[key] for key in predicted]
     assert all(0.88 < ratio < 1.12 for ratio in ratios), dict(zip(predicted, ratios, strict=True))
+
+
+def test_conditions_stand_where_the_wheel_stood_beside_its_steps() -> None:
+    offset = math.radians(-0.3)
+    bare = reduced_test(loads=LOADS, u=ROWS)
+    moved = tuple(dataclasses.replace(c, SA=c.SA + offset) for c in bare.conditions)
+    reduced = dataclasses.replace(bare, conditions=moved)
+    result = TestResult(reduced=reduced, characteristics=characterise(reduced, machine=M15, record=None))
+    known = earlier_test(result, machine=M15, record=None)
+    assert known.offset_rad == pytest.approx(offset)
+    for direction in known.directions(PROTOCOL):
+        steps = np.array([c.step_SA for c in direction.group.conditions])
+        np.testing.assert_allclose(direction.group.SA - steps, offset)
+        assert direction.fit.FY is not None
+        np.testing.assert_allclose(direction.group.values("FY"), value_at(direction.fit.FY, steps + offset))
 
 
 def test_a_test_of_one_direction_stands_for_both() -> None:

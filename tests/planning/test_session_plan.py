@@ -55,7 +55,7 @@ def test_a_fifth_of_the_loads_keeps_u_within_a_twentieth(fewest: SessionPlan) ->
     assert fewest.runs >= 3
     for load in fewest.outlook:
         assert load.U <= 1.05 * load.U_repeated * (1 + 1e-9)
-        assert load.floor < load.U < load.U_in_nine_of_ten
+        assert load.floor < load.U_expected < load.U < load.U_in_nine_of_ten
 
 
 def test_every_sign_is_verified_and_no_check_load_is_a_row(fewest: SessionPlan) -> None:

@@ -17,7 +17,7 @@ from toolkit.simulation.steps import Motion
 PACE = Pace(condition_s=6.0, between_files_s=30.0)
 ANGLES = tuple(np.radians([-8.0, -2.0, 0.0, 4.0]).tolist())
 DESIGN = Design(slip_angles_rad=ANGLES, loads_N=LOADS, rotations=("forward", "reverse"))
-TREAD = Tread(earlier=earlier(), pace=PACE, speed_m_s=10.0)
+TREAD = Tread(tires=(earlier(),), pace=PACE, speed_m_s=10.0)
 MOTION = Motion()
 
 
@@ -73,6 +73,6 @@ def test_what_a_cold_tread_cannot_bear_has_no_pause() -> None:
 
 def test_without_limits_the_time_is_that_of_the_pace_at_the_speed_of_the_protocol() -> None:
     assert TREAD.minutes(DESIGN) == pytest.approx(PACE.minutes(DESIGN))
-    made = Tread.of(M15, earlier(), between_files_s=7.0)
+    made = Tread.of(M15, (earlier(),), between_files_s=7.0)
     assert made.speed_m_s == (M15.protocol.speed_m_s or M15.drum.speed_m_s)
     assert made.pace.between_files_s == 7.0

@@ -5,12 +5,14 @@ from __future__ import annotations
 import html
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.built_once import built_once
 from tests.planning.class_factory import answer, found, write_case
 from tests.workbench.conftest import Served, filled, plain, serving
 from tests.workbench.test_app_numbers import numbers
@@ -39,13 +41,22 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Served, dict[str, str]]]:
     """A server of a home, in which each kind of plan was made from its form; ids by kind."""
-    home = filled(tmp_path_factory.mktemp("planned") / "lab")
+    built = built_once(tmp_path_factory, "planned", _plan_all)
+    home = tmp_path_factory.mktemp("planned") / "lab"
+    shutil.copytree(built / "lab", home)
+    with serving(home) as bench:
+        yield bench, json.loads((built / "ids.json").read_text(encoding="utf-8"))
+
+
+def _plan_all(folder: Path) -> None:
+    """Make a home as `lab`, with a plan of each kind, and the ids of the plans as `ids.json`."""
+    home = filled(folder / "lab")
     case = write_case(home / "cases" / "late")
-    folder = home / "diagnoses" / "late"
-    folder.mkdir(parents=True)
+    late = home / "diagnoses" / "late"
+    late.mkdir(parents=True)
     leaves = answer(read_case(case).sha256, found("channel_delay", "filter_lag"))
-    (folder / "diagnosis.json").write_text(json.dumps({"schema": 1, **as_json(leaves)}), encoding="utf-8")
-    (folder / "model.toml").write_text('[answer]\ncase = "../../cases/late/CASE.toml"\n', encoding="utf-8")
+    (late / "diagnosis.json").write_text(json.dumps({"schema": 1, **as_json(leaves)}), encoding="utf-8")
+    (late / "model.toml").write_text('[answer]\ncase = "../../cases/late/CASE.toml"\n', encoding="utf-8")
     ids = {}
     with serving(home) as bench:
         for kind, form in FORMS.items():
@@ -53,7 +64,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Served, 
             link = re.search(r"/plan/([0-9a-f]{16})", page.body)
             assert link is not None, plain(page.body)
             ids[kind] = link[1]
-        yield bench, ids
+    (folder / "ids.json").write_text(json.dumps(ids), encoding="utf-8")
 
 
 def kept(bench: Served, plan_id: str) -> dict[str, Any]:

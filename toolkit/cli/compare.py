@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -131,10 +131,10 @@ def command(
     Example: toolkit compare tests/steel tests/sandpaper --figures figures
     """
     from toolkit.comparison.compare import compare
-    from toolkit.lab.answers import delivered_keys, unit_choice
+    from toolkit.lab.answers import unit_choice
     from toolkit.lab.home import document_template
     from toolkit.lab.tire_tests.compare import read_entries, write_comparison
-    from toolkit.lab.tire_tests.compare_answer import comparison_payload, comparison_text
+    from toolkit.lab.tire_tests.compare_answer import compare_answer, comparison_text
 
     if laboratories is not None:
         if sources:
@@ -172,12 +172,7 @@ def command(
         comparison, style, attention, figures=figures, opened=opened, out=out, known_at=day(known_at),
         units=None if units is None else style,
     )  # fmt: skip
-    payload: dict[str, Any] = comparison_payload(comparison) | {
-        "figures": drawn,
-        "document": None if document is None else delivered_keys(document),
-        "findings": [finding.as_dict() for finding in attention],
-        "timing": {"seconds": time.perf_counter() - started},
-    }
+    payload = compare_answer(comparison, attention, drawn, document, started)
     text = comparison_text(comparison, style, attention, drawn)
     if document is not None:
         text += f"\n\n{document.pdf}\n{document.docx}\n{document.pages} pages, verified"
@@ -200,12 +195,10 @@ def _laboratories(
 
     from toolkit.lab.tire_tests.laboratories import laboratories_answer
 
-    started = time.perf_counter()
     payload, text, findings = laboratories_answer(
         path, reference=reference, sigma=sigma, figures=figures, opened=opened, out=out,
         issued=known_at or calendar.today(),  # noqa: DTZ011
     )  # fmt: skip
-    payload["timing"] = {"seconds": time.perf_counter() - started}
     output.answer(payload, text)
     warned = bool((payload["document"] or {}).get("warnings"))
     return max(int(warned), exit_code(findings))

@@ -18,12 +18,22 @@ from toolkit.cli.plan import SheetTemplate, app, sheet_code
 @answers("toolkit.lab.plans.protocol_plan:PlanTestAnswer")
 def protocol(
     like: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             "--like",
             metavar="TEST|TIRE",
-            help="Earlier test of such a tire, or a tire file (.tir, model.toml); default: the published "
-            "passenger tire on the virtual machine.",
+            help="Earlier test of such a tire, or a tire file (.tir, model.toml); repeatable: the plan "
+            "serves each of them. Default: passenger tires, by the published one on the virtual machine.",
+        ),
+    ] = None,
+    spread: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--spread",
+            metavar="NAME=LOW..HIGH",
+            help="How far tires of the class may be from it, as factors: stiffness=0.7..1.3, "
+            "friction=0.9..1.1; the plan serves all of them. Default: as tested; of passenger tires, "
+            "stiffness=0.41..1.11.",
         ),
     ] = None,
     u: Annotated[
@@ -71,7 +81,7 @@ def protocol(
 ) -> int:  # fmt: skip
     """Plan the shortest test that reaches stated uncertainties.
 
-    Slip angles, repeats, loads and directions, by the budget that `toolkit process` prints. A demand that no
+    Slip angles, loads and directions, by the budget that `toolkit process` prints. A demand that no
     test meets ends with 2 and the nearest plan that is feasible.
 
     Example: toolkit plan test --like tests/2019-06-04 --u "conicity=2 N" --load "833 lbf" --out plan
@@ -81,7 +91,8 @@ def protocol(
 
     started = time.perf_counter()
     order = ProtocolOrder(
-        like=like, demands=tuple(u or ()), loads=tuple(load or ()), minutes=minutes,
+        like=tuple(like or ()), spread=tuple(spread or ()), demands=tuple(u or ()), loads=tuple(load or ()),
+        minutes=minutes,
         between_files_s=between_files, sliding_kJ=sliding, rise_K=rise,
         calibration=calibration, calibrations=place.calibrations,
         home=place.home, draft=draft,

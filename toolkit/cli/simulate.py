@@ -83,32 +83,22 @@ def command(
 
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
-    from toolkit.lab.answers import finding_lines
     from toolkit.lab.studies.simulate import is_model_file, model_answer, simulate_plan
     from toolkit.simulation.plan import read_plan, with_effects
 
     if inputs or condition or is_model_file(plan):
         _refuse_options({"--effect": effect, "--seed": seed, "--csv": csv, "--case": case})
-        limits = worker.limits()
-        payload, text = model_answer(
-            plan,
-            inputs or [],
-            condition or [],
-            out,
-            place.calibrations,
-            place.home,
-            budget_s=budget,
-            limits=limits,
-        )
-        output.answer(payload, text)
+        outputs, text = model_answer(
+            plan, inputs or [], condition or [], out, place.calibrations, place.home, budget_s=budget,
+            limits=worker.limits(),
+        )  # fmt: skip
+        output.answer(outputs, text)
         return 0
     planned = with_effects(read_plan(plan, seed=seed), effect or [])
-    payload, text = simulate_plan(
+    payload, text, findings = simulate_plan(
         planned, out, calibrations=place.calibrations, home=place.home, csv=csv, case=case
     )
-    findings = () if planned.tire_file is None else planned.tire_file.tir.findings()
-    payload["findings"] = [finding.as_dict() for finding in findings]
-    output.answer(payload, "\n".join([text, *finding_lines(findings)]))
+    output.answer(payload, text)
     return exit_code(findings)
 
 

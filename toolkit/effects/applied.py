@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Annotated, NamedTuple, NotRequired, Protocol, TypedDict
 
 from toolkit.effects.effect import STAGES, Effect, EffectParameter, Stage
 
@@ -61,6 +61,30 @@ class Conditioned(Protocol):
         ...
 
 
+class EffectParameterValue(TypedDict):
+    """A parameter of an effect that was simulated."""
+
+    name: str
+    value: float
+    unit: str
+
+
+SimulatedEffect = TypedDict(
+    "SimulatedEffect",
+    {
+        "name": str,
+        "stage": str,
+        "channel": str | None,
+        "parameters": list[EffectParameterValue],
+        "record": NotRequired[Annotated[str, "of another calibration"]],
+        "with": NotRequired[Annotated[str, "the other channel of an exchange"]],
+        "from": NotRequired[Annotated[str, "where a leak comes from"]],
+        "only": NotRequired[Annotated[Mapping[str, list[str]], "condition under which it acts"]],
+    },
+)
+SimulatedEffect.__doc__ = "An effect that was simulated."
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppliedEffect:
     """One effect of the catalogue at one place.
@@ -90,8 +114,18 @@ class AppliedEffect:
 
     @property
     def searched(self) -> tuple[EffectParameter, ...]:
-        """Parameters that a fit moves: none of an effect that is there or not."""
-        return () if self.effect.discrete else self.effect.parameters
+        """Parameters that a fit moves: none of an effect that is there or not, or is read off the digits."""
+        return () if self.effect.discrete or self.effect.from_digits else self.effect.parameters
+
+    def form_uncertainty(self, parameter: EffectParameter) -> float:
+        """Return the standard uncertainty of a size whose law may be off by a share of what it does.
+
+        The share is a limit to both sides and nothing is known between them: GUM (JCGM 100) 4.3.7.
+        """
+        if parameter.off is None:
+            return 0.0
+        size = abs(self.values[parameter.name] - parameter.off)
+        return self.effect.form_error * size / math.sqrt(3)
 
     def log_prior(self, case: Surroundings) -> float:
         """Return how likely its size is before the recording speaks; 0 of an effect that is there or not."""
@@ -163,9 +197,9 @@ class AppliedEffect:
             parts.append(f"where {self.condition[0]} is {' or '.join(self.condition[1])}")
         return self.key.label + (f": {', '.join(parts)}" if parts else "")
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> SimulatedEffect:
         """Return it as JSON values."""
-        entry: dict[str, Any] = {
+        entry: SimulatedEffect = {
             "name": self.effect.name,
             "stage": self.effect.stage,
             "channel": self.channel,
@@ -175,7 +209,8 @@ class AppliedEffect:
             ],
         }
         if self.source is not None:
-            entry[self.effect.second or "from"] = self.source
+            channel = self.effect.on_channel
+            entry[(channel and channel.second) or "from"] = self.source
         if self.condition is not None:
             entry["only"] = {self.condition[0]: list(self.condition[1])}
         return entry

@@ -108,7 +108,7 @@ def play(x: NDArray[np.float64], width: float) -> NDArray[np.float64]:
 
 
 def plays(x: NDArray[np.float64], halves: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of play operators with several half gaps, each starting in the middle of its gap.
+    """Return the mean of play operators with several half gaps, loaded from zero for the first time.
 
     A row clips the state to an interval, and one clip after another is a clip again: all rows at once by
     doubling the number of rows that stand behind one clip (Hillis and Steele's scan).
@@ -122,4 +122,4 @@ def plays(x: NDArray[np.float64], halves: NDArray[np.float64]) -> NDArray[np.flo
         last = np.maximum(np.minimum(high[:-reach], high[reach:]), low[reach:])
         low[reach:], high[reach:] = first, last
         reach *= 2
-    return np.asarray(np.minimum(np.maximum(x[0], low), high).mean(axis=1))
+    return np.asarray(np.minimum(np.maximum(0.0, low), high).mean(axis=1))

@@ -105,6 +105,10 @@ class Surroundings(Protocol):
         """Return the recorded values of a channel over all runs, (n,) without gaps; none where it was not."""
         ...
 
+    def widest(self, name: str | None) -> tuple[float, float] | None:
+        """Return the ends of a channel in the run where its range is widest, None where it has none."""
+        ...
+
     def recorded_range(self, *names: str) -> float:
         """Return the range of the first of these channels that was recorded, 1 where none was."""
         ...

@@ -28,7 +28,7 @@ from toolkit.planning.demands import PEAK, Demand
 from toolkit.planning.design import Design
 from toolkit.reduction.common_load import slopes
 from toolkit.reduction.model import Condition
-from toolkit.tires.evaluate import value_at
+from toolkit.tires.evaluate import estimate_at, slope_estimate_at, value_at
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.pipeline import TestResult
+    from toolkit.tires.model import CurveFit
 
     Array = NDArray[np.float64]
 
@@ -55,8 +56,9 @@ class EarlierTest:
     """What a plan takes from a test.
 
     ``variances`` (4,) and ``variances_u`` (4,) are those of the sources of scatter with their standard
-    uncertainties, ``load_spread`` how far blocks stood off their common load, as a share; ``mirrored`` names
-    directions that it lacks, whose curves are those of the other one.
+    uncertainties, ``load_spread`` how far blocks stood off their common load, as a share; ``offset_rad`` by
+    how much the wheel stood beyond its step on average, which is the steering's zero; ``mirrored`` names
+    directions that it lacks, whose curves are those of the other one; ``tire`` names its tire in a class.
     """
 
     machine: Machine
@@ -66,7 +68,9 @@ class EarlierTest:
     variances: Array
     variances_u: Array
     load_spread: float = 0.0
+    offset_rad: float = 0.0
     mirrored: tuple[Rotation, ...] = ()
+    tire: str = ""
 
     @property
     def loads_N(self) -> tuple[float, ...]:
@@ -85,9 +89,29 @@ class EarlierTest:
         """Return FY [N] of the curve of a nominal load at slip angles [rad]."""
         return _values(self.curves[load_N, rotation].fit, "FY", SA)
 
+    def similar(self, *, stiffness: float, friction: float, tire: str) -> EarlierTest:
+        """Return this test on a similar tire: stiffness and friction times these.
+
+        Forces are F'(SA) = friction F(SA stiffness / friction), as Pacejka's similarity method has them (Tire
+        and Vehicle Dynamics, 3rd ed. 2012, 4.2); the shifts of the curves stay, so that plysteer follows the
+        stiffness and conicity stays. Scatter and what all rows share are this test's.
+        """
+
+        def scaled(fit: CurveFit | None) -> CurveFit | None:
+            return None if fit is None else _similar(fit, {"B": stiffness / friction, "D": friction})
+
+        curves = {
+            key: dataclasses.replace(
+                curve, fit=dataclasses.replace(curve.fit, FY=scaled(curve.fit.FY), MZ=scaled(curve.fit.MZ))
+            )
+            for key, curve in self.curves.items()
+        }
+        return dataclasses.replace(self, curves=curves, tire=tire)
+
     def directions(self, design: Design) -> tuple[Direction, ...]:
         """Return the directions of a design, its conditions on the curves of this test."""
-        angles = np.sort(np.asarray(design.slip_angles_rad))
+        steps = np.sort(np.asarray(design.slip_angles_rad))
+        angles = steps + self.offset_rad
         loads = sorted(design.loads_N)
         directions = {}
         for rotation in (rotation for rotation in ROTATIONS if rotation in design.rotations):
@@ -97,7 +121,7 @@ class EarlierTest:
             for place, (load, curve) in enumerate(zip(loads, curves, strict=True)):
                 y = {c: values[c][place] for c in CHANNELS}
                 u = {c: own[c][place] for c in CHANNELS}
-                directions[load, rotation] = self._direction(curve, load, rotation, angles, y, u)
+                directions[load, rotation] = self._direction(curve, load, rotation, steps, y, u)
         return tuple(
             directions[key] for key in sorted(directions, key=lambda k: (k[0], ROTATIONS.index(k[1])))
         )
@@ -117,25 +141,26 @@ class EarlierTest:
         curve: _Curve,
         load: float,
         rotation: Rotation,
-        angles: Array,
+        steps: Array,
         y: Mapping[Channel, Array],
         u: Mapping[Channel, Array],
     ) -> Direction:
         FZ = curve.fit.load_N
         sign = signs(self.machine.axes, "SAE", seen_by_cells(rotation, self.shared.reversal))
-        seen = np.column_stack([sign["FY"] * y["FY"], sign["MZ"] * y["MZ"], np.full(len(angles), FZ)])
-        shown = np.column_stack([seen, np.ones(len(angles))]) @ self.cells
+        seen = np.column_stack([sign["FY"] * y["FY"], sign["MZ"] * y["MZ"], np.full(len(steps), FZ)])
+        shown = np.column_stack([seen, np.ones(len(steps))]) @ self.cells
         conditions = tuple(
             dataclasses.replace(
                 curve.pattern,
-                file=f"{rotation} {place}", step_SA=float(SA), SA=float(SA), FZ=FZ, FZ_common=FZ,
+                file=f"{rotation} {place}", step_SA=float(step), SA=float(step) + self.offset_rad,
+                FZ=FZ, FZ_common=FZ,
                 FY=float(y["FY"][place]), FY_common=float(y["FY"][place]),
                 MZ=float(y["MZ"][place]), MZ_common=float(y["MZ"][place]),
                 u_FY=float(u["FY"][place]), u_FY_common=float(u["FY"][place]),
                 u_MZ=float(u["MZ"][place]), u_MZ_common=float(u["MZ"][place]),
                 indications=tuple(shown[place].tolist()), rotation=rotation, step_FZ=load,
             )
-            for place, SA in enumerate(angles)
+            for place, step in enumerate(steps)
         )  # fmt: skip
         fit = dataclasses.replace(curve.fit, rotation=rotation)
         return Direction(group=Group(load_N=FZ, rotation=rotation, conditions=conditions), fit=fit)
@@ -226,6 +251,9 @@ def earlier_test(result: TestResult, *, machine: Machine, record: CalibrationRec
         cells=_cells(reduced.used(), machine, result),
         variances=scatter.variances,
         variances_u=np.sqrt(np.maximum(np.diag(scatter.covariance), 0.0)),
+        offset_rad=float(
+            np.mean([c.SA - c.step_SA for c in reduced.used() if c.step_SA is not None] or [0.0])
+        ),
         load_spread=float(np.sqrt(np.mean([(c.FZ_common / c.FZ - 1) ** 2 for c in reduced.used()]))),
         mirrored=mirrored,
     )
@@ -243,6 +271,24 @@ def pooled(tests: Sequence[EarlierTest]) -> EarlierTest:
         tests[0],
         variances=np.mean([test.variances for test in tests], axis=0),
         variances_u=np.sqrt(np.sum([test.variances_u**2 for test in tests], axis=0)) / count,
+    )
+
+
+def _similar(fit: CurveFit, factors: Mapping[str, float]) -> CurveFit:
+    """Return a curve with some of its parameters times factors."""
+    sizes = np.array([factors.get(parameter.name, 1.0) for parameter in fit.parameters])
+    changed = dataclasses.replace(
+        fit,
+        parameters=tuple(
+            dataclasses.replace(parameter, value=parameter.value * size)
+            for parameter, size in zip(fit.parameters, sizes.tolist(), strict=True)
+        ),
+        covariance=tuple(map(tuple, (np.asarray(fit.covariance) * np.outer(sizes, sizes)).tolist())),
+    )
+    return dataclasses.replace(
+        changed,
+        value_at_zero=None if fit.value_at_zero is None else estimate_at(changed, 0.0),
+        slope_at_zero=None if fit.slope_at_zero is None else slope_estimate_at(changed, 0.0),
     )
 
 

@@ -130,6 +130,16 @@ class Knowledge:
         """Return the budgets at the largest loads that planned rows make, scattering as `runs` has it."""
         return self._budgets([self._planned(at, table) for at in range(len(self.names))])
 
+    def likely(self, table: Table) -> tuple[Budget, ...]:
+        """Return the budgets of planned rows where runs differ as the record says, without `cautious`."""
+        runs = tuple(
+            dataclasses.replace(noise.runs, factor="run", correlation=0.0)
+            if noise.runs.groups > 1
+            else planned  # one run says nothing of the next
+            for noise, planned in zip(self.scatter, self.runs, strict=True)
+        )
+        return dataclasses.replace(self, runs=runs).expected(table)
+
     def repeated(self) -> tuple[Budget, ...]:
         """Return the budgets that the record's own rows are expected to give another time."""
         table = self.loads

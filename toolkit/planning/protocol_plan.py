@@ -14,7 +14,7 @@ from toolkit.declared import Entry, toml_text
 from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, ordered, standard
 from toolkit.planning.printed_units import PrintedUnits, units_of
-from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan
+from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan, shared_loads
 from toolkit.planning.reach import Reach
 from toolkit.planning.tread import Tread, tread_statement
 from toolkit.tires.fit import MIN_POINTS
@@ -35,9 +35,11 @@ class PlannedValue:
     rotation: Annotated[str, Entry("forward, reverse or both")]
     SA_deg: Annotated[float | None, Entry("slip angle; null for what is at none")]
     unit: Annotated[str, Entry("SI, of the values and uncertainties")]
+    tire: Annotated[int, Entry("of the class, the one that is nearest to its limit: its place, from 1")]
     value: Annotated[float, Entry("by the earlier test")]
     demanded_U: Annotated[float, Entry("largest expanded uncertainty, 95 %")]
     planned_U: Annotated[float, Entry("by the plan")]
+    planned_U_in_nine_of_ten: Annotated[float, Entry("no more in nine of ten tests")]
     planned_U_low: Annotated[float, Entry("where the scatter is one standard uncertainty smaller")]
     planned_U_high: Annotated[float, Entry("where it is one larger")]
     protocol_U: Annotated[float | None, Entry("by the machine's protocol")]
@@ -70,7 +72,8 @@ class ProtocolPlan:
 
     feasible: Annotated[bool, Entry("whether every demand is met")]
     machine: Annotated[str, Entry("its name")]
-    like: Annotated[str, Entry("the test that the plan goes by")]
+    like: Annotated[str, Entry("the tests that the plan goes by")]
+    tires: Annotated[tuple[str, ...], Entry("of the class, each of which the plan serves")]
     calibration: Annotated[str | None, Entry("record of that test; null without")]
     plan: Annotated[PlannedDesign, Entry("the plan")]
     protocol: Annotated[PlannedDesign, Entry("the machine's own protocol")]
@@ -82,7 +85,7 @@ class ProtocolPlan:
 
 
 def plan_protocol(
-    earlier: EarlierTest,
+    tires: tuple[EarlierTest, ...],
     demands: tuple[Demand, ...],
     loads_N: tuple[float, ...],
     *,
@@ -96,8 +99,8 @@ def plan_protocol(
 
     Parameters
     ----------
-    earlier : what is known of the tire, the machine and their scatter
-    demands, loads_N : what is asked for, at which nominal loads of the earlier test
+    tires : what is known of each tire of the class, the machine and their scatter; the first stands for it
+    demands, loads_N : what is asked for, at which nominal loads of the earlier tests
     machine : the machine with its own protocol, which the plan is compared with
     tread : what the tire's tread may be put to
     minutes : the time on the machine at most
@@ -108,8 +111,8 @@ def plan_protocol(
         ``plan-infeasible``: the time does not hold the smallest design
     """
     units = units_of(machine.protocol)
-    protocol = protocol_design(earlier, machine)
-    question = Question.beside(protocol, earlier=earlier, demands=demands, loads_N=loads_N)
+    protocol = protocol_design(tires, machine)
+    question = Question.beside(protocol, tires=tires, demands=demands, loads_N=loads_N)
     tell("the protocol")
     # The protocol itself has no limits, and so no pauses but its own.
     free = dataclasses.replace(tread, energy_J=math.inf, rise_K=math.inf)
@@ -120,28 +123,30 @@ def plan_protocol(
     limited = not all(map(math.isinf, (minutes, tread.energy_J, tread.rise_K)))
     if alike is not None and (open_demands != demands or limited):
         tell("the protocol's uncertainties in fewer rows")
-        as_protocol = Question.beside(protocol, earlier=earlier, demands=open_demands, loads_N=loads_N)
+        as_protocol = Question.beside(protocol, tires=tires, demands=open_demands, loads_N=loads_N)
         alike = least_plan(as_protocol, free, tell=tell)
+    (earlier, *others) = tires
     return ProtocolPlan(
         feasible=plan.feasible,
         machine=machine.name,
         like=like,
+        tires=tuple(tire.tire for tire in tires),
         calibration=None if earlier.shared.record is None else earlier.shared.record.id,
         plan=_shown(plan.design, tread),
         protocol=_shown(protocol, free, in_order=True),
         alike=None if alike is None or not alike.feasible else _shown(alike.design, free),
         same_time=None if same_time is None else _shown(same_time.design, free),
         values=_values(question, plan, of_protocol, same_time),
-        assumptions=_assumptions(earlier, tread, units),
+        assumptions=_assumptions(earlier, others, tread, units),
         gives_up=_gives_up(plan.design, protocol, units),
     )
 
 
-def protocol_design(earlier: EarlierTest, machine: Machine) -> Design:
-    """Return the design of the machine's protocol, at the earlier test's loads where these are others."""
-    design = standard(machine, machine.rotations)
-    known = set(design.loads_N) <= set(earlier.loads_N)
-    return design if known else dataclasses.replace(design, loads_N=earlier.loads_N)
+def protocol_design(tires: Sequence[EarlierTest], machine: Machine) -> Design:
+    """Return the design of the machine's protocol, at the earlier tests' loads where these are others."""
+    design, loads_N = standard(machine, machine.rotations), shared_loads(tires)
+    known = set(design.loads_N) <= set(loads_N)
+    return design if known else dataclasses.replace(design, loads_N=loads_N)
 
 
 def in_time(question: Question, tread: Tread, protocol: Design) -> Judged | None:
@@ -173,6 +178,11 @@ def _values(
     high = {_key(reach): reach.U for reach in question.reaches(plan.design, shift=1.0)}
     by_protocol = {_key(reach): reach.U for reach in protocol.reaches}
     in_same_time = {} if same_time is None else {_key(reach): reach.U for reach in same_time.reaches}
+    names = [earlier.tire for earlier in question.tires]
+    nearest: dict[tuple[str, float], Reach] = {}
+    for reach in plan.reaches:
+        known = nearest.get((reach.demand.label, reach.load_N), reach)
+        nearest[reach.demand.label, reach.load_N] = max(known, reach, key=lambda one: one.ratio)
     return tuple(
         PlannedValue(
             name=reach.demand.label,
@@ -180,24 +190,46 @@ def _values(
             rotation=reach.rotation,
             SA_deg=None if reach.SA_rad is None else round(math.degrees(reach.SA_rad), 6),
             unit=reach.unit,
+            tire=names.index(reach.tire) + 1,
             value=reach.value,
             demanded_U=reach.limit,
             planned_U=reach.U,
+            planned_U_in_nine_of_ten=_in_nine_of_ten(
+                reach, low.get(_key(reach), reach.U), high.get(_key(reach), reach.U)
+            ),
             planned_U_low=low.get(_key(reach), reach.U),
             planned_U_high=high.get(_key(reach), reach.U),
             protocol_U=by_protocol.get(_key(reach)),
             same_time_U=in_same_time.get(_key(reach)),
             sources=reach.sources,
         )
-        for reach in plan.reaches
+        for reach in nearest.values()
     )
 
 
-def _key(reach: Reach) -> tuple[str, float]:
-    return reach.demand.label, reach.load_N
+def _in_nine_of_ten(reach: Reach, low: float, high: float) -> float:
+    """Return the U that nine of ten tests keep.
+
+    A variance of n degrees of freedom scatters with twice its square over n; n is that of the test's own
+    residuals (Welch and Satterthwaite), less where the earlier test leaves the scatter itself in doubt.
+    """
+    from scipy.special import chdtri
+
+    doubt = (high**2 - low**2) / (2 * reach.U**2) if reach.U > 0 else 0.0
+    relative = 2 / reach.dof + doubt**2
+    if relative <= 0:
+        return reach.U
+    freedoms = 2 / relative
+    return reach.U * math.sqrt(float(chdtri(freedoms, 0.1)) / freedoms)
 
 
-def _assumptions(earlier: EarlierTest, tread: Tread, units: PrintedUnits) -> tuple[str, ...]:
+def _key(reach: Reach) -> tuple[str, str, float]:
+    return reach.tire, reach.demand.label, reach.load_N
+
+
+def _assumptions(
+    earlier: EarlierTest, others: Sequence[EarlierTest], tread: Tread, units: PrintedUnits
+) -> tuple[str, ...]:
     def scatter(place: int, unit: str) -> str:
         size, printed = units.shown(math.sqrt(earlier.variances[place]), unit)
         return f"{size:.2g} {printed.replace('*', '·')}"
@@ -205,7 +237,10 @@ def _assumptions(earlier: EarlierTest, tread: Tread, units: PrintedUnits) -> tup
     pace = tread.pace
     angle = math.degrees(math.sqrt(earlier.variances[3]))
     statements = [
-        "the tire is like that of the earlier test: its curves say where the slip angles are needed",
+        "the tire is like that of the earlier test: its curves say where the slip angles are needed"
+        if not others
+        else f"the tire is one of a class, of which {len(others) + 1} are looked at: every demand is met on "
+        "each of them, and each line is of the one that is nearest to its limit",
         "blocks scatter about the curves as in that test: "
         f"{scatter(0, 'N')} in FY, {scatter(1, 'N*m')} in MZ, {scatter(2, 'N')} in the load and "
         f"{angle:.2g} deg in the slip angle (one standard deviation), "

@@ -1,8 +1,15 @@
-"""The least test that meets demands: slip angles, repeats and loads, judged by `expectation`."""
+"""The least test that meets demands: slip angles and loads, judged by `expectation`.
+
+No slip angle is planned twice. A repeat has in common with the first what the form of the curve misses there
+and the way to the common load; how much of the scatter about the curves that is, an earlier test of each
+slip angle does not tell. A design of repeats takes all of it for chance: its curves are less sure than it
+says, and its own residuals, mostly between repeats, do not show it.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +25,7 @@ from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, steps_of
 from toolkit.planning.exchange import Points, PointSearch
 from toolkit.planning.reach import Reach, is_of, worst
-from toolkit.planning.screen import screen_of
+from toolkit.planning.screen import Screen, criterion, openness, screen_of
 from toolkit.planning.tread import Exposure, Tread
 from toolkit.tires.fit import MIN_POINTS
 
@@ -30,7 +37,6 @@ if TYPE_CHECKING:
 # A curve that a report prints is measured to its peak, or to the end of the range: within this part of it.
 _PEAK_SHARE = 0.99
 _SAME_RAD = 1e-9
-_LARGEST = 30  # slip angles in each direction
 _BEYOND = 1e3  # what a design that goes beyond its limits pays for as much again
 _STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
@@ -39,30 +45,33 @@ _ALIKE = 1.05
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Question:
-    """What is asked: demands at nominal loads [N]; an earlier test says what a design will reach.
+    """What is asked: demands at nominal loads [N]; earlier tests say what a design will reach.
 
-    ``protocol_U`` is what the machine's own protocol reaches, by demand and load, and a twentieth more: the
-    limit of a demand without one.
+    ``tires`` are those tests, one a tire of the class: a demand is to be met on each of them. ``protocol_U``
+    is what the machine's own protocol reaches, by tire, demand and load, and a twentieth more: the limit of
+    a demand without one.
     """
 
-    earlier: EarlierTest
+    tires: tuple[EarlierTest, ...]
     demands: tuple[Demand, ...]
     loads_N: tuple[float, ...]
-    protocol_U: Mapping[tuple[Demand, float], float] = field(default_factory=dict)
+    protocol_U: Mapping[tuple[str, Demand, float], float] = field(default_factory=dict)
 
     @classmethod
     def beside(
         cls,
         protocol: Design,
         *,
-        earlier: EarlierTest,
+        tires: tuple[EarlierTest, ...],
         demands: tuple[Demand, ...],
         loads_N: tuple[float, ...],
     ) -> Question:
         """Return a question that knows what the machine's protocol reaches."""
-        bare = cls(earlier=earlier, demands=demands, loads_N=loads_N)
+        bare = cls(tires=tires, demands=demands, loads_N=loads_N)
         bare.refuse_what_no_design_has()
-        reached = {(reach.demand, reach.load_N): _ALIKE * reach.U for reach in bare.reaches(protocol)}
+        reached = {
+            (reach.tire, reach.demand, reach.load_N): _ALIKE * reach.U for reach in bare.reaches(protocol)
+        }
         return dataclasses.replace(bare, protocol_U=reached)
 
     @property
@@ -73,33 +82,37 @@ class Question:
 
     @cached_property
     def candidates_rad(self) -> tuple[float, ...]:
-        """The slip angles at which the machine can stand and the earlier test measured [rad]."""
-        low, high = self.earlier.reach_rad
-        slack = self.earlier.machine.protocol.slip_angle_tolerance_rad
-        steps = steps_of(self.earlier.machine.protocol)
+        """The slip angles at which the machine can stand and every earlier test measured [rad]."""
+        low = max(earlier.reach_rad[0] for earlier in self.tires)
+        high = min(earlier.reach_rad[1] for earlier in self.tires)
+        protocol = self.tires[0].machine.protocol
+        slack, steps = protocol.slip_angle_tolerance_rad, steps_of(protocol)
         return tuple(step for step in steps if low - slack <= step <= high + slack)
 
     def reaches(self, design: Design, *, shift: float = 0.0) -> tuple[Reach, ...]:
-        """Return what a design reaches of every demand at every load asked for; empty where it lacks one."""
-        rows = self.earlier.rows(design, self.demands, shift=shift)
+        """Return what a design reaches of every demand at every load asked for, on each tire; empty where it
+        lacks one.
+        """
         reaches = []
-        for demand in self.demands:
-            for load in self.loads_N:
-                at_load = self.earlier.curves[load, "forward"].fit.load_N
+        for earlier in self.tires:
+            rows = earlier.rows(design, self.demands, shift=shift)
+            for demand, load in itertools.product(self.demands, self.loads_N):
+                at_load = earlier.curves[load, "forward"].fit.load_N
                 mine = [row for row in rows if is_of(row, demand, at_load)]
-                reach = worst(demand, mine, load, self.protocol_U.get((demand, load), math.inf))
+                limit = self.protocol_U.get((earlier.tire, demand, load), math.inf)
+                reach = worst(demand, mine, load, limit)
                 if reach is None:
                     return ()
-                reaches.append(reach)
+                reaches.append(dataclasses.replace(reach, tire=earlier.tire))
         return tuple(reaches)
 
     @cached_property
     def _at_peak(self) -> NDArray[np.bool_]:
-        """Which candidates measure the peak: (loads and sides, candidates)."""
+        """Which candidates measure the peak: (tires, loads and sides, candidates)."""
         angles = np.array(self.candidates_rad)
         rows = []
-        for load in self.loads_N:
-            force = np.abs(self.earlier.force(angles, load, "forward"))
+        for earlier, load in itertools.product(self.tires, self.loads_N):
+            force = np.abs(earlier.force(angles, load, "forward"))
             rows += [
                 side & (force >= _PEAK_SHARE * force[side].max(initial=0.0))
                 for side in (angles < 0, angles > 0)
@@ -114,9 +127,9 @@ class Question:
         return np.asarray(np.abs(steps - np.array(angles)[:, None]) < _SAME_RAD)
 
     def covers(self, points: Points) -> bool:
-        """Tell whether candidates give a curve: enough places, to the peak on either side, all demanded."""
+        """Tell whether candidates give a curve: enough, none twice, to either peak, all that are demanded."""
         places = list(dict.fromkeys(points))
-        if len(places) < MIN_POINTS:
+        if len(places) < max(MIN_POINTS, len(points)):
             return False
         needed = np.concatenate([self._at_peak, self._at_angles])
         return bool(needed[:, places].any(axis=1).all())
@@ -143,12 +156,16 @@ class Question:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth."""
+    """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth.
+
+    ``openness`` of the curves between its slip angles, over what is allowed (`screen`).
+    """
 
     design: Design
     reaches: tuple[Reach, ...]
     minutes: float
     excess: float = 0.0
+    openness: float = 0.0
 
     @property
     def worst(self) -> float:
@@ -157,8 +174,8 @@ class Judged:
 
     @property
     def feasible(self) -> bool:
-        """Whether every demand is met within the limits."""
-        return self.worst <= 1 and self.excess <= 0
+        """Whether every demand is met within the limits, and every curve is known between its slip angles."""
+        return self.worst <= 1 and self.excess <= 0 and self.openness <= 1
 
 
 class ProtocolSearch:
@@ -182,8 +199,12 @@ class ProtocolSearch:
             energy_limit_J=tread.energy_J,
             minutes_limit=minutes,
         )
+        self._screens: list[Screen] = []
         self.full = self.judged(full)
-        self._screen = screen_of(question.earlier, full, self.full.reaches)
+        self._screens = [
+            screen_of(earlier, full, [reach for reach in self.full.reaches if reach.tire == earlier.tire])
+            for earlier in question.tires
+        ]
         self._points = PointSearch(self._criterion, len(self.candidates))
         self._best: dict[int, Points] = {}
 
@@ -198,6 +219,7 @@ class ProtocolSearch:
         return Judged(
             design=design, reaches=self.question.reaches(design), minutes=self.tread.minutes(design),
             excess=self.exposure.excess(points),
+            openness=openness(self._screens, points) if self._screens else 0.0,
         )  # fmt: skip
 
     def best(self, size: int) -> Judged:
@@ -213,11 +235,15 @@ class ProtocolSearch:
         """Yield designs of a size drawn at random, the same for the same size."""
         rng = np.random.default_rng([_SEED, size])
         for _ in range(_STARTS):
-            yield tuple(rng.integers(len(self.candidates), size=size).tolist())
+            yield tuple(rng.choice(len(self.candidates), size=size, replace=False).tolist())
 
     def least(self, largest: int) -> Judged | None:
         """Return the best design of the fewest slip angles, at most so many, that meets every demand."""
         low, high = MIN_POINTS, largest
+        if min(self.tread.energy_J, self.tread.rise_K) < math.inf:
+            # Slip angles are not all as gentle: of those that a limit leaves, more are not always better.
+            sizes = (self.best(size) for size in range(low, high + 1))
+            return next((judged for judged in sizes if judged.feasible), None)
         if high < low or not self.best(high).feasible:
             return None
         while low < high:
@@ -225,15 +251,19 @@ class ProtocolSearch:
             low, high = (low, middle) if self.best(middle).feasible else (middle + 1, high)
         return self.best(high)
 
+    def nearest(self) -> Judged:
+        """Return the design that was nearest to its limits and then to the demands."""
+        return min((self.best(size) for size in tuple(self._best)), key=_distance)
+
     def most_within(self, minutes: float) -> int:
         """Return how many slip angles fit into a time."""
-        return int(min(minutes / self.exposure.minutes.min() + 1e-9, _LARGEST))
+        return int(min(minutes / self.exposure.minutes.min() + 1e-9, len(self.candidates)))
 
     def _criterion(self, designs: Sequence[Points]) -> NDArray[np.float64]:
         losses = np.full(len(designs), math.inf)
         serves = np.array([self.question.covers(points) for points in designs])
         if serves.any():
-            losses[serves] = self._screen.criterion(np.array(designs)[serves])
+            losses[serves] = criterion(self._screens, np.array(designs)[serves])
             losses += [_BEYOND * self.exposure.excess(points) for points in designs]
         return losses
 
@@ -268,8 +298,8 @@ def least_plan(
         if least is not None:
             met = least if met is None or least.minutes < met.minutes else met
         elif met is None:
-            nearest = search.best(points)
-            nearer = missed is None or (nearest.excess, nearest.worst) < (missed.excess, missed.worst)
+            nearest = search.nearest()
+            nearer = missed is None or _distance(nearest) < _distance(missed)
             missed = nearest if nearer else missed
     if met is None and missed is None:
         raise ConfigError(
@@ -281,11 +311,20 @@ def least_plan(
     return met or cast("Judged", missed)
 
 
+def _distance(judged: Judged) -> tuple[float, float]:
+    return judged.excess, max(judged.worst, judged.openness)
+
+
+def shared_loads(tires: Sequence[EarlierTest]) -> tuple[float, ...]:
+    """Return the nominal loads that every earlier test measured [N]."""
+    return tuple(load for load in tires[0].loads_N if all(load in other.loads_N for other in tires))
+
+
 def load_sets(question: Question) -> tuple[tuple[float, ...], ...]:
     """Return the loads that are asked for, then with one more each time, the nearest first."""
     asked = question.loads_N
     remaining = sorted(
-        (load for load in question.earlier.loads_N if load not in asked),
+        (load for load in shared_loads(question.tires) if load not in asked),
         key=lambda load: min(abs(load - wished) for wished in asked),
     )
     return tuple(tuple(sorted((*asked, *remaining[:count]))) for count in range(len(remaining) + 1))

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 class Reach:
     """The uncertainty that a design has of one demand at one load, in the direction in which it is largest.
 
-    ``value``, ``u``, ``U`` [unit], ``dof``; ``limit`` is what was demanded; ``sources`` the budget.
+    ``value``, ``u``, ``U`` [unit], ``dof``; ``limit`` is what was demanded; ``sources`` the budget; ``tire``
+    that of a class.
     """
 
     demand: Demand
@@ -32,6 +33,7 @@ class Reach:
     unit: str
     limit: float
     sources: tuple[tuple[str, float], ...]
+    tire: str = ""
 
     @property
     def ratio(self) -> float:

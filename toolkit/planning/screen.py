@@ -5,6 +5,10 @@ that conditions of variances s² leave (g J^+)² s² of it (`characteristics.rea
 what all rows share, stays as it is whatever the slip angles. The gradient is taken by moving a curve's
 parameters and letting the catalogue read again: no formula of a characteristic stands here. A design that
 comes out of the exchange is judged by the whole budget (`expectation`), not by this.
+
+Derivatives hold near the curves of the earlier test. A design that leaves a curve open between its slip
+angles is none, however well it tells what is demanded: the curve of the test may go elsewhere there, and
+what is read off it has another U.
 """
 
 from __future__ import annotations
@@ -37,6 +41,8 @@ _STEP = 1e-4  # of a parameter's size
 _NO_DATA = 1e-8
 _COVERAGE = 1.96
 _POWER = 16
+# The standard uncertainty of a curve, anywhere in its range, in that of a condition there, at most.
+_OPEN = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,16 +60,30 @@ class Screen:
     fixed: Array
     limits: Array
 
-    def criterion(self, designs: NDArray[np.intp]) -> Array:
-        """Return the largest U over its limit (designs,), where many are alike a little more.
+    def ratios(self, designs: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return U of each reading over its limit (designs, readings), and how open each curve is between
+        its slip angles over what is allowed (designs, curves).
 
         ``designs`` (designs, points) are candidates by their numbers.
         """
         pseudo = np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA)  # (curves, designs, p, points)
         weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
         own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
-        ratios = _COVERAGE * np.sqrt(self.fixed + own) / self.limits
-        return np.asarray(np.sum(ratios**_POWER, axis=1) ** (1 / _POWER))
+        between = self.tangents[:, None] @ pseudo  # (curves, designs, candidates, points)
+        curves = np.einsum("cdkn,cdn->dck", between**2, self.variances[:, designs]) / self.variances
+        return _COVERAGE * np.sqrt(self.fixed + own) / self.limits, np.sqrt(curves.max(axis=2)) / _OPEN
+
+
+def criterion(screens: Sequence[Screen], designs: NDArray[np.intp]) -> Array:
+    """Return the largest ratio (designs,) of all screens, where many are alike a little more."""
+    ratios = np.concatenate([part for screen in screens for part in screen.ratios(designs)], axis=1)
+    return np.asarray(np.sum(ratios**_POWER, axis=1) ** (1 / _POWER))
+
+
+def openness(screens: Sequence[Screen], design: Sequence[int]) -> float:
+    """Return how open the least known curve of a design is, over what is allowed: at most 1 serves."""
+    at = np.array([list(design)])
+    return float(max(screen.ratios(at)[1].max() for screen in screens))
 
 
 def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> Screen:

@@ -38,8 +38,10 @@ class PlannedLoad:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outlook:
-    """What is expected of one load: U at ``at`` today, as asked, as expected, and in nine of ten sessions.
+    """What is expected of one load: U at ``at`` today, as asked, as planned, and in nine of ten sessions.
 
+    ``U`` takes runs to differ by a standard error more than the record says: by it the demand is kept.
+    ``U_expected`` takes them as the record says, and is what sessions have on average.
     ``U_repeated`` is what the last session's own loads are expected to give another time.
     ``share`` of simulated sessions reach what was asked. ``floor`` is U without the part that more rows can
     lower; ``visible_misfit`` the misfit that four of five sessions would show; ``drift`` and ``creep``
@@ -52,6 +54,7 @@ class Outlook:
     U_today: float
     U_repeated: float
     U_asked: float | None
+    U_expected: float
     U: float
     U_in_nine_of_ten: float
     share: float | None
@@ -172,13 +175,14 @@ class _Finished:
         self, design: Design, table: Table, drawn: NDArray[np.float64], answers: NDArray[np.float64]
     ) -> tuple[Outlook, ...]:
         knowledge = self.knowledge
-        misfits = knowledge.visible_misfit(table)
+        misfits, likely = knowledge.visible_misfit(table), knowledge.likely(table)
         return tuple(
             Outlook(
                 load=fit.load, unit=fit.unit, at=budget.at, U_today=budget.U,
                 U_repeated=float(self.search.today[at]),
                 U_asked=float(self.asked[at]) if math.isfinite(self.asked[at]) else None,
-                U=float(design.U[at]), U_in_nine_of_ten=float(np.quantile(drawn[:, at], 0.9)),
+                U_expected=likely[at].U, U=float(design.U[at]),
+                U_in_nine_of_ten=float(np.quantile(drawn[:, at], 0.9)),
                 share=float(np.mean(drawn[:, at] <= self.asked[at] * (1 + 1e-9)))
                 if math.isfinite(self.asked[at]) else None,
                 floor=knowledge.floor(at), visible_misfit=misfits[at],

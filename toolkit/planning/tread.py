@@ -41,26 +41,34 @@ def tread_statement() -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tread:
-    """The tread of an earlier test's tire at a speed, and what it may be put to: no limit by default."""
+    """The tread of the tires of earlier tests at a speed, and what it may be put to: no limit by default.
 
-    earlier: EarlierTest
+    Of several tires the one of the largest force counts, at each condition.
+    """
+
+    tires: tuple[EarlierTest, ...]
     pace: Pace
     speed_m_s: float
     energy_J: float = math.inf
     rise_K: float = math.inf
 
     @classmethod
-    def of(cls, machine: Machine, earlier: EarlierTest, *, between_files_s: float | None = None) -> Tread:
+    def of(
+        cls, machine: Machine, tires: tuple[EarlierTest, ...], *, between_files_s: float | None = None
+    ) -> Tread:
         """Return the tread without limits at the speed and the pace of a machine's protocol."""
         pace = pace_of(machine, between_files_s=between_files_s)
         speed = machine.protocol.speed_m_s or machine.drum.speed_m_s
-        return cls(earlier=earlier, pace=pace, speed_m_s=speed)
+        return cls(tires=tires, pace=pace, speed_m_s=speed)
 
     def powers_W(self, design: Design) -> Array:
         """Return the power that slides away (slip angles, directions, loads)."""
         angles = np.asarray(design.slip_angles_rad)
         forces = [
-            [np.abs(self.earlier.force(angles, load, rotation)) for load in design.loads_N]
+            [
+                np.max([np.abs(earlier.force(angles, load, rotation)) for earlier in self.tires], axis=0)
+                for load in design.loads_N
+            ]
             for rotation in design.rotations
         ]
         sliding = self.speed_m_s * np.abs(np.sin(angles))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import functools
 import io
 import re
 import zipfile
@@ -55,7 +56,7 @@ def write_labview(
         be written
     """
     names = _layout(path, machine, columns)
-    headers = [machine.column(name).header if "[" not in name else name for name in names]
+    headers = tuple(machine.column(name).header if "[" not in name else name for name in names)
     values = [np.asarray(columns[name], dtype=np.float64) for name in names]
     _check(path, names, values)
     shell = _shell(
@@ -68,7 +69,9 @@ def write_labview(
     write_result(path, _filled(shell, _rows_xml(values), created))
 
 
-def _shell(headers: list[str], *, sheet: str, title: str, keywords: str, created: dt.datetime) -> bytes:
+@functools.lru_cache(maxsize=4)
+def _shell(headers: tuple[str, ...], *, sheet: str, title: str, keywords: str, created: dt.datetime) -> bytes:
+    """Return a workbook with the head alone: that of the next file of a test is most often the same."""
     from openpyxl import Workbook
     from openpyxl.cell import WriteOnlyCell
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from toolkit.characteristics.characteristic import BOTH
 from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
 from toolkit.publication import write_result
 from toolkit.recording.marks import mark_workbook
+from toolkit.recording.sheet_rows import filled, sheet_row
 from toolkit.testfile.layout import CONDITION_FIELDS, HUB, KIND, SCHEMA, cell, content_hash, header
 from toolkit.testfile.readable import Sheet, Shown, readable_sheets
 
@@ -44,7 +47,8 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
 def workbook(result: TestResult, recordings: Mapping[str, Recording] | None = None) -> bytes:
     """Return the file that `write_test_file` writes."""
     try:
-        return _workbook(result, content_hash(result), recordings or {})
+        with ExitStack() as files:
+            return _workbook(result, content_hash(result), recordings or {}, files)
     except OSError as error:
         raise OutputError(
             "the reduced test cannot be put together",
@@ -55,11 +59,14 @@ def workbook(result: TestResult, recordings: Mapping[str, Recording] | None = No
         ) from error
 
 
-def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recording]) -> bytes:
-    """Return the file's bytes, made in memory: what cannot be made never touches the target."""
+def _workbook(
+    result: TestResult, digest: str, recordings: Mapping[str, Recording], files: ExitStack
+) -> bytes:
+    """Return the file's bytes; ``files`` holds its rows while they are put together."""
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
+    bodies: dict[str, IO[bytes]] = {}
     use, info = result.reduced.calibration, result.reduced.info
     mark_workbook(book, simulated=info.simulated, machine=info.machine, word=use.word)
     for page in readable_sheets(result):
@@ -78,10 +85,12 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
         *_raw_sheets(recordings),
         ("provenance", _provenance(result, digest)),
     ):
-        _machine_sheet(book, name, rows, use.mark)
-    bytes_io = BytesIO()
-    book.save(bytes_io)
-    return bytes_io.getvalue()
+        body = files.enter_context(tempfile.TemporaryFile())  # noqa: SIM115  closed with the others
+        _machine_sheet(book, name, rows, use.mark, body)
+        bodies[f"sheet{len(book.worksheets)}.xml"] = body
+    shell = BytesIO()
+    book.save(shell)
+    return filled(shell.getvalue(), bodies)
 
 
 def _sheet(book: Any, name: str, mark: str | None) -> Any:
@@ -119,8 +128,8 @@ def _readable(book: Any, page: Sheet, mark: str | None) -> None:
         sheet.append([_cell(sheet, value) for value in row])
 
 
-def _machine_sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
-    """Write a sheet for programs: values as they are, its head frozen and with a filter."""
+def _machine_sheet(book: Any, name: str, rows: Rows, mark: str | None, body: IO[bytes]) -> None:
+    """Begin a sheet for programs, its head frozen and with a filter; what is below goes into ``body``."""
     sheet = _sheet(book, name, mark)
     sheet.freeze_panes = "A2"
     lines = iter(rows)
@@ -128,41 +137,34 @@ def _machine_sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
     for column, texts in enumerate(zip(*first, strict=True)):
         longest = max(len(str(text)) for text in texts if isinstance(text, str) or text is texts[0])
         sheet.column_dimensions[_letter(column)].width = max(11, min(longest + 2, _WIDEST))
-    count = 0
-    for count, row in enumerate(itertools.chain(first, lines), start=1):
-        sheet.append([_cell(sheet, Shown(value=value, bold=True) if count == 1 else value) for value in row])
+    sheet.append([_cell(sheet, Shown(value=text, bold=True)) for text in first[0]])
+    count = 1
+    for count, row in enumerate(itertools.chain(first[1:], lines), start=2):
+        body.write(sheet_row(count, [cell(value) for value in row]))
     sheet.auto_filter.ref = f"A1:{_letter(len(first[0]) - 1)}{count}"
 
 
 def _cell(sheet: Any, value: Any) -> Any:
-    """Return a value as a sheet takes it: plain where openpyxl writes it as it is."""
-    printed = value if isinstance(value, Shown) else None
-    content = cell(value if printed is None else printed.value)
-    # openpyxl writes 16 digits; a double that needs 17 is given as its own shortest decimal, typed as the
-    # number that it is.
-    long = isinstance(content, float) and float(f"{content:.16g}") != content
-    # A text is a text even where it begins like a formula: openpyxl would guess otherwise.
-    formula = isinstance(content, str) and content.startswith("=")
-    if printed is None and not long and not formula:
-        return content
-    return _styled(sheet, repr(content) if long else content, printed, is_number=long)
-
-
-def _styled(sheet: Any, content: Any, shown: Shown | None, *, is_number: bool) -> Any:
+    """Return a value as a sheet for people takes it."""
     from openpyxl.cell import WriteOnlyCell
     from openpyxl.styles import Alignment, Font
 
-    cell = WriteOnlyCell(sheet, value=content)
-    if isinstance(content, str):
-        cell.data_type = "n" if is_number else "s"
-    if shown is not None:
-        cell.number_format = shown.number_format
-        if shown.bold or shown.size or shown.warning:
-            colour = "B3261E" if shown.warning else None
-            cell.font = Font(name="Calibri", bold=shown.bold, size=shown.size or 11, color=colour)
-        if shown.side:
-            cell.alignment = Alignment(horizontal=shown.side)
-    return cell
+    shown = value if isinstance(value, Shown) else Shown(value=value)
+    content = cell(shown.value)
+    # openpyxl writes 16 digits; a double that needs 17 is given as its own shortest decimal, typed as the
+    # number that it is. A text is a text even where it begins like a formula: openpyxl would guess otherwise.
+    long = isinstance(content, float) and float(f"{content:.16g}") != content
+    styled = WriteOnlyCell(sheet, value=repr(content) if long else content)
+    if isinstance(styled.value, str):
+        styled.data_type = "n" if long else "s"
+    if shown.number_format != "General":
+        styled.number_format = shown.number_format
+    if shown.bold or shown.size or shown.warning:
+        colour = "B3261E" if shown.warning else None
+        styled.font = Font(name="Calibri", bold=shown.bold, size=shown.size or 11, color=colour)
+    if shown.side:
+        styled.alignment = Alignment(horizontal=shown.side)
+    return styled
 
 
 def _letter(column: int) -> str:

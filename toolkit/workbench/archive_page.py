@@ -11,6 +11,7 @@ from toolkit.audit.model import GRADES
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk.agenda import unfinished_audits
 from toolkit.lab.desk.audited import ORDERS, Audited, stamp
+from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -41,10 +42,7 @@ def audit_list(request: Request) -> Response:
 
 def audit(request: Request) -> Response:
     """Return an audit's page: a place for its first line, and for its files."""
-    bench: Bench = request.app.state.bench
-    audit_id = request.path_params["audit"]
-    if bench.path_of("audit", audit_id) is None:
-        raise HTTPException(404)
+    bench, audit_id, _ = holding(request, "audit")
     place_of = bench.holdings().places["audit"][audit_id]
     return page(request, "audit", audit_id=audit_id, place_of=place_of, grades=GRADES, orders=ORDERS)
 

@@ -8,11 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from starlette.exceptions import HTTPException
+
 from toolkit.calibration.registry.clock import today
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk.pending import agent_people, pending_request
 
 if TYPE_CHECKING:
+    from starlette.requests import Request
+
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.desk.audited import Audited
     from toolkit.lab.desk.holdings import Holdings, Kind
@@ -128,3 +132,13 @@ def waiting(bench: Bench, name: str) -> dict[str, Any]:
         "agent": [(person, names[person]) for person in able],
         "signers": [names.get(person, person) for person in pending.signers],
     }  # fmt: skip
+
+
+def holding(request: Request, kind: Kind) -> tuple[Bench, str, Path]:
+    """Return the bench, the id in the address and the folder of that holding; 404 where there is none."""
+    bench: Bench = request.app.state.bench
+    name = request.path_params[kind]
+    folder = bench.path_of(kind, name)
+    if folder is None:
+        raise HTTPException(404)
+    return bench, name, folder

@@ -15,6 +15,7 @@ from starlette.responses import RedirectResponse, Response
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk import built_case
 from toolkit.lab.desk.holdings import holding_id
+from toolkit.workbench.bench import holding
 from toolkit.workbench.diagnosis_page import diagnoses_page
 from toolkit.workbench.page import page
 
@@ -99,12 +100,8 @@ def trial(request: Request) -> Response:
 
 
 def _requested(request: Request) -> tuple[Bench, str, Path]:
-    bench: Bench = request.app.state.bench
-    case_id = request.path_params["case"]
-    folder = bench.path_of("case", case_id)
-    if not bench.is_own or folder is None:
-        raise HTTPException(404)
-    if not built_case.is_open(bench.home, bench.holdings().places["case"][case_id]):
+    bench, case_id, folder = holding(request, "case")
+    if not bench.is_own or not built_case.is_open(bench.home, bench.holdings().places["case"][case_id]):
         raise HTTPException(404)
     return bench, case_id, folder
 

@@ -19,6 +19,7 @@ from toolkit.lab.desk.jobs import start_job
 from toolkit.lab.desk.seen_diagnosis import read_diagnosis
 from toolkit.lab.desk.sized_model import MODELS, keep_model, sizable_model, sized_from, trial_answer
 from toolkit.lab.desk.uploads import hand_in_case
+from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -79,11 +80,7 @@ def diagnosis_list(request: Request) -> Response:
 
 def diagnosis(request: Request) -> Response:
     """Return an answer's page."""
-    bench: Bench = request.app.state.bench
-    folder = bench.path_of("diagnosis", request.path_params["diagnosis"])
-    if folder is None:
-        raise HTTPException(404)
-    diagnosis_id = request.path_params["diagnosis"]
+    bench, diagnosis_id, folder = holding(request, "diagnosis")
     return page(
         request, "diagnosis", seen=read_diagnosis(folder), diagnosis_id=diagnosis_id,
         place_of=bench.holdings().places["diagnosis"][diagnosis_id],
@@ -92,10 +89,7 @@ def diagnosis(request: Request) -> Response:
 
 def start(request: Request) -> Response:
     """Start the diagnosis of a case, isolated."""
-    bench: Bench = request.app.state.bench
-    case_id = request.path_params["case"]
-    if bench.path_of("case", case_id) is None:
-        raise HTTPException(404)
+    bench, case_id, _ = holding(request, "case")
     place_of = bench.holdings().places["case"][case_id]
     words = (
         "diagnose",
@@ -140,11 +134,8 @@ def keep(request: Request) -> Response:
 
 
 def _requested(request: Request) -> tuple[Bench, Path, SizableModel]:
-    bench: Bench = request.app.state.bench
-    folder = bench.path_of("diagnosis", request.path_params["diagnosis"])
-    if folder is None or not (folder / ANSWER).is_file():
-        raise HTTPException(404)
-    sizable = sizable_model(folder, bench.holdings())
+    bench, _, folder = holding(request, "diagnosis")
+    sizable = sizable_model(folder, bench.holdings()) if (folder / ANSWER).is_file() else None
     if sizable is None:
         raise HTTPException(404)
     return bench, folder, sizable

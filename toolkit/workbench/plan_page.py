@@ -12,11 +12,11 @@ from toolkit.lab.desk.chart import Chart, Series
 from toolkit.lab.desk.jobs import start_job
 from toolkit.lab.desk.kept_plans import KINDS, fixtures_of, plan_words, read_plan, titles_of
 from toolkit.lab.desk.previews import templates_of
+from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from starlette.requests import Request
 
@@ -50,7 +50,7 @@ def plan_list(request: Request) -> Response:
 
 def plan(request: Request) -> Response:
     """Return a plan's page."""
-    _, plan_id, folder = _requested(request)
+    _, plan_id, folder = holding(request, "plan")
     planned = read_plan(folder)
     return page(
         request, "plan", kept=planned, answer=planned.answer, plan_id=plan_id,
@@ -62,7 +62,7 @@ def plan(request: Request) -> Response:
 
 def file(request: Request) -> Response:
     """Return a file of a plan, one of those that a plan writes."""
-    _, _, folder = _requested(request)
+    _, _, folder = holding(request, "plan")
     planned, name = read_plan(folder), request.path_params["name"]
     if name not in (*planned.files, *planned.pictures):
         raise HTTPException(404)
@@ -111,15 +111,6 @@ def _risk_chart(answer: Mapping[str, Any]) -> Chart:
     level = [100 * (1 - answer["reliability"])] * len(days)
     allowed: Series = {"label": "allowed", "x": days, "y": level, "line": True, "dash": True}
     return {"x_label": "interval [days]", "y_label": "beyond [%]", "series": [risk, allowed]}
-
-
-def _requested(request: Request) -> tuple[Bench, str, Path]:
-    bench: Bench = request.app.state.bench
-    plan_id = request.path_params["plan"]
-    folder = bench.path_of("plan", plan_id)
-    if folder is None:
-        raise HTTPException(404)
-    return bench, plan_id, folder
 
 
 ROUTES: Routes = (

@@ -23,6 +23,7 @@ from toolkit.lab.desk.previews import (
 )
 from toolkit.lab.desk.uploads import hand_in_template
 from toolkit.lab.home import TEMPLATES
+from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -155,10 +156,7 @@ def _template(request: Request) -> tuple[Bench, Path]:
 
 
 def _requested(request: Request) -> tuple[Bench, str, str]:
-    bench: Bench = request.app.state.bench
-    test_id = request.path_params["test"]
-    if bench.path_of("test", test_id) is None:
-        raise HTTPException(404)
+    bench, test_id, _ = holding(request, "test")
     return bench, test_id, bench.holdings().places["test"][test_id]
 
 

@@ -14,6 +14,7 @@ from starlette.responses import Response
 from toolkit.lab.desk.chart import common_ranges
 from toolkit.lab.desk.holdings import rows_of_tests
 from toolkit.lab.desk.seen_test import recordings_answer, results_answer, shown_conditions
+from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def query_of(request: Request) -> str:
 
 def test(request: Request) -> Response:
     """Return a test's page: what its folder says, and a place for each part."""
-    bench, test_id, _ = _requested(request)
+    bench, test_id, _ = holding(request, "test")
     (row,) = rows_of_tests(bench.holdings(), (test_id,), bench.reported())
     records = _records(bench, row["machine"])
     return page(request, "test", row=row, records=records, record=_record(request, records))
@@ -78,7 +79,7 @@ def part(request: Request) -> Response:
     """Return one part of a test's page."""
     name = request.path_params["part"]
     if name == "recordings":
-        bench, test_id, folder = _requested(request)
+        bench, test_id, folder = holding(request, "test")
         content = bench.remembered(
             f"recordings of {test_id}",
             None,
@@ -150,7 +151,7 @@ def _side(request: Request, side: str) -> tuple[Bench, dict[str, Any], Path, str
 
 def download(request: Request) -> Response:
     """Return what is seen as a table, or the whole reduced test as `process --out` writes it."""
-    bench, test_id, folder = _requested(request)
+    bench, test_id, folder = holding(request, "test")
     table_name = request.path_params["what"]
     if table_name == "test.xlsx":
         return _reduced(_resolve(bench, folder, _named(request, bench)))
@@ -181,7 +182,7 @@ def download(request: Request) -> Response:
 
 
 def _results_of(request: Request) -> dict[str, Any]:
-    bench, test_id, folder = _requested(request)
+    bench, test_id, folder = holding(request, "test")
     return _remembered_results(bench, test_id, folder, _named(request, bench))
 
 
@@ -263,16 +264,6 @@ def _named(request: Request, bench: Bench) -> str | None:
     if match is None or record_id not in _records(bench, match["instrument"]):
         raise HTTPException(404)
     return record_id
-
-
-def _requested(request: Request) -> tuple[Bench, str, Path]:
-    """Return the bench, the id of an address and its folder: nothing else has one."""
-    bench: Bench = request.app.state.bench
-    test_id = request.path_params["test"]
-    folder = bench.path_of("test", test_id)
-    if folder is None:
-        raise HTTPException(404)
-    return bench, test_id, folder
 
 
 ROUTES: Routes = (

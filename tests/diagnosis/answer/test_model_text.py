@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+import math
 import shutil
 
 import numpy as np
@@ -216,8 +217,9 @@ def test_a_model_file_says_what_it_rests_on(tmp_path, drag):
     applied, told = effect.applied, drag.effects[0].parameters[0]
     assert (applied.values, applied.units) == ({"drag": told.value}, {"drag": told.unit})  # noqa: PD011
     assert applied.key == drag.effects[0].key
-    # a 95 % interval of some 160 rows reaches 1.97 to 1.98 standard errors
-    assert (told.ci95[1] - told.value) / effect.standard_errors["drag"] == pytest.approx(1.975, abs=0.01)
+    # a 95 % interval of some 160 rows reaches 1.97 to 1.98 standard uncertainties, the form's share in them
+    uncertainty = math.hypot(effect.standard_errors["drag"], applied.form_uncertainty(applied.searched[0]))
+    assert (told.ci95[1] - told.value) / uncertainty == pytest.approx(1.975, abs=0.01)
     assert model.file("path").resolve() == (tmp_path / "sim.py").resolve()
 
 

@@ -100,6 +100,14 @@ def test_a_hysteresis_that_reaches_over_the_whole_range_is_the_lens_of_Rayleigh(
     np.testing.assert_allclose((y - made)[up], parabola[up], atol=0.004)
 
 
+def test_a_recording_that_begins_on_the_first_loading_has_the_same_hysteresis():
+    y = 2.0 * np.sin(0.8 * T)
+    whole = act("hysteresis", y, width=0.1, reach=1.0, gain=0.0, _span=2.0, _middle=0.0)
+    late = slice(200, None)  # at 1 s, before the first reversal
+    cut = act("hysteresis", y[late], t=T[late], width=0.1, reach=1.0, gain=0.0, _span=2.0, _middle=0.0)
+    np.testing.assert_allclose(cut, whole[late], atol=1e-12)
+
+
 def test_flat_stepped_and_dead():
     assert np.abs(act("saturation", level=1.2)).max() == 1.2
     inside = np.abs(WAVE) < 1.2

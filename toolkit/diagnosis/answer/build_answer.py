@@ -263,7 +263,7 @@ def _parameters(
         value = active.values.get(parameter.name, 0.0)
         ci: tuple[float, float] | None = None
         if active.searched:
-            variance = search.variance(at + i)
+            variance = search.variance(at + i) + active.form_uncertainty(parameter) ** 2
             reach = quantile * math.sqrt(max(variance, 0.0))
             if math.isfinite(reach) and reach < VERDICT.open_interval * max(abs(value), 1e-300):
                 ci = (max(value - reach, parameter.bounds[0]), min(value + reach, parameter.bounds[1]))

@@ -162,7 +162,7 @@ def fit(
     else:
         chosen = _plain(space, layouts, solved, derivatives) or solved if plain else solved
     p, values = space.split(chosen.x)
-    return Fit(
+    fitted = Fit(
         p=tuple(p),
         active=values,
         residual=chosen.residual,
@@ -175,6 +175,11 @@ def fit(
         rows=rows,
         plain=plain,
     )
+    if len(values) == len(active):
+        return fitted
+    moved = iter(values)
+    whole = tuple(applied if applied.effect.from_digits else next(moved) for applied in active)
+    return _resimulated(problem, fitted, whole)
 
 
 def _coloured(
@@ -249,14 +254,18 @@ def _solve(
 
 def replace_effects(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
     """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
-    simulated = problem.simulate(fit.p, active)
     before, after = _columns(problem, fit.active), _columns(problem, active)
     covariance = np.zeros((len(after), len(after)))
     there = [i for i, applied in enumerate(after) if applied in before]
     places = [before.index(after[i]) for i in there]
     covariance[np.ix_(there, there)] = fit.covariance[np.ix_(places, places)]
+    return replace(_resimulated(problem, fit, active), covariance=covariance)
+
+
+def _resimulated(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
+    simulated = problem.simulate(fit.p, active)
     residual = {name: problem.observed[name] - column for name, column in simulated.items()}
-    return replace(fit, active=active, simulated=simulated, residual=residual, covariance=covariance)
+    return replace(fit, active=active, simulated=simulated, residual=residual)
 
 
 def _columns(problem: Problem, active: Sequence[AppliedEffect]) -> list[tuple[object, ...]]:

@@ -38,7 +38,11 @@ class Space:
 
     @staticmethod
     def of(problem: Problem, active: tuple[AppliedEffect, ...]) -> Space:
-        """Return the space of a problem's free parameters and of the values that effects search."""
+        """Return the space of a problem's free parameters and of the values that effects search.
+
+        Steps that were read off the digits are left out: a staircase has no slope.
+        """
+        active = tuple(applied for applied in active if not applied.effect.from_digits)
         sizes, low, high = [], [], []
         for one in problem.free:
             size = one.sd or abs(one.value) or 1.0

@@ -105,6 +105,17 @@ class CaseView:
             values = np.concatenate(columns) if columns else np.zeros(0)
         return values[np.isfinite(values)]
 
+    def widest(self, name: str | None) -> tuple[float, float] | None:
+        """Return the ends of a channel in the run where its range is widest, None where it has none."""
+        if name is not None and name in self._problem.observed:
+            observed, kept = self._problem.observed[name], self._problem.kept[name]
+            columns = [observed[rows][kept[rows]] for rows in self._problem.slices]
+        else:
+            columns = [run.columns[str(name)] for run in self._problem.runs if name in run.columns]
+        finite = [column[np.isfinite(column)] for column in columns]
+        ranges = [(float(column.min()), float(column.max())) for column in finite if len(column)]
+        return max(ranges, key=lambda ends: ends[1] - ends[0], default=None)
+
     def recorded_range(self, *names: str) -> float:
         """Return the range of the first of these channels that was recorded, 1 where none was."""
         for name in names:

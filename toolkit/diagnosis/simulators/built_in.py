@@ -161,8 +161,7 @@ def _built(
         low, high = (sense * bound for bound in parameter.bounds)
         text = applied.units[parameter.name]
         scale = _scale(case, model, active, parameter.name, text)
-        fitted = active.searched and not effect.from_digits
-        sd = one.standard_errors.get(parameter.name) if fitted else None
+        sd = one.standard_errors.get(parameter.name) if active.searched else None
         free.append(
             CaseParameter(
                 name=name,

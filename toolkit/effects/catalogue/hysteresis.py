@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from toolkit.effects.signals import Setting
 
-_OPERATORS = 10
+_OPERATORS = 20  # of half as many the corners are so far apart that a fit of reach ends between them
 
 
 def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
@@ -24,6 +24,7 @@ def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArra
 
     Play operators with half gaps spread evenly over (0, reach x span]; after a reversal a small reach turns
     at once (dry friction in a joint), a large one along the lens of a strained solid (Rayleigh's loop).
+    Before the recording the channel was loaded from zero for the first time.
     """
     span = values.get("_span") or 0.5 * float(np.ptp(y)) if len(y) else 0.0
     if not span:
@@ -47,11 +48,11 @@ def _line(halves: NDArray[np.float64], span: float) -> float:
 
 
 def _span(case: Surroundings) -> dict[str, float]:
-    """Return half the range of the channel and its middle, over all runs: its loops have one shape."""
-    values = case.values(case.channel)
-    if not len(values):
+    """Return half the widest range of a run and its middle: no cycle goes from one run to another."""
+    ends = case.widest(case.channel)
+    if ends is None:
         return {}
-    low, high = float(values.min()), float(values.max())
+    low, high = ends
     return {"_span": 0.5 * (high - low), "_middle": 0.5 * (high + low)}
 
 
@@ -66,7 +67,8 @@ EFFECT = Effect(
     rank=5,
     in_time=False,
     statement="The channel reads differently on the way up and on the way down.",
-    equation="y = (1 + gain) y_model + width * z, z: play operators with gaps up to reach, less their line",
+    equation="y = (1 + gain) y_model + width * z, z: play operators with gaps up to reach, first loaded from"
+    " zero, less their line",
     reference="Brokate and Sprekels, Hysteresis and Phase Transitions, 1996, ch. 2 (Prandtl and Ishlinskii)",
     signature="a loop over the channel's own value that does not depend on the rate",
     separates="load up and down at two rates",
@@ -74,7 +76,7 @@ EFFECT = Effect(
         EffectParameter(
             name="width",
             unit="{channel}",
-            text="full height of the loop",
+            text="full height of the loop over the range of the widest run",
             typical=(0.002, 0.1),
             scale=of_channel,
             bounds=(0.0, float("inf")),
@@ -89,7 +91,7 @@ EFFECT = Effect(
         EffectParameter(
             name="reach",
             unit="1",
-            text="of half the recorded range, within which a reversal is completed",
+            text="of half the range of the widest run, within which a reversal is completed",
             typical=(0.05, 1.0),
             off=None,
             bounds=(0.01, 1.5),

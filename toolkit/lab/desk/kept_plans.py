@@ -48,7 +48,7 @@ _SWITCHES: Mapping[PlanKind, Mapping[str, str]] = {
 }  # fmt: skip
 _REPEATED: Mapping[PlanKind, Mapping[str, str]] = {
     "session": {"u": "--u"},
-    "test": {"u": "--u", "load": "--load"},
+    "test": {"u": "--u", "load": "--load", "spread": "--spread"},
     "next": {"limit": "--limit"},
     "interval": {},
 }
@@ -123,7 +123,7 @@ def plan_words(
     """Return the command of a plan, in a folder of its own below ``plans/``.
 
     ``subject`` is the instrument of a session or an interval, the place in the home of the test that a test
-    is planned like (None: the published tire), or of the answer whose class a run is to part; ``fixtures``
+    is planned like (None: passenger tires), or of the answer whose class a run is to part; ``fixtures``
     the place of a session's loading fixtures. Fields that are left empty are left to the command.
 
     Raises

@@ -67,6 +67,8 @@ def interval_plan_answer(
     if tests_a_year is not None and not (math.isfinite(tests_a_year) and tests_a_year >= 0):
         raise _wrong("--tests", tests_a_year, "tests a year, 0 or more")
     due = due_of(registry, instrument, registry.today())
+    if load is not None:
+        registry.load(due.record).load(load)  # refuses a load that the record does not have
     chart = control_chart(registry, instrument, load=load)
     records = {point.record for series in chart.series for point in series.points}
     dates = {record: dt.date.fromisoformat(registry.load(record).date) for record in sorted(records)}

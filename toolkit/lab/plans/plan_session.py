@@ -234,18 +234,21 @@ def plan_text(plan: SessionPlan, record: CalibrationRecord) -> str:
         f"from {plan.source}; {plan.record} took {plan.rows_today} loads and {plan.check_today} check loads",
         "",
         table(
-            ["load", "at", "U today", "repeated", "U asked", "U expected", "in 9 of 10", "reached in", ""],
+            ["load", "at", "U today", "repeated", "U asked", "U expected", "U planned", "in 9 of 10",
+             "reached in", ""],
             [
                 [load.load, f"{load.at:.5g}", round_uncertainty(load.U_today),
                  round_uncertainty(load.U_repeated),
-                 "-" if load.U_asked is None else f"{load.U_asked:.3g}", round_uncertainty(load.U),
+                 "-" if load.U_asked is None else f"{load.U_asked:.3g}",
+                 round_uncertainty(load.U_expected), round_uncertainty(load.U),
                  round_uncertainty(load.U_in_nine_of_ten),
                  "-" if load.share is None else f"{100 * load.share:.0f} %", load.unit]
                 for load in plan.outlook
             ],
-            align="<>>>>>>><",
+            align="<>>>>>>>><",
         ),
-        "'repeated': what the last session's loads are expected to give another time",
+        "'expected': runs differ as the record says; 'planned': by a standard error more, as for 'repeated', "
+        "what the last session's loads are to give another time",
         f"U at the largest load, k for 95 %; 'in 9 of 10', 'reached in': of {plan.simulated} simulations",
         "",
         table(

@@ -112,7 +112,7 @@ def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date)
                 quantity=load.load, at=f"{load.at:.5g}", unit=_dotted(load.unit),
                 reference=round_uncertainty(load.U_today),
                 asked="-" if load.U_asked is None else f"{load.U_asked:.3g}",
-                expected=round_uncertainty(load.U),
+                expected=round_uncertainty(load.U_expected),
                 span=f"< {round_uncertainty(load.U_in_nine_of_ten)} in 9 of 10",
             )
             for load in plan.outlook
@@ -169,7 +169,7 @@ def _expected(value: PlannedValue, units: PrintedUnits) -> Expected:
         reference="-" if value.protocol_U is None else U(value.protocol_U),
         asked=U(value.demanded_U),
         expected=U(value.planned_U),
-        span=f"{U(value.planned_U_low)} – {U(value.planned_U_high)}",
+        span=f"< {U(value.planned_U_in_nine_of_ten)} in 9 of 10",
     )
 
 

@@ -45,12 +45,14 @@ _NEAR = 0.15  # a load that is asked for is the nominal one within this part of 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProtocolOrder:
-    """What `plan_test` is asked for: texts of demands and loads, an earlier test or tire, the time.
+    """What `plan_test` is asked for: texts of demands, loads and spreads, earlier tests or tires, the time.
 
-    ``like`` None is the published tire of the virtual machine; ``between_files_s`` None its pause.
+    Without ``like`` it is the published tire of the virtual machine, and with it the class of passenger tires
+    where no ``spread`` is stated; ``between_files_s`` None is the virtual machine's pause.
     """
 
-    like: Path | None = None
+    like: tuple[Path, ...] = ()
+    spread: tuple[str, ...] = ()
     demands: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     minutes: float = math.inf
@@ -87,21 +89,25 @@ def plan_test(
     from toolkit.planning.demands import parse_demand
     from toolkit.planning.printed_units import units_of
     from toolkit.planning.protocol_plan import plan_protocol
+    from toolkit.planning.protocol_search import shared_loads
+    from toolkit.planning.tire_class import parse_spread
     from toolkit.planning.tread import Tread
 
+    spread = parse_spread(order.spread)
     demands = tuple(dict.fromkeys(parse_demand(text) for text in order.demands or DEMANDS))
-    _refuse_doubled([demand.label for demand in demands])
+    labels = [demand.label for demand in demands]
+    _refuse_doubled(labels, where="--u", what="a characteristic has two demands")
     _refuse_endless(order)
     tell("the earlier test")
-    earlier, like, tire = _earlier(order)
-    own = load_machine(earlier.machine.name)
+    tires, like, tire = _tires(order, spread)
+    own = load_machine(tires[0].machine.name)
     tread = dataclasses.replace(
-        Tread.of(own, earlier, between_files_s=order.between_files_s),
+        Tread.of(own, tires, between_files_s=order.between_files_s),
         energy_J=1e3 * order.sliding_kJ, rise_K=order.rise_K,
     )  # fmt: skip
     plan = plan_protocol(
-        earlier, demands, _loads(order.loads, earlier), machine=own, like=like, minutes=order.minutes,
-        tread=tread, tell=tell,
+        tires, demands, _loads(order.loads, shared_loads(tires)), machine=own, like=like,
+        minutes=order.minutes, tread=tread, tell=tell,
     )  # fmt: skip
     if not plan.feasible:
         raise _beyond(plan, order) or _infeasible(plan, order.minutes)
@@ -114,12 +120,12 @@ def plan_test(
     return payload, plan_text(plan, payload["files"], units) + sheet_text(payload)
 
 
-def _refuse_doubled(labels: Sequence[str]) -> None:
+def _refuse_doubled(labels: Sequence[str], where: str, what: str) -> None:
     doubled = sorted({label for label in labels if labels.count(label) > 1})
     if doubled:
         raise ConfigError(
-            "a characteristic has two demands", where="--u", got=", ".join(doubled),
-            expected="one demand of each", next_step="state the smaller one", rule="plan-demand",
+            what, where=where, got=", ".join(doubled), expected="each once",
+            next_step="leave all but one out", rule="plan-demand" if where == "--u" else "plan-like",
         )  # fmt: skip
 
 
@@ -139,19 +145,43 @@ def _refuse_endless(order: ProtocolOrder) -> None:
         )  # fmt: skip
 
 
-def _earlier(order: ProtocolOrder) -> tuple[EarlierTest, str, Path | None]:
-    """Return the earlier test, what it is called, and the tire file that it was simulated from."""
+def _tires(
+    order: ProtocolOrder, spread: Mapping[str, tuple[float, float]]
+) -> tuple[tuple[EarlierTest, ...], str, Path | None]:
+    """Return the earlier test of each tire of the class, what they are called, and the first's tire file."""
+    from toolkit.planning.protocol_search import shared_loads
+    from toolkit.planning.tire_class import PASSENGER, members
+
+    known = [_earlier(order, like) for like in order.like or (None,)]
+    if not order.like and not order.spread:
+        spread = PASSENGER
+    _refuse_doubled([earlier.tire for earlier, _, _ in known], where="--like", what="a tire is named twice")
+    tires = tuple(member for earlier, _, _ in known for member in members(earlier, spread))
+    machines = list(dict.fromkeys(earlier.machine.name for earlier in tires))
+    if len(machines) > 1 or not shared_loads(tires):
+        raise ConfigError(
+            "the earlier tests have nothing in common", where="--like",
+            got=", ".join(machines) if len(machines) > 1 else "no load that all of them measured",
+            expected="tests on one machine, at common loads", next_step="plan from one of them",
+            rule="plan-like",
+        )  # fmt: skip
+    return tires, "; ".join(name for _, name, _ in known), known[0][2]
+
+
+def _earlier(order: ProtocolOrder, like: Path | None) -> tuple[EarlierTest, str, Path | None]:
+    """Return an earlier test, what it is called, and the tire file that it was simulated from."""
     from toolkit.lab.tire_tests.resolve import resolve_test
 
-    like = order.like
     if like is None or like.suffix.lower() in (".tir", ".toml"):
         what = "the published passenger tire (SAE 870421)" if like is None else f"the tire {like.name}"
-        return _virtual(order), f"{_SIMULATED} simulated tests of {what} on the virtual machine", like
+        earlier = dataclasses.replace(_virtual(order, like), tire=what if like is None else str(like))
+        return earlier, f"{_SIMULATED} simulated tests of {what} on the virtual machine", like
     resolved = resolve_test(
         like, calibration=order.calibration, calibrations=order.calibrations, home=order.home,
         draft=order.draft,
     )  # fmt: skip
-    return _of(resolved, str(like)), f"the test {resolved.result.reduced.info.name}", None
+    name = f"the test {resolved.result.reduced.info.name}"
+    return dataclasses.replace(_of(resolved, str(like)), tire=str(like)), name, None
 
 
 def _of(resolved: Resolved, where: str) -> EarlierTest:
@@ -170,7 +200,7 @@ def _of(resolved: Resolved, where: str) -> EarlierTest:
     return earlier_test(resolved.result, machine=machine, record=resolved.record)
 
 
-def _virtual(order: ProtocolOrder) -> EarlierTest:
+def _virtual(order: ProtocolOrder, like: Path | None) -> EarlierTest:
     """Return the virtual machine's protocol on a tire, processed: what is expected of such a tire."""
     from toolkit.lab.home import packaged_home, registry_if_any
     from toolkit.lab.studies.simulate import simulate_plan
@@ -183,8 +213,8 @@ def _virtual(order: ProtocolOrder) -> EarlierTest:
     known = registry is not None and (registry.folder / SIMULATED_MACHINE).is_dir()
     calibrations = registry.folder if registry is not None and known else packaged_home() / "calibrations"
     plan = read_plan(Path(__file__).parents[2] / "examples" / "virtual" / "test_plan.toml")
-    if order.like is not None:
-        plan = _with_tire(plan, order.like)
+    if like is not None:
+        plan = _within_its_loads(_with_tire(plan, like), like)
     tests = []
     with tempfile.TemporaryDirectory() as folder:
         for number in range(_SIMULATED):
@@ -193,7 +223,7 @@ def _virtual(order: ProtocolOrder) -> EarlierTest:
             resolved = resolve_test(
                 test, calibration=order.calibration, calibrations=calibrations, draft=order.draft
             )
-            tests.append(_of(resolved, str(order.like)))
+            tests.append(_of(resolved, str(like)))
     return pooled(tests)
 
 
@@ -212,18 +242,38 @@ def _with_tire(plan: Plan, tire: Path) -> Plan:
     return dataclasses.replace(own, seed=plan.seed, label=plan.label)
 
 
-def _loads(texts: Sequence[str], earlier: EarlierTest) -> tuple[float, ...]:
-    """Return the nominal loads that are asked for; all of the earlier test by default."""
+def _within_its_loads(plan: Plan, like: Path) -> Plan:
+    """Return a plan at those of its loads that the tire's file was made for."""
+    from toolkit.tires.tir import si_number
+    from toolkit.units import in_both
+
+    if plan.tire_file is None:
+        return plan
+    tir = plan.tire_file.tir
+    low, high = si_number(tir, "FZMIN", 0.0), si_number(tir, "FZMAX", math.inf)
+    loads = tuple(load for load in plan.loads_N if low <= load <= high)
+    if not loads:
+        raise ConfigError(
+            "the tire file says nothing of the machine's loads", where=f"--like {like}",
+            got=f"FZMIN {low:g} N, FZMAX {high:g} N",
+            expected=f"{plan.machine.name} loads a tire with {in_both(list(plan.loads_N), 'lbf', '.0f')}",
+            next_step="name a tire of the machine's range, or an earlier test of this one", rule="plan-like",
+        )  # fmt: skip
+    return dataclasses.replace(plan, loads_N=loads)
+
+
+def _loads(texts: Sequence[str], known_N: Sequence[float]) -> tuple[float, ...]:
+    """Return the nominal loads that are asked for, of those that are known [N]; all by default."""
     from toolkit.units import in_both
 
     if not texts:
-        return earlier.loads_N
+        return tuple(known_N)
     loads = []
     for text in texts:
         asked = _quantity(text)
-        nearest = min(earlier.loads_N, key=lambda load: abs(load - asked))
+        nearest = min(known_N, key=lambda load: abs(load - asked))
         if abs(nearest - asked) > _NEAR * nearest:
-            raise _wrong_load(text, in_both(list(earlier.loads_N), "lbf", ".0f"))
+            raise _wrong_load(text, in_both(list(known_N), "lbf", ".0f"))
         loads.append(nearest)
     return tuple(sorted(set(loads)))
 
@@ -289,6 +339,13 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
         for name, values in by_name.items()
     ]
     limit = "" if math.isinf(minutes) else f" in {minutes:g} min"
+    if not missed:
+        return ConfigError(
+            f"no test{limit} knows its curves between the slip angles", where="--minutes",
+            got=f"{len(plan.plan.slip_angles_deg)} slip angles at {len(plan.plan.loads_N)} loads",
+            expected="slip angles that leave no part of a curve open",
+            next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
+        )  # fmt: skip
     angles = ", ".join(f"{angle:g}" for angle in sorted(plan.plan.slip_angles_deg))
     return ConfigError(
         f"no test{limit} reaches what is demanded", where="--u",
@@ -329,7 +386,7 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
     from toolkit.lab.answers import table
     from toolkit.planning.printed_units import title_of
 
-    own, design = plan.protocol, plan.plan
+    own, design, several = plan.protocol, plan.plan, len(plan.tires) > 1
 
     def row(value: PlannedValue) -> list[str]:
         def U(size: float | None) -> str:
@@ -337,19 +394,21 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
 
         size, unit = units.shown(value.value, value.unit)
         return [
-            title_of(value.name), f"{units.shown(value.load_N, 'N')[0]:.0f}",
+            title_of(value.name), *([str(value.tire)] if several else []),
+            f"{units.shown(value.load_N, 'N')[0]:.0f}",
             f"{plus_minus(size, units.shown(value.planned_U, value.unit)[0])} {unit}", U(value.demanded_U),
-            f"{U(value.planned_U_low)} to {U(value.planned_U_high)}", U(value.protocol_U),
+            U(value.planned_U_in_nine_of_ten), U(value.protocol_U),
             U(value.same_time_U),
         ]  # fmt: skip
 
     rows = [row(value) for value in plan.values]
     head = [
         "",
+        *(["tire"] if several else []),
         f"FZ [{units.force}]",
         "expected, ± U",
         "U demanded",
-        "U, how sure",
+        "in 9 of 10",
         "U by protocol",
         "U in its time",
     ]
@@ -365,8 +424,9 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
         *pauses,
         f"  like         {plan.like}"
         + (f", record {plan.calibration}" if plan.calibration is not None else ""),
+        *(f"  tire {place}       {name}" for place, name in enumerate(plan.tires, start=1) if several),
         "",
-        table(head, rows, align="<>>>>>>"),
+        table(head, rows, align="<" + ">" * (len(head) - 1)),
         "",
         f"protocol of {plan.machine}: {own.rows} rows in {own.minutes:.1f} min",
         f"tread: {design.sliding_kJ:.0f} kJ slide away, by the protocol {own.sliding_kJ:.0f} kJ; a recording "

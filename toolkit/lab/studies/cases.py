@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolkit.lab.faces import Face, Facts, as_path
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer import answer
     from toolkit.findings import Finding
     from toolkit.lab.studies.diagnosis import Diagnosed
+    from toolkit.lab.studies.simulate import PlanForms
     from toolkit.report.content import Plot
     from toolkit.simulation.plan import Plan
 
@@ -97,7 +98,7 @@ class Simulation(Face):
 
     plan: Plan
     folder: Path
-    answer: Mapping[str, Any]
+    answer: PlanForms
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one file a row: its name and its size in bytes."""
@@ -187,7 +188,7 @@ def simulate(
     from toolkit.simulation.plan import read_plan, with_effects
 
     planned = with_effects(read_plan(Path(plan), seed=seed), list(effects))
-    payload, _ = simulate_plan(
+    payload, _, _ = simulate_plan(
         planned, Path(out), case=as_path(case), calibrations=as_path(calibrations), home=as_path(home)
     )
     return Simulation(plan=planned, folder=Path(out), answer=payload)

@@ -2,44 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
+from toolkit.effects.applied import SimulatedEffect
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.errors import ToolkitError
+    from toolkit.findings import Finding
     from toolkit.simulation.acquisition import OwnProgram
     from toolkit.simulation.plan import Plan
     from toolkit.worker.posix import Limits
-
-
-class EffectParameterValue(TypedDict):
-    """A parameter of an effect that was simulated."""
-
-    name: str
-    value: float
-    unit: str
-
-
-SimulatedEffect = TypedDict(
-    "SimulatedEffect",
-    {
-        "name": str,
-        "stage": str,
-        "channel": str | None,
-        "parameters": list[EffectParameterValue],
-        "record": NotRequired[Annotated[str, "of another calibration"]],
-        "with": NotRequired[Annotated[str, "the other channel of an exchange"]],
-        "from": NotRequired[Annotated[str, "where a leak comes from"]],
-        "only": NotRequired[Annotated[Mapping[str, list[str]], "condition under which it acts"]],
-    },
-)
-SimulatedEffect.__doc__ = "An effect that was simulated."
 
 
 class SimulatedFiles(TypedDict):
@@ -68,15 +46,20 @@ class AcquisitionProgram(TypedDict):
     negated: Annotated[list[str], "indications that it takes with the wrong sign"]
 
 
-class SimulatedTest(PlannedSimulation):
+class CopiedTest(TypedDict):
+    """Where a simulated test stands in other forms."""
+
+    csv: NotRequired[list[str]]
+    case: NotRequired[Annotated[str, "case that `diagnose` reads"]]
+
+
+class SimulatedTest(PlannedSimulation, CopiedTest):
     """A simulated test."""
 
     record: Annotated[str, "means or continuous"]
     recordings: list[str]
     truth: Annotated[str, "file of what was simulated"]
     acquisition_program: AcquisitionProgram
-    csv: NotRequired[list[str]]
-    case: NotRequired[Annotated[str, "case that `diagnose` reads"]]
 
 
 class SimulatedSession(PlannedSimulation):
@@ -103,7 +86,8 @@ class SimulatedModel(SimulatedFiles):
     effects: Annotated[list[str], "effects in the model"]
 
 
-SimulateForms = SimulatedTest | SimulatedSession | SimulatedTable | SimulatedModel
+PlanForms = SimulatedTest | SimulatedSession | SimulatedTable
+SimulateForms = PlanForms | SimulatedModel
 
 
 def simulate_plan(
@@ -114,8 +98,8 @@ def simulate_plan(
     home: Path | None = None,
     csv: Path | None = None,
     case: Path | None = None,
-) -> tuple[dict[str, Any], str]:
-    """Write what a plan makes; return the JSON answer without its findings, and the text for people.
+) -> tuple[PlanForms, str, Sequence[Finding]]:
+    """Write what a plan makes; return the JSON answer, the text for people and the findings on its tire.
 
     Parameters
     ----------
@@ -131,11 +115,20 @@ def simulate_plan(
 
     if plan.kind != "test" and (csv is not None or case is not None):
         raise _no_runs(plan)
+    payload: PlanForms
     if plan.kind == "session":
-        return _session(plan, out)
-    if plan.kind == "table":
-        return _table(plan, out)
-    return _test(plan, out, registry_if_any(calibrations, home), csv, case)
+        payload, text = _session(plan, out)
+    elif plan.kind == "table":
+        payload, text = _table(plan, out)
+    else:
+        payload, text = _test(plan, out, registry_if_any(calibrations, home), csv, case)
+    effects = (f"  effect       {effect.as_text()}" for effect in plan.effects)
+    findings = _findings(plan)
+    return payload, "\n".join([text, *effects, *finding_lines(findings)]), findings
+
+
+def _findings(plan: Plan) -> Sequence[Finding]:
+    return () if plan.tire_file is None else plan.tire_file.tir.findings()
 
 
 def _no_runs(plan: Plan) -> ToolkitError:
@@ -149,7 +142,7 @@ def _no_runs(plan: Plan) -> ToolkitError:
 
 def _test(
     plan: Plan, out: Path, registry: Registry | None, csv: Path | None, case: Path | None
-) -> tuple[dict[str, Any], str]:
+) -> tuple[SimulatedTest, str]:
     from toolkit.publication import publication
     from toolkit.simulation.case import CASE, RUNS, TIRE, check_case, run_names, write_case, write_runs
     from toolkit.simulation.program import other_programs
@@ -177,12 +170,18 @@ def _test(
         runs = () if csv is None else write_runs(test, stages[csv])
         if case is not None:
             write_case(test, stages[case], record=record)
-    payload = _common(plan, out, files) | {
-        "kind": "test",
+    copies: CopiedTest = {}
+    if csv is not None:
+        copies["csv"] = [str(csv / path.name) for path in runs]
+    if case is not None:
+        copies["case"] = str(case / CASE)
+    payload: SimulatedTest = {
+        **_planned(plan, out, files),
         "record": plan.record,
         "recordings": [file.name for file in test.files],
         "truth": TRUTH,
-        "acquisition_program": {"record": record, "negated": plan.acquisition.negated},
+        "acquisition_program": {"record": record, "negated": [*plan.acquisition.negated]},
+        **copies,
     }
     wrong = f", with {', '.join(plan.acquisition.negated)} negative" if plan.acquisition.negated else ""
     text = (
@@ -191,12 +190,10 @@ def _test(
         f"  own Fy, Mz   by {record or 'the true map of the cells (no record applies)'}{wrong}"
     )
     if csv is not None:
-        payload["csv"] = [str(csv / path.name) for path in runs]
         text += f"\n  as CSV       {csv}"
     if case is not None:
-        payload["case"] = str(case / CASE)
         text += f"\n  case         {case / CASE}   (toolkit diagnose {case / CASE} --out DIR)"
-    return payload, text + _effects(plan)
+    return payload, text
 
 
 def _check_apart(folder: Path, out: Path) -> None:
@@ -211,25 +208,24 @@ def _check_apart(folder: Path, out: Path) -> None:
         )  # fmt: skip
 
 
-def _table(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:
+def _table(plan: Plan, out: Path) -> tuple[SimulatedTable, str]:
     from toolkit.simulation.steady import TABLE, write_table
     from toolkit.simulation.write import check_folder
 
     check_folder(out, {TABLE})
     path = write_table(plan, out)
-    payload = _common(plan, out, (path,)) | {"kind": "table", "table": path.name, "axes": "SAE"}
-    text = f"flat-surface table of the plan's tire in {path}, SAE axes  SIMULATED"
-    return payload, text + _effects(plan)
+    payload: SimulatedTable = {**_planned(plan, out, (path,)), "table": path.name, "axes": "SAE"}
+    return payload, f"flat-surface table of the plan's tire in {path}, SAE axes  SIMULATED"
 
 
-def _session(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:
+def _session(plan: Plan, out: Path) -> tuple[SimulatedSession, str]:
     from toolkit.simulation.session import simulate_session
     from toolkit.simulation.write import SESSION, TRUTH, write_session
 
     session = simulate_session(plan)
     files = write_session(session, out)
-    payload = _common(plan, out, files) | {
-        "kind": "session",
+    payload: SimulatedSession = {
+        **_planned(plan, out, files),
         "session": SESSION,
         "truth": TRUTH,
         "points": len(session.run),
@@ -240,23 +236,21 @@ def _session(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:
         f"{max(session.run)} runs, {len(session.check_loads)} check loads  SIMULATED\n"
         f"  next: toolkit calibrate {out / SESSION}"
     )
-    return payload, text + _effects(plan)
+    return payload, text
 
 
-def _common(plan: Plan, out: Path, files: tuple[Path, ...]) -> dict[str, Any]:
+def _planned(plan: Plan, out: Path, files: Sequence[Path]) -> PlannedSimulation:
     return {
         "out": out,
         "simulated": True,
+        "kind": plan.kind,
         "machine": plan.machine.name,
         "date": plan.date,
         "seed": plan.seed,
         "effects": [effect.as_dict() for effect in plan.effects],
         "files": [path.name for path in files],
+        "findings": [finding.as_dict() for finding in _findings(plan)],
     }
-
-
-def _effects(plan: Plan) -> str:
-    return "".join(f"\n  effect       {effect.as_text()}" for effect in plan.effects)
 
 
 def _program(plan: Plan, registry: Registry | None) -> OwnProgram | None:
@@ -298,7 +292,7 @@ def model_answer(
     *,
     budget_s: float,
     limits: Limits,
-) -> tuple[dict[str, Any], str]:
+) -> tuple[SimulatedModel, str]:
     """Write the outputs of a model on inputs; return the JSON answer and the text for people.
 
     ``limits`` are of the worker in which the model's own code runs, ``budget_s`` its seconds.
@@ -318,7 +312,7 @@ def model_answer(
     with publication(out) as stage:
         for name, content in outputs:
             (stage / name).write_text(content, encoding="utf-8")
-    payload = {
+    payload: SimulatedModel = {
         "out": out,
         "simulated": True,
         "kind": "model",

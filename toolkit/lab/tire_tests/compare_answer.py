@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 from toolkit.calibration.records.use import UsedRecord
 from toolkit.comparison.laboratories import LaboratoryComparison
 from toolkit.declared.answers import entry_of, merged
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import (
+    DeliveredDocument,
     DraftKeys,
     EstimateEntry,
-    Timing,
+    Timed,
+    delivered_keys,
     draft_keys,
     estimate_keys,
     finding_lines,
@@ -23,8 +26,9 @@ from toolkit.lab.answers import (
 )
 
 if TYPE_CHECKING:
-    from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
+    from toolkit.comparison.model import Comparison, Difference, Entry, Precision, Repeats
     from toolkit.findings import Finding
+    from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
 
 
@@ -37,7 +41,7 @@ class ComparedEntry(TypedDict):
     simulated: bool
     calibration: UsedRecord | None
     unverified: bool
-    conditions: Annotated[Mapping[str, Any], "day, operator, surface, ..."]
+    conditions: Annotated[Mapping[str, str | None], "day, operator, surface, ..."]
 
 
 class DifferenceEntry(TypedDict):
@@ -70,7 +74,73 @@ class PatternEffect(TypedDict):
     body: EstimateEntry
 
 
-class Compared(DraftKeys):
+class FactorEntry(TypedDict):
+    """A factor of repeats, and its level in each test."""
+
+    factor: str
+    levels: list[str | None]
+    varied: bool
+    same_as: Annotated[list[str], "factors that changed together with it"]
+    note: Annotated[str | None, "why it is not told apart"]
+
+
+class SpreadEntry(TypedDict):
+    """A standard deviation with its 95 % interval, in the unit of its quantity."""
+
+    value: float
+    dof: int
+    low: float
+    high: float
+
+
+class IntermediateEntry(TypedDict):
+    """Intermediate precision with one factor different, ISO 5725-3."""
+
+    factor: str
+    levels: int
+    s_I: float
+    s_between: float | None
+    F: float | None
+    p: float | None
+    p_holm: float | None
+    significant: bool
+
+
+class PrecisionEntry(TypedDict):
+    """How well tests of one tire agree in one quantity at one load."""
+
+    quantity: str
+    rotation: str
+    load_N: float
+    n: int
+    mean: float
+    s: SpreadEntry
+    repeatability_s_r: SpreadEntry | None
+    repeatability_limit_r: float | None
+    intermediate: list[IntermediateEntry]
+    farthest: Annotated[str, "test farthest from the mean"]
+    grubbs_p: float | None
+    grubbs_p_holm: float | None
+    outlier: bool
+
+
+class RepeatsEntry(TypedDict):
+    """Precision of tests of one tire by ISO 5725-3."""
+
+    factors: list[FactorEntry]
+    reproducibility: str | None
+    reproducibility_note: str
+    precision: list[PrecisionEntry]
+
+
+class WrittenComparison(Timed):
+    """What a comparison wrote."""
+
+    figures: Annotated[Mapping[str, Path], "pictures that were written, by name"]
+    document: Annotated[DeliveredDocument | None, "Word document and PDF, where they were asked for"]
+
+
+class CompareAnswer(WrittenComparison, DraftKeys):
     """Tests held against each other, or against a maker's table; SI, angles in rad."""
 
     mode: str
@@ -80,34 +150,36 @@ class Compared(DraftKeys):
     entries: list[ComparedEntry]
     differences: list[DifferenceEntry]
     significant: Annotated[int, "how many differences are"]
-    repeats: Annotated[Mapping[str, Any] | None, "precision by ISO 5725-3, where tests repeat each other"]
+    repeats: Annotated[RepeatsEntry | None, "where tests repeat each other"]
     pattern_effect: list[PatternEffect]
     left_out: Annotated[list[str], "what could not be compared, and why"]
 
-
-class CompareAnswer(Compared):
-    """Tests held against each other, and what was written."""
-
-    figures: Annotated[Mapping[str, Any], "pictures that were written, by name"]
-    document: Annotated[Mapping[str, Any] | None, "Word document and PDF, where they were asked for"]
     findings: list[FindingEntry]
-    timing: Timing
 
 
-class _LaboratoryKeys(TypedDict):
+class LaboratoryKeys(WrittenComparison):
+    """What the answer on laboratories says beside the comparison itself."""
+
     mode: Annotated[str, "always laboratories"]
     source: str
-    figures: Annotated[Mapping[str, Path], "pictures that were written, by name"]
-    document: Annotated[Mapping[str, Any] | None, "Word document and PDF, where they were asked for"]
-    timing: Timing
 
 
-CompareForms = CompareAnswer | merged(LaboratoryComparison, _LaboratoryKeys)
+CompareForms = CompareAnswer | merged(LaboratoryComparison, LaboratoryKeys)
 """Of tests, and with ``--laboratories``."""
 
 
-def comparison_payload(comparison: Comparison) -> Compared:
-    """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes."""
+def compare_answer(
+    comparison: Comparison,
+    findings: Sequence[Finding],
+    drawn: Mapping[str, Path],
+    document: Delivered | None,
+    started: float,
+) -> CompareAnswer:
+    """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes.
+
+    ``started`` is when the command began, by the clock of `time.perf_counter`.
+    """
+    repeats = comparison.repeats
     return {
         "mode": comparison.mode,
         "axes": "SAE",
@@ -117,7 +189,7 @@ def comparison_payload(comparison: Comparison) -> Compared:
         "entries": [_entry(entry) for entry in comparison.entries],
         "differences": [_difference(difference) for difference in comparison.differences],
         "significant": sum(difference.significant for difference in comparison.differences),
-        "repeats": None if comparison.repeats is None else _repeats(comparison),
+        "repeats": None if repeats is None else _repeats(repeats),
         "pattern_effect": [
             {
                 "quantity": effect.name,
@@ -130,6 +202,17 @@ def comparison_payload(comparison: Comparison) -> Compared:
             for effect in comparison.pattern
         ],
         "left_out": list(comparison.left_out),
+        "findings": [finding.as_dict() for finding in findings],
+        **written_keys(drawn, document, started),
+    }
+
+
+def written_keys(drawn: Mapping[str, Path], document: Delivered | None, started: float) -> WrittenComparison:
+    """Return what an answer says of a comparison's files, and the time since ``started``."""
+    return {
+        "figures": drawn,
+        "document": None if document is None else delivered_keys(document),
+        "timing": {"seconds": time.perf_counter() - started},
     }
 
 
@@ -158,60 +241,24 @@ def _difference(difference: Difference) -> DifferenceEntry:
     }
 
 
-def _repeats(comparison: Comparison) -> dict[str, Any]:
-    repeats = comparison.repeats
-    assert repeats is not None  # noqa: S101  asked before
+def _repeats(repeats: Repeats) -> RepeatsEntry:
     return {
-        "factors": [
-            {
-                "factor": factor.name,
-                "levels": list(factor.levels),
-                "varied": factor.varied,
-                "same_as": list(factor.same_as),
-                "note": factor.note,
-            }
-            for factor in repeats.factors
-        ],
+        "factors": [entry_of(FactorEntry, factor, factor=factor.name) for factor in repeats.factors],
         "reproducibility": repeats.reproducibility,
         "reproducibility_note": repeats.reproducibility_note,
-        "precision": [
-            {
-                "quantity": precision.name,
-                "rotation": precision.rotation,
-                "load_N": precision.load_N,
-                "n": precision.n,
-                "mean": precision.mean,
-                "s": _spread(precision.total),
-                "repeatability_s_r": None
-                if precision.repeatability is None
-                else _spread(precision.repeatability),
-                "repeatability_limit_r": precision.limit_r,
-                "intermediate": [_factor(factor) for factor in precision.factors],
-                "farthest": precision.farthest,
-                "grubbs_p": precision.outlier_p,
-                "grubbs_p_holm": precision.outlier_p_holm,
-                "outlier": precision.outlier,
-            }
-            for precision in repeats.precisions
-        ],
+        "precision": [_precision_entry(precision) for precision in repeats.precisions],
     }
 
 
-def _spread(spread: Spread) -> dict[str, Any]:
-    return {"value": spread.value, "dof": spread.dof, "low": spread.low, "high": spread.high}
-
-
-def _factor(factor: FactorSpread) -> dict[str, Any]:
-    return {
-        "factor": factor.factor,
-        "levels": factor.levels,
-        "s_I": factor.s,
-        "s_between": factor.s_between,
-        "F": factor.F,
-        "p": factor.p,
-        "p_holm": factor.p_holm,
-        "significant": factor.significant,
-    }
+def _precision_entry(precision: Precision) -> PrecisionEntry:
+    return entry_of(
+        PrecisionEntry, precision, quantity=precision.name,
+        s=entry_of(SpreadEntry, precision.total),
+        repeatability_s_r=precision.repeatability and entry_of(SpreadEntry, precision.repeatability),
+        repeatability_limit_r=precision.limit_r,
+        intermediate=[entry_of(IntermediateEntry, factor, s_I=factor.s) for factor in precision.factors],
+        grubbs_p=precision.outlier_p, grubbs_p_holm=precision.outlier_p_holm,
+    )  # fmt: skip
 
 
 def comparison_text(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from toolkit.comparison.laboratories import LaboratoryComparison, Measurand, Score
     from toolkit.findings import Finding
+    from toolkit.lab.tire_tests.compare_answer import LaboratoryKeys
     from toolkit.report.deliver import Delivered
     from toolkit.report.word.package import Template
 
@@ -44,8 +46,9 @@ def laboratories_answer(
     from toolkit.comparison.laboratories import compare_laboratories
     from toolkit.comparison.laboratory_file import read_laboratories
     from toolkit.declared import answer
-    from toolkit.lab.answers import delivered_keys
+    from toolkit.lab.tire_tests.compare_answer import written_keys
 
+    started = time.perf_counter()
     for folder in (figures, out):
         refuse_unwritable(folder)
     if sigma is not None and not (math.isfinite(sigma) and sigma > 0):
@@ -60,19 +63,20 @@ def laboratories_answer(
         document = None
         if opened is not None and out is not None:
             document = _document(comparison, path, opened, out, issued, together)
-    payload = answer(comparison) | {
-        "mode": "laboratories",
-        "source": str(path),
-        "figures": drawn,
-        "document": None if document is None else delivered_keys(document),
-    }
+    keys: LaboratoryKeys = {
+        "mode": "laboratories", "source": str(path), **written_keys(drawn, document, started),
+    }  # fmt: skip
     lines = [line for measurand in comparison.measurands for line in _lines(measurand)]
     lines += [f"written: {one_line(file)}" for file in drawn.values()]
     if document is not None:
         lines += [f"written: {one_line(file)}" for file in (document.docx, document.pdf)]
         lines += [f"{document.pages} pages, verified", *(f"  warning {text}" for text in document.warnings)]
     shown = findings_text(comparison.findings)
-    return payload, "\n".join([*lines, *([shown] if shown else [])]), list(comparison.findings)
+    return (
+        answer(comparison) | keys,
+        "\n".join([*lines, *([shown] if shown else [])]),
+        list(comparison.findings),
+    )
 
 
 def _figures(comparison: LaboratoryComparison, folder: Path, together: ExitStack) -> dict[str, Path]:

@@ -29,7 +29,6 @@ EXACT = "The file is the canonical form of this document."
 # The mark by which the toolkit knows its own files again (`recording.marks.OWN_OUTPUT`).
 _HEAD = b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- toolkit-output -->\n'
 _ENVELOPED = f"{DS}enveloped-signature"
-_PROPERTIES = "http://uri.etsi.org/01903#SignedProperties"
 _CANONICAL = (
     "http://www.w3.org/2001/10/xml-exc-c14n#",
     "http://www.w3.org/2006/12/xml-c14n11",
