@@ -22,6 +22,7 @@ from toolkit.diagnosis.policy import FOLLOWING, SCREENING
 from toolkit.diagnosis.search.candidates import CandidateEffect, Start, candidates
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
+from toolkit.diagnosis.simulators.following import PARAMETER_STEP
 from toolkit.diagnosis.simulators.simulator import Following, TermPattern
 from toolkit.effects.law import ITSELF, POSITION, TIME
 from toolkit.errors import FitError
@@ -39,8 +40,6 @@ if TYPE_CHECKING:
     from toolkit.effects.surroundings import MotionSizes
 
     Array = NDArray[np.float64]
-
-_STEP = 1e-3  # of a parameter's prior sd, for its answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +68,7 @@ def proposals(problem: Problem, base: Fit) -> Proposals:
         parameter.name: value for parameter, value in zip(problem.free, base.p, strict=True)
     }
     asked = Following(
-        steps={parameter.name: _STEP * (parameter.sd or 1.0) for parameter in problem.free},
+        steps={parameter.name: PARAMETER_STEP * (parameter.sd or 1.0) for parameter in problem.free},
         sensor={name: noise_parts(problem, base, name).sensor_sd or 1.0 for name in problem.names},
         unread={
             name: tuple(np.flatnonzero(~kept & np.isfinite(problem.observed[name])).tolist())
@@ -80,7 +79,7 @@ def proposals(problem: Problem, base: Fit) -> Proposals:
         followed, answers = moving.followed(problem.runs, p, base.active, asked)
     except FitError:
         return NONE
-    errors = _PredictionErrors(problem, base, followed, answers / _STEP)
+    errors = _PredictionErrors(problem, base, followed, answers / PARAMETER_STEP)
     present = {applied.key for applied in base.active}
     listed = [
         candidate

@@ -147,8 +147,7 @@ def beside_rivals(
     promising = [
         scored
         for scored in view.significant
-        if scored.candidate.key not in fitted
-        and 0.5 * scored.gain > FOLLOWING.rival * led.outcome[2][-1].gain
+        if scored.candidate.key not in fitted and scored.gain > 2 * FOLLOWING.rival * led.outcome[2][-1].gain
     ][: STEP.refined]
     if not promising or not led.joint:
         return led.outcome

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+PARAMETER_STEP = 1e-3  # of its prior sd: for the answer of the prediction errors to a parameter
 _PASSES = 4  # the equation is taken as linear about the states of the pass before
 _SETTLED = 1e-3  # of a state's spread
 _PROCESS = 10.0 ** np.arange(-4.0, 1.1, 0.5)  # of the fastest rate of a state: process noise that is tried

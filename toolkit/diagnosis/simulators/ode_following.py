@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Run
-    from toolkit.diagnosis.simulators.ode import OdeModel
+    from toolkit.diagnosis.simulators.ode_responses import IntegratedModel
     from toolkit.diagnosis.simulators.simulator import Following
     from toolkit.effects.applied import AppliedEffect
 
@@ -31,7 +31,7 @@ _FEWEST = 3  # rows of a run
 
 
 def followed(
-    model: OdeModel,
+    model: IntegratedModel,
     runs: Sequence[Run],
     p: Mapping[str, float],
     active: Sequence[AppliedEffect],
@@ -125,11 +125,11 @@ def followed(
     return made, answers
 
 
-def _read(model: OdeModel, run: Run, name: str) -> Array:
+def _read(model: IntegratedModel, run: Run, name: str) -> Array:
     return np.asarray(model.observed(run).get(name, np.full(run.rows, np.nan)))
 
 
-def _not_followed(model: OdeModel, got: str) -> FitError:
+def _not_followed(model: IntegratedModel, got: str) -> FitError:
     return FitError(
         "the equation cannot be led along the recording", where=str(model.case.simulation.path), got=got,
         expected="an equation whose states follow what was recorded",

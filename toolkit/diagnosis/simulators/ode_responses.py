@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -16,14 +16,63 @@ from toolkit.effects.law import ITSELF, POSITION, TIME
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.case.case import Run
-    from toolkit.diagnosis.simulators.ode import OdeModel
-    from toolkit.diagnosis.simulators.simulator import Pattern
+    from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.equation import Equation
+    from toolkit.diagnosis.simulators.forces import Forces
+    from toolkit.diagnosis.simulators.simulator import Output, Pattern
     from toolkit.effects.applied import AppliedEffect
+    from toolkit.effects.signals import Setting
+
+    Array = NDArray[np.float64]
+
+
+class IntegratedModel(Protocol):
+    """An equation as what is asked of it beside its simulations needs it.
+
+    ``scale`` has of every state the size of its rate and its spread; ``derivative_of`` leads from the place
+    of a rate to that of the state whose rate it is; ``force_units`` has the states that a term may enter.
+    """
+
+    case: Case
+    equation: Equation
+    states: tuple[str, ...]
+    outputs: tuple[Output, ...]
+    drivers: tuple[str, ...]
+    scale: dict[str, tuple[float, float]]
+    derivative_of: dict[int, int]
+    force_units: dict[str, str]
+
+    def forces(self, active: Sequence[AppliedEffect]) -> Forces:
+        """Return effects as forces on the equation's states."""
+        ...
+
+    def integrated(self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect]) -> Array:
+        """Return the states of a run, (states, rows)."""
+        ...
+
+    def between(self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], x: Array) -> Array:
+        """Return the states also between the rows."""
+        ...
+
+    def finer(self, run: Run) -> Run:
+        """Return a run with rows between its rows."""
+        ...
+
+    def steps(self, runs: Sequence[Run]) -> NDArray[np.intp]:
+        """Return the steps of every interval of runs behind one another."""
+        ...
+
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+        ...
+
+    def observed(self, run: Run) -> dict[str, Array]:
+        """Return what was recorded of every output."""
+        ...
 
 
 def pushed(
-    model: OdeModel,
+    model: IntegratedModel,
     run: Run,
     p: Mapping[str, float],
     active: Sequence[AppliedEffect],
@@ -61,7 +110,9 @@ def pushed(
     return {name: shown[name][:, None] * column for name, column in responses.items()}
 
 
-def _signals(model: OdeModel, run: Run, fine: NDArray[np.float64], at: int) -> dict[str, NDArray[np.float64]]:
+def _signals(
+    model: IntegratedModel, run: Run, fine: NDArray[np.float64], at: int
+) -> dict[str, NDArray[np.float64]]:
     """Return what a term in the equation of a state may read, between the rows too."""
     finer = model.finer(run)
     inputs = {name: finer.columns[name] for name in model.drivers}

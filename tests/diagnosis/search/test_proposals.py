@@ -1,0 +1,123 @@
+"""Terms that are so large that the simulation without them is another motion: the recording proposes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.diagnosis.cases import write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.fit import Fit, fit
+from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.search.proposals import Proposals, proposals
+from toolkit.diagnosis.search.screen import Scored
+from toolkit.diagnosis.simulators.build_simulator import model_of
+
+HEAD = """schema = 1
+title = "A driven body"
+[simulation]
+kind = "ode"
+path = "sim.py"
+states = ["x", "v"]
+force_terms = {{ v = "N/kg" }}
+[simulation.parameters.stiffness]
+value = {stiffness}
+unit = "1/s^2"
+sd = 2.0
+bounds = [0.0, 40.0]
+[simulation.parameters.damping]
+value = 0.9
+unit = "1/s"
+sd = 0.4
+bounds = [0.0, 4.0]
+[recording]
+time = "t"
+[recording.channels]
+t = {{ unit = "s", role = "time" }}
+u = {{ unit = "N/kg", role = "input" }}
+x = {{ unit = "m", role = "output" }}
+"""
+SIMULATOR = """
+def initial(p):
+    return [0.0, 0.0]
+def rhs(t, x, u, p):
+    return [x[1], u["u"] - p["stiffness"] * x[0] - p["damping"] * x[1]]
+def outputs(x, u, p):
+    return {"x": x[0]}
+"""
+K3, COULOMB, FORCE = 30.0, 1.5, 0.6
+
+
+def driven(
+    folder: Path, *, stiffness: float, k3: float = 0.0, coulomb: float = 0.0, force: float = 0.0
+) -> Problem:
+    """Return two runs of a body of damping 0.8/s, integrated by a solver of scipy's."""
+    toml, frames, t = HEAD.format(stiffness=stiffness), {}, np.arange(400) * 0.05
+    for run in range(2):
+        rng = np.random.default_rng(run)
+        u = sum(rng.uniform(1.5, 2.5) * np.sin(w * t + rng.uniform(0, 6)) for w in (0.7, 1.9, 3.7, 5.1))
+
+        def rate(at: float, y: np.ndarray, u: np.ndarray = u) -> list[float]:
+            pull = np.interp(at, t, u) - stiffness * y[0] - k3 * y[0] ** 3 - 0.8 * y[1]
+            return [y[1], pull - coulomb * np.tanh(y[1] / 1e-3) - force]
+
+        solved = solve_ivp(rate, (0, t[-1]), [0.0, 0.0], t_eval=t, method="LSODA", rtol=1e-8, atol=1e-9)
+        noise = rng.normal(0, 0.002, t.size)
+        frames[f"r{run}__csv"] = pd.DataFrame({"t": t, "u": u, "x": solved.y[0] + noise})
+        toml += f'[[recording.run]]\nfile = "r{run}.csv"\n'
+    case = read_case(write_case(folder, toml, simulator=SIMULATOR, **frames))
+    return problem_of(case, model_of(case, None, None))
+
+
+def proposed(problem: Problem) -> tuple[Fit, Proposals]:
+    base = fit(problem)
+    return base, proposals(problem, base)
+
+
+def sizes(scored: Scored) -> dict[str, float]:
+    return dict(scored.active.values)
+
+
+def test_a_spring_that_hardens_is_proposed_with_its_size_and_the_parameters_beside_it(tmp_path: Path) -> None:
+    base, found = proposed(driven(tmp_path, stiffness=12.0, k3=K3))
+    first = found.scored[0]
+    assert first.candidate.name == "cubic_stiffness"
+    assert sizes(first)["k3"] == pytest.approx(K3, rel=0.1)
+    assert first.p is not None
+    assert first.p == pytest.approx((12.0, 0.8), abs=0.4)
+    # The refit without it has gone elsewhere.
+    assert abs(base.p[0] - 12.0) > 2.0
+    assert found.p_of[id(first)] < 1e-12
+
+
+def test_friction_beside_a_force_is_proposed_with_it(tmp_path: Path) -> None:
+    """Without a spring a body that is pushed to one side leaves every simulation that lacks either."""
+    _, found = proposed(driven(tmp_path, stiffness=0.0, coulomb=COULOMB, force=FORCE))
+    both = {scored.candidate.name: sizes(scored) for scored in found.together}
+    assert set(both) == {"coulomb_friction", "constant_force"}
+    assert both["coulomb_friction"]["coulomb"] == pytest.approx(COULOMB, rel=0.1)
+    assert abs(both["constant_force"]["force"]) == pytest.approx(FORCE, rel=0.15)
+
+
+def test_a_simulation_that_lacks_nothing_is_proposed_nothing(tmp_path: Path) -> None:
+    _, found = proposed(driven(tmp_path, stiffness=12.0))
+    assert found.scored == ()
+    assert found.together == ()
+    assert found.hopeless == frozenset()
+
+
+def test_the_worker_answers_as_the_same_process_does(tmp_path: Path) -> None:
+    """What is asked of an equation in its worker comes back as it was made."""
+    problem = driven(tmp_path, stiffness=12.0, k3=K3)
+    _, here = proposed(problem)
+    answer = diagnose(problem.case, None).diagnosis
+    assert [effect.name for effect in answer.effects] == ["cubic_stiffness"]
+    low, high = answer.effects[0].parameters[0].ci95
+    assert low < K3 < high
+    assert answer.remaining == "nothing"
+    assert sizes(here.scored[0])["k3"] == pytest.approx(K3, rel=0.1)
