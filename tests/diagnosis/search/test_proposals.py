@@ -54,9 +54,15 @@ K3, COULOMB, FORCE = 30.0, 1.5, 0.6
 
 
 def driven(
-    folder: Path, *, stiffness: float, k3: float = 0.0, coulomb: float = 0.0, force: float = 0.0
+    folder: Path,
+    *,
+    stiffness: float,
+    k3: float = 0.0,
+    coulomb: float = 0.0,
+    force: float = 0.0,
+    late_s: float = 0.0,
 ) -> Problem:
-    """Return two runs of a body of damping 0.8/s, integrated by a solver of scipy's."""
+    """Return two runs of a body of damping 0.8/s, integrated by a solver of scipy's and read late."""
     toml, frames, t = HEAD.format(stiffness=stiffness), {}, np.arange(400) * 0.05
     for run in range(2):
         rng = np.random.default_rng(run)
@@ -68,7 +74,8 @@ def driven(
 
         solved = solve_ivp(rate, (0, t[-1]), [0.0, 0.0], t_eval=t, method="LSODA", rtol=1e-8, atol=1e-9)
         noise = rng.normal(0, 0.002, t.size)
-        frames[f"r{run}__csv"] = pd.DataFrame({"t": t, "u": u, "x": solved.y[0] + noise})
+        read = np.interp(t - late_s, t, solved.y[0]) + noise
+        frames[f"r{run}__csv"] = pd.DataFrame({"t": t, "u": u, "x": read})
         toml += f'[[recording.run]]\nfile = "r{run}.csv"\n'
     case = read_case(write_case(folder, toml, simulator=SIMULATOR, **frames))
     return problem_of(case, model_of(case, None, None))
@@ -121,3 +128,12 @@ def test_the_worker_answers_as_the_same_process_does(tmp_path: Path) -> None:
     assert low < K3 < high
     assert answer.remaining == "nothing"
     assert sizes(here.scored[0])["k3"] == pytest.approx(K3, rel=0.1)
+
+
+def test_an_output_that_is_read_late_is_not_told_as_forces(tmp_path: Path) -> None:
+    """Led along late readings, an equation seems to lack forces; a delay alone explains them."""
+    problem = driven(tmp_path, stiffness=12.0, late_s=0.15)
+    answer = diagnose(problem.case, None).diagnosis
+    assert len(answer.effects) == 1
+    effect = answer.effects[0]
+    assert "channel_delay" in (effect.name, *effect.equivalent_to)

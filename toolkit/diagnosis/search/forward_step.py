@@ -80,14 +80,19 @@ def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tupl
     it is usually met, by likelihood times prior. A sensor's zero is a small share of its range, a drift that
     takes half of it is none.
     """
-    weight = _weight(problem)
     joints = []
     for scored in promising:
         fitted = joint_fit(problem, base, (scored.active,), begin=scored.p)
         if fitted is not None:
-            penalty = weight * sum(not parameter.ends_count for parameter in scored.active.searched)
-            joints.append(Joint(scored=scored, fit=fitted, score=fitted.log_posterior - penalty))
+            score = fitted.log_posterior - cost(problem, (scored.active,))
+            joints.append(Joint(scored=scored, fit=fitted, score=score))
     return ranked(problem, joints)
+
+
+def cost(problem: Problem, added: Sequence[AppliedEffect]) -> float:
+    """Return what the parameters of effects cost of the log-likelihood."""
+    searched = [parameter for applied in added for parameter in applied.searched]
+    return _weight(problem) * sum(not parameter.ends_count for parameter in searched)
 
 
 def ranked(problem: Problem, joints: Sequence[Joint]) -> tuple[Joint, ...]:

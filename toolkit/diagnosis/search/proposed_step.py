@@ -16,6 +16,7 @@ from toolkit.diagnosis.search.forward_step import (
     Step,
     at_bound,
     best_step,
+    cost,
     joint_fit,
     joint_fits,
     ranked,
@@ -149,13 +150,22 @@ def beside_rivals(
         for scored in view.significant
         if scored.candidate.key not in fitted and scored.gain > 2 * FOLLOWING.rival * led.outcome[2][-1].gain
     ][: STEP.refined]
-    if not promising or not led.joint:
+    if not promising:
         return led.outcome
     tell(promising)
     joint = ranked(problem, (*led.joint, *joint_fits(problem, base, promising)))
     p_of = led.proposed.p_of | view.p_of
     single = best_step(problem, folds, base, held_base, joint, p_of, least, refitted)
-    return led.outcome if single is None else (*single[:2], (single[2],))
+    made, _, steps = led.outcome
+    if single is None or (
+        len(steps) > 1 and _score(problem, single[0], 1) < _score(problem, made, len(steps))
+    ):
+        return led.outcome  # several terms explain more than any one that could stand for them
+    return (*single[:2], (single[2],))
+
+
+def _score(problem: Problem, made: Fit, added: int) -> float:
+    return made.log_posterior - cost(problem, made.active[-added:])
 
 
 def _is_abrupt(candidate: CandidateEffect) -> bool:
