@@ -125,7 +125,8 @@ class AppliedEffect:
         if parameter.off is None:
             return 0.0
         size = abs(self.values[parameter.name] - parameter.off)
-        return self.effect.form_error * size / math.sqrt(3)
+        share = self.effect.form_error if self.effect.size_error is None else self.effect.size_error
+        return share * size / math.sqrt(3)
 
     def log_prior(self, case: Surroundings) -> float:
         """Return how likely its size is before the recording speaks; 0 of an effect that is there or not."""
