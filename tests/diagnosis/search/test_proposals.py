@@ -31,9 +31,9 @@ unit = "1/s^2"
 sd = 2.0
 bounds = [0.0, 40.0]
 [simulation.parameters.damping]
-value = 0.9
+value = {damping}
 unit = "1/s"
-sd = 0.4
+sd = {sd}
 bounds = [0.0, 4.0]
 [recording]
 time = "t"
@@ -61,9 +61,17 @@ def driven(
     coulomb: float = 0.0,
     force: float = 0.0,
     late_s: float = 0.0,
+    damping: tuple[float, float] = (0.9, 0.4),
 ) -> Problem:
-    """Return two runs of a body of damping 0.8/s, integrated by a solver of scipy's and read late."""
-    toml, frames, t = HEAD.format(stiffness=stiffness), {}, np.arange(400) * 0.05
+    """Return two runs of a body of damping 0.8/s, integrated by a solver of scipy's and read late.
+
+    ``damping`` is its prior: value and sd.
+    """
+    toml, frames, t = (
+        HEAD.format(stiffness=stiffness, damping=damping[0], sd=damping[1]),
+        {},
+        np.arange(400) * 0.05,
+    )
     for run in range(2):
         rng = np.random.default_rng(run)
         u = sum(rng.uniform(1.5, 2.5) * np.sin(w * t + rng.uniform(0, 6)) for w in (0.7, 1.9, 3.7, 5.1))
@@ -137,3 +145,16 @@ def test_an_output_that_is_read_late_is_not_told_as_forces(tmp_path: Path) -> No
     assert len(answer.effects) == 1
     effect = answer.effects[0]
     assert "channel_delay" in (effect.name, *effect.equivalent_to)
+
+
+def test_a_parameter_with_a_wrong_prior_does_not_withdraw_what_foretells_all_else(tmp_path: Path) -> None:
+    """Three sd off with and without the spring: it is the prior that is wrong, and the spring stands."""
+    problem = driven(tmp_path, stiffness=12.0, k3=K3, damping=(2.2, 0.4))
+    answer = diagnose(problem.case, None).diagnosis
+    assert "cubic_stiffness" in [effect.name for effect in answer.effects]
+    shifts = {
+        each.name: (each.after - each.before) / each.prior_sd
+        for each in answer.nominal_parameters
+        if each.prior_sd
+    }
+    assert shifts["damping"] < -3

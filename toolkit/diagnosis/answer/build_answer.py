@@ -94,9 +94,10 @@ def mostly_unknown(search: Search) -> bool:
 
     By the log-likelihood, by what they take of the held-out mean square that is above the noise, and by the
     parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
-    what was left out. Nor is a cell's law beside an unexplained rest, with a size that no cell has.
+    what was left out, unless its prior is what is wrong. Nor is a cell's law beside an unexplained rest, with
+    a size that no cell has.
     """
-    if search.steps and implausible(search) and not _takes_nearly_all(search):
+    if search.steps and implausible(search) and not _has_wrong_prior(search):
         return True
     shown = _taken(search)
     if search.steps and not shown and _is_smooth(search):
@@ -189,12 +190,17 @@ def _taken(search: Search) -> list[tuple[float, float]]:
     return shown
 
 
-def _takes_nearly_all(search: Search) -> bool:
-    """Tell whether the effects take nearly all that is above the sensor's own noise on unseen rows.
+def _has_wrong_prior(search: Search) -> bool:
+    """Tell whether it is its prior that a parameter is far off, and not the effects that drive it there.
 
-    A parameter that stays far off beside them has a wrong prior, as it has without them: what foretells all
-    else is not withdrawn for it.
+    It is as far off without them, and they take nearly all that is above the sensor's own noise on unseen
+    rows: what foretells all else is not withdrawn for it.
     """
+    without = dict(zip((each.name for each in search.problem.free), search.refitted.p, strict=True))
+    apart = {each.name: each for each in search.problem.free}
+    for name in implausible(search):
+        if abs(without[name] - apart[name].value) <= PRIORS.far * (apart[name].sd or 1.0):
+            return False
     shares = []
     for output in _held_out(search, unknown=False):
         before, after = output.refitted_rmse**2, output.augmented_rmse**2

@@ -310,7 +310,8 @@ class _PredictionErrors:
     def _held_up(self, candidate: CandidateEffect, values: Values, at: int) -> Array:
         """Return by how much a limit lowers the mean rate of a state that rises, (rows - 1,)."""
         term = candidate.active.effect.term
-        assert term is not None and term.limit is not None  # noqa: S101, PT018  asked before
+        if term is None or term.limit is None:
+            return np.zeros(self._rates.shape[1])
         left = term.limit(self._followed.states[at], float(self._followed.spread[at]), values)
         free = 0.5 * (left[1:] + left[:-1])
         return np.asarray(np.maximum(self._rates[at], 0.0) * (1 - free))

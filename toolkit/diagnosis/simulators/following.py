@@ -196,7 +196,7 @@ def follow(
         carried[rows.stop - 1], read[rows.stop - 1] = 0.0, 0.0
     return Followed(
         states=x,
-        rates=(about.ends - x[:, :-1]),
+        rates=about.ends - x[:, :-1],
         errors=whole(passed.errors),
         closed=carried,
         shows=whole(np.asarray(inverse @ stretch.shows)),
