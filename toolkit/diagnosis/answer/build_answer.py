@@ -94,10 +94,10 @@ def mostly_unknown(search: Search) -> bool:
 
     By the log-likelihood, by what they take of the held-out mean square that is above the noise, and by the
     parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
-    what was left out, unless its prior is what is wrong. Nor is a cell's law beside an unexplained rest, with
+    what was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with
     a size that no cell has.
     """
-    if search.steps and implausible(search) and not _has_wrong_prior(search):
+    if search.steps and implausible(search) and not _takes_nearly_all(search):
         return True
     shown = _taken(search)
     if search.steps and not shown and _is_smooth(search):
@@ -190,17 +190,12 @@ def _taken(search: Search) -> list[tuple[float, float]]:
     return shown
 
 
-def _has_wrong_prior(search: Search) -> bool:
-    """Tell whether it is its prior that a parameter is far off, and not the effects that drive it there.
+def _takes_nearly_all(search: Search) -> bool:
+    """Tell whether effects take nearly all that is above the sensor's own noise on unseen rows.
 
-    It is as far off without them, and they take nearly all that is above the sensor's own noise on unseen
-    rows: what foretells all else is not withdrawn for it.
+    What foretells all else is not withdrawn for a parameter that is far off beside it: its prior is as likely
+    wrong, and the answer gives the parameter with its shift.
     """
-    without = dict(zip((each.name for each in search.problem.free), search.refitted.p, strict=True))
-    apart = {each.name: each for each in search.problem.free}
-    for name in implausible(search):
-        if abs(without[name] - apart[name].value) <= PRIORS.far * (apart[name].sd or 1.0):
-            return False
     shares = []
     for output in _held_out(search, unknown=False):
         before, after = output.refitted_rmse**2, output.augmented_rmse**2

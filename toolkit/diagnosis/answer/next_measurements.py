@@ -95,9 +95,11 @@ def next_measurements(search: Search, effects: tuple[FoundEffect, ...], verdict:
     sentences = [text for effect in effects if (text := parted(effect))]
     if verdict == "unknown":
         sentences += to_find_it(search)
+    if verdict == "unknown" or effects:
         beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))
+        near = f"beside {beside}" if effects else f"even beside the nearest effects ({beside})"
         sentences += [
-            f"Measure {name} by itself: even beside the nearest effects ({beside}) it is far off its prior."
+            f"Measure {name} by itself: {near} it is far off its prior."
             for name in (implausible(search) if search.steps else ())
         ]
     if cut_short(search.skipped):
