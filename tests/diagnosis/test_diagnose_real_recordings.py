@@ -50,7 +50,7 @@ def test_a_light_ball_is_held_back_by_the_air(tmp_path):
     assert len(made.effects) == 1
     assert classes(made)[0] & {"viscous_damping", "quadratic_drag"}
     assert made.held_out[0].augmented_rmse < 0.1 * made.held_out[0].refitted_rmse
-    # A speed of release that is as far off its prior as no other is no reason to withdraw the drag: it is told.
+    # A speed of release far off its prior is no reason to withdraw the drag: it is told.
     far = [each.name for each in made.nominal_parameters if abs(each.shift_in_sd or 0.0) > 3]
     asked = [sentence for sentence in made.next_measurements if "far off its prior" in sentence]
     assert [sentence.split()[1] for sentence in asked] == far

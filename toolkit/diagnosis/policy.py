@@ -246,6 +246,9 @@ class _Following:
     hopeless: float = _set(
         0.05, "of the best gain", "what takes as little is not simulated beside one that takes all of it"
     )
+    idle: float = _set(
+        0.05, "of one test", "where no term takes a good part: what takes no more than chance gives it"
+    )
     rival: float = _set(
         0.5,
         "of the gain reached",

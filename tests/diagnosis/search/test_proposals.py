@@ -123,7 +123,8 @@ def test_a_simulation_that_lacks_nothing_is_proposed_nothing(tmp_path: Path) -> 
     _, found = proposed(driven(tmp_path, stiffness=12.0))
     assert found.scored == ()
     assert found.together == ()
-    assert found.hopeless == frozenset()
+    # What holds, slides or runs against a limit takes no more than chance: it costs no free simulation.
+    assert {"coulomb_friction", "overflow"} <= {key.name for key in found.hopeless}
 
 
 def test_the_worker_answers_as_the_same_process_does(tmp_path: Path) -> None:

@@ -48,12 +48,22 @@ class Proposals:
 
     ``together`` are terms of which each takes a good part of what those before it leave, with their sizes
     beside each other; one alone is none. ``p_of`` has the p-value of every term, by its identity.
+    ``hopeless`` take next to nothing beside the best, or no more than chance where none takes a good part.
     """
 
     scored: tuple[Scored, ...]
     together: tuple[Scored, ...]
     p_of: dict[int, float]
     hopeless: frozenset[EffectKey]
+
+    def is_worth(self, candidate: CandidateEffect) -> bool:
+        """Tell whether a candidate is worth a free simulation.
+
+        One that turns or runs against a limit costs many times another: a hopeless one is left out.
+        """
+        term = candidate.active.effect.term
+        abrupt = term is not None and (term.limit is not None or term.bristle is not None)
+        return candidate.key not in self.hopeless or not abrupt
 
 
 NONE = Proposals((), (), {}, frozenset())
@@ -96,13 +106,15 @@ def proposals(problem: Problem, base: Fit) -> Proposals:
         and p_of[id(scored)] < SCREENING.alpha
         and scored.gain > FOLLOWING.near * seen[0].gain
     ]
+    best = {scored.candidate.key: scored for scored in seen}
     if not shown:
-        return NONE
-    gains = {scored.candidate.key: scored.gain for scored in seen}
+        idle = (key for key, scored in best.items() if errors.p_value(scored, 1) > FOLLOWING.idle)
+        unseen = (candidate.key for candidate in listed if candidate.key not in best)
+        return replace(NONE, hopeless=frozenset((*idle, *unseen)))
     hopeless = frozenset(
         candidate.key
         for candidate in listed
-        if gains.get(candidate.key, 0.0) < FOLLOWING.hopeless * seen[0].gain
+        if candidate.key not in best or best[candidate.key].gain < FOLLOWING.hopeless * seen[0].gain
     )
     together = _pursued(errors, shown[0], listed, tests)
     p_of |= {id(scored): p_value for scored, p_value in together}
@@ -156,6 +168,24 @@ class _FollowedView(CaseView):
             speed=float(np.std(own)) or sizes.speed, place=float(np.std(place)) or sizes.place,
             level=float(own.max()) or sizes.level,
         )  # fmt: skip
+
+    @property
+    def way(self) -> tuple[float, float]:
+        """Longest way of a run over the followed position and the usual one from row to row.
+
+        A simulation that lacks what stops it goes farther: what the plant saw once would look periodic.
+        """
+        moving = self._problem.model.capability.motion
+        if moving is None or self.channel is None:
+            return super().way
+        names = [state.name for state in moving.states]
+        position = moving.position(self.channel)
+        if position not in names:
+            return super().way
+        place = self._followed.states[names.index(position)]
+        runs = [place[rows] for rows in self._problem.slices if rows.stop > rows.start]
+        steps = np.concatenate([np.abs(np.diff(run)) for run in runs])
+        return max(float(np.ptp(run)) for run in runs), float(np.median(steps)) if len(steps) else 0.0
 
 
 class _PredictionErrors:

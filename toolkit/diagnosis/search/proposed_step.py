@@ -21,12 +21,11 @@ from toolkit.diagnosis.search.forward_step import (
     joint_fits,
     ranked,
 )
-from toolkit.diagnosis.search.proposals import Proposals, proposals
+from toolkit.diagnosis.search.proposals import Proposals
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.search.candidates import CandidateEffect
     from toolkit.diagnosis.search.screen_step import Look
 
     Outcome = tuple[Fit, HeldOut, tuple[Step, ...]]
@@ -40,24 +39,13 @@ class ProposedStep:
     joint: tuple[Joint, ...]
     proposed: Proposals
 
-    def sought(self, listed: Sequence[CandidateEffect]) -> list[CandidateEffect]:
-        """Return the candidates that are worth a free simulation beside the step.
-
-        One that turns or runs against a limit costs many times another: it is left out where it takes next to
-        none of the prediction errors.
-        """
-        return [
-            candidate
-            for candidate in listed
-            if candidate.key not in self.proposed.hopeless or not _is_abrupt(candidate)
-        ]
-
 
 def proposed_step(
     problem: Problem,
     folds: Folds,
     base: Fit,
     held_base: HeldOut,
+    proposed: Proposals,
     *,
     least: float,
     refitted: HeldOut,
@@ -67,11 +55,11 @@ def proposed_step(
 
     Parameters
     ----------
+    proposed : what the prediction errors of the base propose
     least : share of an output's held-out mean square that it must take away
     refitted : the held-out rows without any effect
     tell : is told what is fitted
     """
-    proposed = proposals(problem, base)
     if not proposed.scored:
         return None
     for count in range(len(proposed.together), 1, -1):
@@ -166,8 +154,3 @@ def beside_rivals(
 
 def _score(problem: Problem, made: Fit, added: int) -> float:
     return made.log_posterior - cost(problem, made.active[-added:])
-
-
-def _is_abrupt(candidate: CandidateEffect) -> bool:
-    term = candidate.active.effect.term
-    return term is not None and (term.limit is not None or term.bristle is not None)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
-from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
+from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
@@ -20,6 +20,7 @@ from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, s
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise
 from toolkit.diagnosis.search.pairs import best_pair
+from toolkit.diagnosis.search.proposals import NONE, proposals
 from toolkit.diagnosis.search.proposed_step import beside_rivals, proposed_step
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import from_declared, look, masked
@@ -168,13 +169,16 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in scored))
                 budget.check(f"step {turn + 1}: joint fits of {names}")
 
-            led = None
+            led, proposed, sought = None, NONE, tuple(listed)
             if turn < STEP.most_effects:
                 budget.check(f"step {turn + 1}: the equation along the recording")
+                proposed = proposals(problem, base)
                 led = proposed_step(
-                    problem, folds, base, held_base, least=share, refitted=held_refitted, tell=fitting
-                )
-            sought = listed if led is None else led.sought(listed)
+                    problem, folds, base, held_base, proposed,
+                    least=share, refitted=held_refitted, tell=fitting,
+                )  # fmt: skip
+                if led is not None:
+                    sought = tuple(candidate for candidate in listed if proposed.is_worth(candidate))
             budget.check(f"step {turn + 1}: screening {len(sought)} candidates")
             view = look(problem, base, sought, turn=turn, seed=seed + turn)
             view = from_declared(problem, base, view)
@@ -196,8 +200,12 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             budget.check(f"step {turn + 1}: unseen runs")
             outcome = shown_on_unseen_runs(problem, folds, base, held_base, view)
             hidden = masked(problem, base, view.candidates) if view.significant else frozenset()
-            hinted = view.hinted if folds.by_run and len(problem.runs) >= STEP.runs else ()
-            groups = step_groups(view.significant, hinted, hidden, share) if outcome is None else []
+            hinted: Sequence[Scored] = view.hinted if folds.by_run and len(problem.runs) >= STEP.runs else ()
+            significant, hinted, paired = (
+                [trial for trial in ranking if proposed.is_worth(trial.candidate)]
+                for ranking in (view.significant, hinted, scored)
+            )
+            groups = step_groups(significant, hinted, hidden, share) if outcome is None else []
             for promising, least in groups:
                 fitting(promising)
                 joint = joint_fits(problem, base, promising)
@@ -213,7 +221,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             if not structure or turn + 2 > STEP.most_effects:
                 break
             budget.check(f"step {turn + 1}: pairs of candidates")
-            both = best_pair(problem, folds, base, held_base, screen, scored, share)
+            both = best_pair(problem, folds, base, held_base, screen, paired, share)
             if both is None:
                 break
             base, held_base, pair = both
@@ -224,7 +232,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
-            base, held_base, steps = _pruned(problem, folds, base, held_base, steps)
+            base, held_base, steps = _pruned(problem, folds, base, held_base, held_refitted, steps)
     except BudgetSpentError as error:
         skipped.append(str(error))
     base, steps = _with_a_size(problem, base, steps)
@@ -304,9 +312,16 @@ def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
 
 
 def _pruned(
-    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, refitted: HeldOut, steps: list[Step]
 ) -> tuple[Fit, HeldOut, list[Step]]:
-    """Drop effects that the later ones made superfluous: without them the held-out score is as good."""
+    """Drop effects that the others make superfluous: of which too little is left to say beside them.
+
+    Their held-out score is as good without, or what it takes is no more than the others' own forms are off.
+
+    Parameters
+    ----------
+    refitted : the held-out rows without any effect
+    """
     for i in range(len(steps) - 1):
         if len(base.active) < 2:
             break
@@ -316,11 +331,14 @@ def _pruned(
             scores = hold_out(problem, folds, pruned.active, pruned)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
-        if held_base.total - scores.total < STEP.least_gain:
+        form = max((applied.effect.form_error for applied in remaining), default=0.0)
+        if held_base.total - scores.total < STEP.least_gain or not beyond_form(
+            problem, refitted, scores, held_base, form
+        ):
             base, held_base = pruned, scores
             keys = {applied.key for applied in remaining}
             steps = [step for step in steps if step.active.key in keys]
-            return _pruned(problem, folds, base, held_base, steps)
+            return _pruned(problem, folds, base, held_base, refitted, steps)
     return base, held_base, steps
 
 
@@ -347,7 +365,11 @@ def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, l
 def _told_from_none(
     problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
 ) -> tuple[Fit, HeldOut, list[Step]]:
-    """Return a hypothesis without effects of one size that the others leave open: it may be none."""
+    """Return a hypothesis without effects of one size that the others leave open: it may be none.
+
+    The curvature of a fit says where to ask, and the fit without it decides: where friction holds, slides or
+    stops, an interval of the curvature reaches to zero for an effect without which nothing is foretold.
+    """
     from scipy.stats import norm
 
     reach = float(norm.ppf((1 + VERDICT.interval) / 2))
@@ -368,6 +390,8 @@ def _told_from_none(
             bare = fit(problem, without(base.active, applied), start=base.p)
             scores = hold_out(problem, folds, bare.active, bare)
         except FitError:  # the simulation needs it
+            continue
+        if base.log_posterior - bare.log_posterior > reach**2 / 2:  # the likelihood ratio of its interval
             continue
         return _told_from_none(problem, folds, bare, scores, listed)
     return base, held_base, steps

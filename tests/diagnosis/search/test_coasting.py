@@ -1,0 +1,138 @@
+"""Wheels that coast: large losses, and what else a slightly wrong law of them leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.integrate import solve_ivp
+
+from tests.diagnosis.cases import write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.fit.fit import Fit, fit
+from toolkit.diagnosis.fit.folds import HeldOut, folds_of, hold_out
+from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.search import proposals as along
+from toolkit.diagnosis.search import search
+from toolkit.diagnosis.search.candidates import candidates
+from toolkit.diagnosis.search.case_view import CaseView
+from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.effects.facts import Values
+
+COASTING = """schema = 1
+title = "A wheel that coasts"
+[simulation]
+kind = "ode"
+path = "sim.py"
+states = ["s", "v"]
+force_terms = { v = "N/kg" }
+[simulation.parameters.bearing]
+value = 0.03
+unit = "N/kg"
+sd = 0.01
+bounds = [0.0, 0.1]
+[simulation.parameters.v0]
+value = 22.0
+unit = "m/s"
+sd = 3.0
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+v = { unit = "m/s", role = "output" }
+"""
+COASTING_SIMULATOR = """
+def initial(p):
+    return [0.0, p["v0"]]
+def rhs(t, x, u, p):
+    return [x[1], -p["bearing"] if x[1] > 0 else 0.0]
+def outputs(x, u, p):
+    return {"v": x[1]}
+"""
+
+
+def coasting(folder: Path, wave: float = 0.0) -> tuple[Problem, float]:
+    """Return wheels with drag and a wave over the way [N/kg], and the longest way that one rolls [m]."""
+    toml, frames, ways, t = COASTING, {}, [], np.arange(600) * 0.25
+    for run in range(3):
+
+        def rate(_: float, y: np.ndarray) -> list[float]:
+            return [y[1], -0.004 - 0.0022 * max(y[1], 0.0) ** 2 - wave * np.sin(y[0] / 80)]
+
+        rng = np.random.default_rng(run)
+        solved = solve_ivp(rate, (0, t[-1]), [0.0, 22.0], t_eval=t, method="LSODA", rtol=1e-9)
+        ways.append(float(solved.y[0][-1]))
+        frames[f"r{run}__csv"] = pd.DataFrame({"t": t, "v": solved.y[1] + rng.normal(0, 0.002, t.size)})
+        toml += f'[[recording.run]]\nfile = "r{run}.csv"\n'
+    case = read_case(write_case(folder, toml, simulator=COASTING_SIMULATOR, **frames))
+    return problem_of(case, model_of(case, None, None)), max(ways)
+
+
+def test_what_rolls_out_is_periodic_by_the_way_that_it_rolled_and_not_by_the_simulations(
+    tmp_path: Path,
+) -> None:
+    problem, way = coasting(tmp_path)
+    seen: list[float] = []
+
+    class View(along._FollowedView):
+        @property
+        def way(self) -> tuple[float, float]:
+            seen.append(super().way[0])
+            return super().way
+
+    with_view, along._FollowedView = along._FollowedView, View  # type: ignore[misc]
+    try:
+        found = along.proposals(problem, fit(problem))
+    finally:
+        along._FollowedView = with_view  # type: ignore[misc]
+    assert found.scored
+    assert abs(max(seen) / way - 1) < 0.1
+    assert CaseView(problem, "v", None).way[0] > 1.5 * way
+
+
+def fitted(problem: Problem, **values: Values) -> tuple[Fit, HeldOut, HeldOut, list[Step]]:
+    """Return a joint fit of some effects on the speed, unseen rows with and without them, and their steps."""
+    listed = {candidate.name: candidate.active for candidate in candidates(problem)}
+    active = tuple(
+        replace(listed[name], values=dict(listed[name].values) | dict(sizes))
+        for name, sizes in values.items()
+    )
+    refitted, made = fit(problem), fit(problem, active)
+    folds = folds_of(problem, refitted)
+    steps = [Step(active=each, p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=()) for each in made.active]
+    without = hold_out(problem, folds, (), refitted)
+    return made, hold_out(problem, folds, made.active, made), without, steps[::-1]
+
+
+def names(steps: Sequence[Step]) -> list[str]:
+    return [step.active.effect.name for step in steps]
+
+
+def test_what_the_form_of_a_drag_may_leave_is_dropped_beside_it(tmp_path: Path) -> None:
+    """A slow wave over the way takes what is left, less than a thousandth of what the drag took."""
+    problem, _ = coasting(tmp_path, wave=0.002)
+    made, unseen, without, steps = fitted(
+        problem,
+        quadratic_drag={"drag": 0.0022},
+        periodic_ripple={"amplitude": 0.002, "period": 160 * np.pi, "phase": 0.0},
+    )
+    folds = folds_of(problem, made)
+    _, kept_unseen, kept = search._pruned(problem, folds, made, unseen, without, steps)
+    assert names(steps) == ["periodic_ripple", "quadratic_drag"]
+    assert unseen.total > kept_unseen.total + 1.5  # the score alone would have kept it
+    assert names(kept) == ["quadratic_drag"]
+
+
+def test_an_effect_stays_where_the_likelihood_falls_without_it_whatever_the_curvature(tmp_path: Path) -> None:
+    problem, _ = coasting(tmp_path)
+    made, unseen, _, steps = fitted(
+        problem, quadratic_drag={"drag": 0.0022}, viscous_damping={"viscous": 1e-3}
+    )
+    folds = folds_of(problem, made)
+    wide = replace(made, covariance=made.covariance * 1e9)
+    _, _, kept = search._told_from_none(problem, folds, wide, unseen, steps)
+    assert "quadratic_drag" in names(kept)
