@@ -74,11 +74,14 @@ SECONDS ?= 600
 fuzz: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.fuzz --count $(COUNT) --seconds $(SECONDS)
 
-# A new sealed batch of concealed effects, the tool once on every case, then the answers opened. Resumable.
+# A new sealed batch of concealed effects, the tool once on every case, then the answers opened; and every effect of the
+# virtual machine, there and back. Resumable.
 CASES ?= 400
 proof: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m proof all --out build/proof \
 	  --cases $(CASES) --workers $(JOBS) --proof . --log proof/batches.jsonl
+	TOOLKIT_PROOF=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal \
+	  tests/simulation/test_case_effects_are_named.py
 
 # The virtual environment from the lock file: exact versions, each with its hash.
 $(STAMP): requirements.lock pyproject.toml

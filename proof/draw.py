@@ -178,9 +178,13 @@ def nearest_inside(
     return best
 
 
-def _before_converter(s: Scenario, p: Params, effects: dict[str, dict[str, Any]]) -> sizing.Signals:
+def _before_converter(
+    s: Scenario, p: Params, effects: dict[str, dict[str, Any]], truth: sizing.Signals
+) -> sizing.Signals:
     """Return the outputs before noise, without what an output's converter does to the noisy value."""
     later = {k for k, v in effects.items() if k in DIGITAL and v["channel"] in s.outputs and not s.timeless}
+    if not later:
+        return truth
     return sizing.truth_of(s, s.runs, p, {k: v for k, v in effects.items() if k not in later})
 
 
@@ -309,7 +313,7 @@ def _draw(
     effects, rows = {}, []
     for name in names:
         wanted = _log_uniform(rng, low, high)
-        factor, found = sizing.scaled_to(s, name, wanted, slopes)
+        factor, found = sizing.scaled_to(s, name, wanted, slopes, without)
         spec = s.effects[name]
         if spec.scaled and not 0.6 < found.over_noise / wanted < 1.6:
             raise RedrawError
@@ -322,7 +326,9 @@ def _draw(
             "size": round(found.over_noise, 4),
             "distance": round(found.distance, 3),
         })  # fmt: skip
-    truth, without = sizing.truth_of(s, s.runs, p, effects), sizing.without_of(s, s.runs, p, effects)
+    truth = sizing.truth_of(s, s.runs, p, effects)
+    if s.driven:
+        without = sizing.without_of(s, s.runs, p, effects)
     total = sizing.size_of(s, sizing.difference(truth, without), slopes)
     near: dict[str, float] = {}
     nearest: tuple[str, float] = ("", 0.0)
@@ -337,12 +343,12 @@ def _draw(
     more = {}
     if bucket.startswith("stirred"):
         wanted = _log_uniform(rng, 0.3, 1.0)
-        s, added = stirred(s, p, effects, wanted, rng)
+        s, added, truth = stirred(s, p, effects, wanted, rng, truth)
         if not 0.7 < added / wanted < 1.4:
             raise RedrawError
         more["process_noise"] = round(added, 4)
-        truth = sizing.truth_of(s, s.runs, p, effects)
-    measured = [_recorded(s, row, effects, lost, rng) for row in _before_converter(s, p, effects)]
+    analogue = _before_converter(s, p, effects, truth)
+    measured = [_recorded(s, row, effects, lost, rng) for row in analogue]
     _check(s, measured, truth, effects)
     answer = {
         "bucket": bucket,

@@ -67,18 +67,19 @@ def _motion(
     one."""
     hidden, gust = e.get("hidden_resonance"), e.get("hidden_gust")
 
-    def rhs(time: float, x: Array, u: dict[str, float]) -> Array:
-        added, bristle_rate = left_out(x[0], x[1], x[2], e, presliding)
-        a = rates(x[0], x[1], u) + added + u.get("push", 0.0)
+    def rhs(time: float, state: Array, u: dict[str, float]) -> Array:
+        x, v, z, q, w = state.tolist()
+        added, bristle_rate = left_out(x, v, z, e, presliding)
+        a = rates(x, v, u) + added + u.get("push", 0.0)
         if gust:
             a += gust["force"] * sum(math.exp(-(((time - at) / gust["seconds"]) ** 2)) for at in gust["at"])
         q_rate, w_rate = 0.0, 0.0
         if hidden:
-            w = 2 * math.pi * hidden["frequency"]
-            pull = w * w * x[3] + 0.06 * w * x[4]
+            omega = 2 * math.pi * hidden["frequency"]
+            pull = omega * omega * q + 0.06 * omega * w
             a += hidden["share"] * pull
-            q_rate, w_rate = x[4], -pull - a
-        return np.array([x[1], a, bristle_rate, q_rate, w_rate])
+            q_rate, w_rate = w, -pull - a
+        return np.array([v, a, bristle_rate, q_rate, w_rate])
 
     t = run.fine["t"]
     driven = dict(inputs) | {k: run.fine[k] for k in ("push",) if k in run.fine}

@@ -42,15 +42,14 @@ def nominal(
 
 def truth(rates: Rates, x0: Array, t: Array, u: dict[str, Array], *, longest: float) -> Array:
     """Return the states (time x states) on the grid; the inputs are linear between its points."""
-    names = tuple(u)
-    table = np.array([u[k] for k in names])
-    h = float(t[1] - t[0])
+    # Plain floats: a table of one or two inputs costs more as an array than all that is computed from it.
+    inputs = [(name, np.asarray(values, float).tolist()) for name, values in u.items()]
+    h, begin, last = float(t[1] - t[0]), float(t[0]), t.size - 1.000001
 
     def rhs(at: float, x: Array) -> Array:
-        z = min(max((at - t[0]) / h, 0.0), t.size - 1.000001)
+        z = min(max((at - begin) / h, 0.0), last)
         i = int(z)
-        now = table[:, i] + (z - i) * (table[:, i + 1] - table[:, i])
-        return rates(at, x, dict(zip(names, now.tolist(), strict=True)))
+        return rates(at, x, {name: y[i] + (z - i) * (y[i + 1] - y[i]) for name, y in inputs})
 
     found = solve_ivp(
         rhs, (t[0], t[-1]), x0, method="LSODA", t_eval=t, rtol=1e-6, atol=1e-8, max_step=longest

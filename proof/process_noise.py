@@ -17,26 +17,33 @@ MEMORY_ROWS = 4.0
 
 
 def stirred(
-    s: Scenario, p: Params, effects: dict[str, dict[str, Any]], wanted: float, rng: np.random.Generator
-) -> tuple[Scenario, float]:
-    """Return the scenario with pushes in its recorded runs, and what they add to an output, in noise sd.
+    s: Scenario,
+    p: Params,
+    effects: dict[str, dict[str, Any]],
+    wanted: float,
+    rng: np.random.Generator,
+    still: sizing.Signals,
+) -> tuple[Scenario, float, sizing.Signals]:
+    """Return the scenario with pushes in its recorded runs, what they add to an output, in noise sd, and the
+    outputs with them.
 
-    They are scaled so that they add about `wanted` to the output that shows them most.
+    They are scaled so that they add about `wanted` to the output that shows them most; `still` are the
+    outputs without them.
     """
-    still = sizing.truth_of(s, s.runs, p, effects)
     pushes = [_push(run, rng) for run in s.runs]
 
-    def at(scale: float) -> tuple[Scenario, float]:
+    def at(scale: float) -> tuple[Scenario, float, sizing.Signals]:
         runs = tuple(
             dataclasses.replace(run, fine={**run.fine, "push": scale * push})
             for run, push in zip(s.runs, pushes, strict=True)
         )
-        added = sizing.difference(sizing.truth_of(s, runs, p, effects), still)
+        pushed = sizing.truth_of(s, runs, p, effects)
+        added = sizing.difference(pushed, still)
         sizes = [
             float(np.sqrt(np.mean(np.concatenate([row[k] for row in added]) ** 2))) / s.noise[k].sd
             for k in s.outputs
         ]
-        return dataclasses.replace(s, runs=runs), max(sizes)
+        return dataclasses.replace(s, runs=runs), max(sizes), pushed
 
     scale = 1e-3
     for _ in range(3):

@@ -27,6 +27,19 @@ def right(case: RealCase, verdict: str, reported: tuple[frozenset[str], ...]) ->
     return False
 
 
+def sized(case: RealCase, answer: dict[str, Any]) -> bool:
+    """Return whether every published size is that of a reported effect, by its name or its class."""
+    for name, size, share in case.sizes:
+        values = [
+            abs(float(effect["parameters"][0]["value"]))
+            for effect in answer.get("effects") or []
+            if name in (effect["name"], *effect.get("equivalent_to", ())) and effect.get("parameters")
+        ]
+        if not any(abs(value - size) <= share * size for value in values):
+            return False
+    return True
+
+
 def _error(case: RealCase, answer: dict[str, Any], folder: Path, data: Path) -> str:
     """Return the held-out error before and after in words."""
     if case.score_on and case.truth:
@@ -60,7 +73,7 @@ def _row(
         row["error"] = f"not given ({type(error).__name__})"
     verdict = str(answer["verdict"])
     row["answered"] = f"{verdict}: {names}" if names else verdict
-    row["right"] = "yes" if right(case, verdict, reported) else "no"
+    row["right"] = "yes" if right(case, verdict, reported) and sized(case, answer) else "no"
     return row
 
 

@@ -34,6 +34,8 @@ class RealCase:
     """Names that may stand beside them."""
     make: Callable[[Path, Path], None]
     published: str = ""
+    sizes: tuple[tuple[str, float, float], ...] = ()
+    """Effects whose first parameter is published: a name, its magnitude, and the share it may be off."""
     score_on: str | None = None
     """A file to predict whose outputs are known; its relative error is printed."""
     truth: Callable[[Path], dict[str, np.ndarray]] | None = None
@@ -275,6 +277,7 @@ CASES: tuple[RealCase, ...] = (
         name="emps-force", title="EMPS: force of inertia and viscous friction", folder="emps",
         wanted=(("coulomb_friction", "constant_force"), ("coulomb_friction", "zero_offset")),
         make=emps_force, score_on="pulses.csv", truth=emps_truth,
+        sizes=(("coulomb_friction", 20.4, 0.1), ("constant_force", 3.2, 0.2)),
         published="M 95.1 kg, Fv 203.5 N s/m, Fc 20.4 N, offset -3.2 N (Janot et al.)",
     ),
     RealCase(

@@ -105,16 +105,15 @@ def size_of(scenario: Scenario, effect: Signals, slopes: list[Signals]) -> Size:
     return Size(over_noise=max(by_output.values()), distance=distance, by_output=by_output)
 
 
-def scaled_to(scenario: Scenario, name: str, wanted: float, slopes: list[Signals]) -> tuple[float, Size]:
+def scaled_to(
+    scenario: Scenario, name: str, wanted: float, slopes: list[Signals], without: Signals
+) -> tuple[float, Size]:
     """Return the factor on the effect's base, and the size it reaches; as near the wanted one as is
-    physical."""
+    physical. `without` is what the outputs would be without any effect."""
     spec, p = scenario.effects[name], scenario.true_parameters()
 
     def size_at(factor: float) -> Size:
-        e = {name: spec.at(factor)}
-        there = truth_of(scenario, scenario.runs, p, e)
-        without = without_of(scenario, scenario.runs, p, e)
-        return size_of(scenario, difference(there, without), slopes)
+        return size_of(scenario, change(scenario, p, {name: spec.at(factor)}, without), slopes)
 
     factor = 1.0
     found = size_at(factor)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.built_once import built_once
 from toolkit.version import DISTRIBUTION, __version__
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,10 +33,12 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from hatchling.builders.sdist import SdistBuilder
     from hatchling.builders.wheel import WheelBuilder
 
-    folder = tmp_path_factory.mktemp("dist")
-    for builder in (WheelBuilder, SdistBuilder):
-        list(builder(str(ROOT)).build(directory=str(folder), versions=["standard"]))
-    return folder
+    def build(folder: Path) -> None:
+        for builder in (WheelBuilder, SdistBuilder):
+            list(builder(str(ROOT)).build(directory=str(folder), versions=["standard"]))
+
+    # Once for all workers: the site in it is made in one place of the checkout.
+    return built_once(tmp_path_factory, "dist", build)
 
 
 @pytest.fixture(scope="module")

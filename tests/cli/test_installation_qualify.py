@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import shutil
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from toolkit import __version__
 from toolkit.cli.main import run
+from toolkit.lab.home import packaged_home
 from toolkit.qualification import numbers
+from toolkit.qualification import run as qualification
+from toolkit.qualification.run import QualificationRecord
 
 
 def qualify(*arguments: str) -> int:
@@ -20,15 +24,32 @@ def qualify(*arguments: str) -> int:
     return caught.value.code
 
 
-@pytest.fixture
-def spoiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One digit of one packaged number is changed."""
-    copy = Path(shutil.copytree(numbers.FOLDER, tmp_path / "data"))
+@pytest.fixture(scope="module")
+def records(tmp_path_factory: pytest.TempPathFactory) -> dict[str, QualificationRecord]:
+    """What qualifying finds, and what it finds where one digit of one packaged number is changed."""
+    copy = Path(shutil.copytree(numbers.FOLDER, tmp_path_factory.mktemp("spoiled") / "data"))
     path = copy / "pontius.toml"
     path.write_text(path.read_text().replace("2.16844", "2.16845", 1))
-    monkeypatch.setattr(numbers, "FOLDER", copy)
+    asked = {"calibrations": packaged_home() / "calibrations", "on": datetime.now(tz=UTC).date()}
+    whole = qualification.qualify(**asked)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(numbers, "FOLDER", copy)
+        return {"whole": whole, "spoiled": qualification.qualify(**asked)}
 
 
+@pytest.fixture
+def spoiled(records: dict[str, QualificationRecord], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Qualifying finds a changed digit."""
+    monkeypatch.setattr(qualification, "qualify", lambda **_: records["spoiled"])
+
+
+@pytest.fixture
+def known(records: dict[str, QualificationRecord], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Qualifying was done already: the command is asked what it makes of it."""
+    monkeypatch.setattr(qualification, "qualify", lambda **_: records["whole"])
+
+
+@pytest.mark.usefixtures("known")
 def test_the_record_as_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert qualify() == 0
     text = capsys.readouterr().out
@@ -84,6 +105,7 @@ def test_quiet_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == ""
 
 
+@pytest.mark.usefixtures("known")
 def test_a_record_that_cannot_be_written_is_an_error(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

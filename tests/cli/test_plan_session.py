@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
 import shutil
 import subprocess
@@ -14,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from toolkit.cli.main import run
 from toolkit.simulation.cells import CELLS, LOADS, CellsTruth, outputs
 from toolkit.simulation.session import LOAD_UNITS
 from toolkit.units import to_si
@@ -21,11 +24,27 @@ from toolkit.units import to_si
 CALIBRATIONS = Path(__file__).resolve().parents[2] / "calibrations"
 
 
-def toolkit(*arguments: object, code: int | None = 0) -> subprocess.CompletedProcess[str]:
-    result = subprocess.run(
-        [sys.executable, "-c", "from toolkit.cli.main import run; run()", *map(str, arguments)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+def toolkit(
+    *arguments: object, code: int | None = 0, apart: bool = False
+) -> subprocess.CompletedProcess[str]:
+    """Run the command line on words, in this process or ``apart`` in one of its own."""
+    words = [*map(str, arguments)]
+    if apart:
+        result = subprocess.run(
+            [sys.executable, "-c", "from toolkit.cli.main import run; run()", *words],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    else:
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            pytest.raises(SystemExit) as ended,
+        ):
+            run(words)
+        result = subprocess.CompletedProcess(
+            words, int(ended.value.code or 0), out.getvalue(), err.getvalue()
+        )
     assert code is None or result.returncode == code, result.stdout + result.stderr
     return result
 
@@ -40,7 +59,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def planned(home: Path) -> tuple[Path, dict[str, Any]]:
     out = home / "next"
-    said = toolkit("plan", "session", "m15-virtual", "--out", out, "--home", home, "--json")
+    said = toolkit("plan", "session", "m15-virtual", "--out", out, "--home", home, "--json", apart=True)
     return out, json.loads(said.stdout)
 
 

@@ -1,7 +1,8 @@
 """`make coverage`: how often the intervals that the toolkit prints hold the truth, by simulation.
 
-The tables are those of `docs/coverage.md`: calibration sessions, characteristics of whole virtual tests, and
-parameters of the Magic Formula. Nothing here asserts; a small seeded part runs with the tests.
+The tables are those of `docs/coverage.md`: calibration sessions, characteristics of whole virtual tests,
+parameters of the Magic Formula and of its combined slip, and sound rows that are left alone. Nothing here
+asserts; a small seeded part runs with the tests.
 """
 
 from __future__ import annotations
@@ -10,13 +11,15 @@ import argparse
 import sys
 import time
 
-from tests.coverage import calibration, characteristics, magic_formula
+from tests.coverage import calibration, characteristics, combined_slip, magic_formula, sound_rows
 from tests.coverage.rows import as_table
 
 TABLES = {
     "calibration": calibration.table,
     "characteristics": characteristics.table,
     "magic-formula": magic_formula.table,
+    "combined-slip": combined_slip.table,
+    "sound-rows": sound_rows.table,
 }
 
 

@@ -90,6 +90,11 @@ def readings(cell: Cell, seed: int) -> tuple[Reading, ...]:
     reduced = drawn_test(plan, record, machine, rng)
     found = characterise(reduced, machine=machine, record=record)
     tire = settled(bare, {})
+    # Several characteristics are read off at each load: the tire is asked once.
+    pull = functools.cache(lambda load_N: true_pull(tire, load_N=load_N))
+    stiffness = functools.cache(
+        lambda load_N, rotation: true_stiffness(tire, load_N=load_N, rotation=rotation)
+    )
     made: list[Reading] = []
 
     def hold(name: str, load: int, rotation: str, estimate: Estimate | None, true: float) -> None:
@@ -101,12 +106,11 @@ def readings(cell: Cell, seed: int) -> tuple[Reading, ...]:
     for row in found.rows:
         load = found.loads_N.index(row.load_N)
         if row.name in PULL:
-            truth = true_pull(tire, load_N=row.load_N)
-            hold(row.name, load, "both", row.estimate, getattr(truth, row.name))
+            hold(row.name, load, "both", row.estimate, getattr(pull(row.load_N), row.name))
         elif row.name in STIFFNESS:
             rotation = cast("Rotation", row.rotation)
-            true = true_stiffness(tire, load_N=row.load_N, rotation=rotation)
-            hold(row.name, load, rotation, row.estimate, getattr(true, row.name))
+            true = getattr(stiffness(row.load_N, rotation), row.name)
+            hold(row.name, load, rotation, row.estimate, true)
     return tuple(made)
 
 

@@ -83,6 +83,7 @@ def test_names_are_the_contracts_and_what_is_outside_is_not() -> None:
         assert set(group.present) <= group.members <= CATALOGUE
 
 
+@pytest.mark.usefixtures("entered_here")
 @pytest.mark.parametrize(("bucket", "picked"), QUICK)
 def test_a_case_is_drawn_the_same_again_and_tells_nothing(
     bucket: str, picked: tuple[str, tuple[str, ...]] | None, tmp_path: Path

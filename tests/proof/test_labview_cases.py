@@ -11,6 +11,7 @@ import pytest
 
 from proof import cell_cases, files
 from proof.draw import Drawn, draw_case
+from proof.files import enter
 from proof.labview_cases import HEADER
 
 
@@ -50,6 +51,7 @@ def test_a_mistake_of_the_program_is_in_the_file(effect: str) -> None:
         assert np.abs(wrong[seen] - right[seen]).max() > 0.5 * np.abs(right[seen]).max()
 
 
+@pytest.mark.usefixtures("entered_here")
 def test_the_file_has_the_machines_columns_and_the_case_no_time(tmp_path: Path) -> None:
     case = drawn()
     files.write_case(case.scenario, case.measured, tmp_path / "case")
@@ -71,12 +73,13 @@ def test_the_same_numbers_give_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a.xlsx").read_bytes() == (tmp_path / "b.xlsx").read_bytes()
 
 
+@pytest.mark.usefixtures("entered_here")
 def test_the_older_record_stands_in_the_registry_and_the_case_names_the_newer(tmp_path: Path) -> None:
     case = drawn("wrong_calibration")
     files.write_case(case.scenario, case.measured, tmp_path / "case")
     sessions = sorted((tmp_path / "case" / files.SESSIONS).iterdir())
     tool = [str(Path(sys.executable).with_name("toolkit"))]
-    newest = files.enter(sessions, tmp_path / "calibrations", tool)
+    newest = enter(sessions, tmp_path / "calibrations", tool)
     assert newest.name == "m15-r2.json"
     assert newest.read_bytes() == (tmp_path / "case" / "record.json").read_bytes()
     assert (newest.parent / "m15-r1.json").exists()

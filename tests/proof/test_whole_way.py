@@ -15,7 +15,7 @@ import pytest
 from proof import proof_file, real_cases
 from proof.__main__ import main
 from proof.judge import judge
-from proof.real import right, run_real
+from proof.real import right, run_real, sized
 from proof.running import answer_of
 from tests.conftest import SHARED_DATA
 
@@ -259,6 +259,19 @@ def _case(name: str) -> real_cases.RealCase:
 )
 def test_what_is_right_for_a_recording(case: str, verdict: str, reported: list[set[str]], good: bool) -> None:
     assert right(_case(case), verdict, tuple(frozenset(r) for r in reported)) is good
+
+
+@pytest.mark.parametrize(
+    ("friction", "offset", "good"), [(21.0, -3.0, True), (23.0, -3.0, False), (20.4, 4.0, False)]
+)
+def test_a_published_size_is_asked_as_well(friction: float, offset: float, good: bool) -> None:
+    effects = [
+        {"name": "coulomb_friction", "equivalent_to": [], "parameters": [{"value": friction}]},
+        {"name": "zero_offset", "equivalent_to": ["constant_force"], "parameters": [{"value": offset}]},
+    ]
+    assert sized(_case("emps-force"), {"effects": effects}) is good
+    assert not sized(_case("emps-force"), {"effects": effects[1:]})
+    assert sized(_case("dziuba1"), {"effects": []})
 
 
 def test_recordings_that_are_not_there_are_skipped_with_a_reason(tool: Path, tmp_path: Path) -> None:

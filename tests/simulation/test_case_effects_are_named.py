@@ -1,8 +1,8 @@
 """There and back: an effect that the virtual machine is given is the one that the engine names.
 
 Five recordings of two steering rates, two speeds, both directions and a turned tire; inputs are exact, so
-that the noise of FY and MZ is the cells'. A few effects stand for all in the ordinary run; TOOLKIT_PROOF=1
-takes every one of them.
+that the noise of FY and MZ is the cells'. Two effects stand for all in the ordinary run; `make proof` takes
+every one of them, by TOOLKIT_PROOF=1.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ ALL = (
     "creep.FY=fraction:0.02,time_constant:5s", "hysteresis.FY=50N", "nonlinearity.FY=cubic:3e-9",
     "sensitivity_error.MZ=2%",
 )  # fmt: skip
-USUAL = ("relaxation=0.4m", "steer_offset=0.1deg", "load_lag=0.4s", "channel_delay.FY=30ms")
+USUAL = ("steer_offset=0.1deg", "channel_delay.FY=30ms")
 
 
 @pytest.fixture(scope="module")

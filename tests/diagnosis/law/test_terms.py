@@ -51,7 +51,7 @@ X = { unit = "m", role = "output" }
 def _recorded(seed: int) -> pd.DataFrame:
     """A latch at 0.3 m pushes back: 6 exp(-((x - 0.3)/0.12)^2) N/kg; k is 41, d 1.05, the noise 4 mm."""
     rng = np.random.default_rng(seed)
-    t = np.arange(250) * 0.04
+    t = np.arange(160) * 0.04
     phase = rng.uniform(0, 6, 3)
     force = sum(a * np.sin(w * t + p) for a, w, p in zip((12, 9, 6), (3.1, 5.2, 1.3), phase, strict=True))
 

@@ -116,7 +116,7 @@ def test_friction_that_a_refitted_damping_hides_is_found(tmp_path):
     # torque of 0.24 rad/s^2 against the motion, on a body that never rests.
     frames, text = {}, TORSION_CASE
     for i in range(2):
-        t = np.arange(0, 12, 0.04)
+        t = np.arange(0, 7, 0.04)
         fine = np.linspace(0, t[-1], 60 * (t.size - 1) + 1)
         torque = np.interp(fine, t, 1.5 * np.sin(2.2 * t + i) + 0.9 * np.sin(7.1 * t + 2 * i))
         th, om, path = 0.0, 0.0, []

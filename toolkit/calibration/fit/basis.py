@@ -101,16 +101,11 @@ def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
     design[:, :k] -= middle[:k]
     length[:k] = [_power_of_two(math.sqrt(inner(column, column))) for column in design[:, :k].T]
     design /= length
-    # design column j = (raw_j - middle_j) / length_j
-    unscale = [[Fraction(0)] * p for _ in range(p)]
-    for j in range(p):
-        unscale[j][j] = 1 / Fraction(float(length[j]))
-        if constant and j < k:
-            unscale[k][j] = -Fraction(float(middle[j])) / Fraction(float(length[j]))
-    exact = tuple(
-        tuple(sum((a * unscale[m][j] for m, a in enumerate(row) if a), Fraction(0)) for j in range(p))
-        for row in expand
-    )
+    # design column j = (raw_j - middle_j) / length_j: a coefficient goes into a raw term by its own column,
+    # and into the constant by the middle as well.
+    scale = [1 / Fraction(float(one)) for one in length]
+    shift = [Fraction(float(one)) for one in middle]
+    exact = tuple(_mapped(row, row[k] if constant else Fraction(0), shift, scale) for row in expand)
     return Basis(
         terms=tuple(terms),
         design=design,
@@ -121,6 +116,14 @@ def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
         middle=middle,
         length=length,
     )
+
+
+def _mapped(
+    row: Sequence[Fraction], constant: Fraction, shift: Sequence[Fraction], scale: Sequence[Fraction]
+) -> tuple[Fraction, ...]:
+    # Most places are zero, and a product of rationals costs more than to look.
+    shifted = (a - constant * m if constant and m else a for a, m in zip(row, shift, strict=True))
+    return tuple(a * one if a else a for a, one in zip(shifted, scale, strict=True))
 
 
 def _anchor(values: NDArray[np.float64]) -> float:

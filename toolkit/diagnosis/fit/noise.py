@@ -179,11 +179,18 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) ->
     early = [
         math.sqrt(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) for k in range(p)
     ]  # innovation sd of order p over that of order k
-    for segment in where.segments:
-        x = values[segment.start : min(segment.start + p, segment.stop)]
-        for k in range(len(x)):
-            past = orders[k] @ x[:k][::-1] if k else 0.0
-            innovations[segment.start + k] = (x[k] - past) * early[k]
+    starts = np.array([segment.start for segment in where.segments], dtype=np.intp)
+    rows = np.array([segment.stop for segment in where.segments], dtype=np.intp) - starts
+    # A recording with a gap in every day has hundreds of segments: the first two orders, whose products have
+    # one term at most, are taken of all at once.
+    for k in range(min(p, 2)):
+        at = starts[rows > k] + k
+        past = orders[k][0] * values[at - 1] if k else 0.0
+        innovations[at] = (values[at] - past) * early[k]
+    for start, count in zip(starts.tolist(), rows.tolist(), strict=True):
+        for k in range(2, min(p, count)):
+            past = orders[k] @ values[start : start + k][::-1]
+            innovations[start + k] = (values[start + k] - past) * early[k]
     return innovations / noise.sd
 
 
