@@ -196,7 +196,7 @@ def example(name: str) -> Path:
     'tire.tir'
     """
     from toolkit.errors import ConfigError
-    from toolkit.examples.fig4_4 import packaged_fig4_4
+    from toolkit.examples import packaged_fig4_4
     from toolkit.lab.home import packaged_home
 
     virtual = Path(__file__).parents[1] / "examples" / "virtual"

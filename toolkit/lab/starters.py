@@ -21,8 +21,8 @@ from toolkit.declared import Source, refuse
 from toolkit.declared.describe import outline
 from toolkit.declared.text import attempt, value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
-from toolkit.headers import is_unit, split_header
 from toolkit.inputs import RECORDING_FILE, read_input
+from toolkit.units import is_unit, split_header
 
 FORMS = {
     "session": "toolkit.calibration.session.session_file:SessionFile",

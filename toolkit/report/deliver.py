@@ -1,11 +1,14 @@
 """Make reports and hand them over: staged, verified, then published in their output folders.
 
 Several reports are converted in one call of LibreOffice, whose start is paid for once.
+
+The hand-over: one manifest of what went in and what came out, and the hash of the content.
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -16,11 +19,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import RenderError, ToolkitError
+from toolkit.files import sha256_bytes, sha256_file
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.publication import publication
-from toolkit.recording.marks import refuse_original
+from toolkit.recording.marks import GENERATOR, refuse_original
 from toolkit.report.content import Plot, ReportContent
-from toolkit.report.handover import MANIFEST, content_hash, manifest_json
 from toolkit.report.word.fill import fill, needed_figures
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
@@ -357,3 +360,65 @@ def _reject(stage: Path, out: Path, name: str, reason: str) -> None:
             if file.is_file():
                 file.replace(rejected / file.name)
         (rejected / "reason.txt").write_text(reason + "\n")
+
+
+MANIFEST = "manifest.json"
+_OF_THE_DAY = ("tk:report.date",)
+
+
+def content_hash(filled: Filled, template: Template) -> str:
+    """Return the SHA-256 of what a report says: every printed value, cell, figure, and the template.
+
+    Neither a .docx nor a PDF is the same byte for byte twice, so the content is hashed. The day of issue
+    is left out, and so is what a run took: the same inputs give the same hash on another day. (A row of a
+    table with such a value is hashed by its other values, not as a row of cells.)
+    """
+    passing = {*_OF_THE_DAY, *filled.of_the_run}
+    printed = {
+        "template": template.sha256,
+        "values": [
+            [entry.tag, entry.text, entry.part] for entry in filled.manifest if entry.tag not in passing
+        ],
+        "cells": [row for at, row in enumerate(filled.cells) if at not in filled.rows_of_the_run],
+        "figures": [[tag, alt] for tag, alt in filled.figures],
+        "pictures": filled.pictures,
+        "contents": [[entry.text, entry.level] for entry in filled.contents.entries],
+    }
+    return sha256_bytes(json.dumps(printed, ensure_ascii=False, separators=(",", ":")).encode())
+
+
+def manifest_json(
+    provenance: Mapping[str, Any],
+    content: ReportContent,
+    template: Template,
+    digest: str,
+    outputs: Sequence[Path],
+    ledger: Mapping[str, Any] | None = None,
+    *,
+    missing: Sequence[str] = (),
+) -> str:
+    """Return the manifest: inputs, calibration, software and outputs, each with its SHA-256.
+
+    ``provenance`` holds what the caller knows: the inputs and the software; ``ledger`` is the proof of a
+    document that was issued, ``missing`` are the tags that print a mark in place of a value.
+    """
+    manifest = {
+        "generator": GENERATOR,
+        "schema": 1,
+        "report": content.identity,
+        "issued": content.issued,
+        "content_sha256": digest,
+        "template": {"name": template.path.name, "sha256": template.sha256},
+        "draft": bool(content.draft_reasons),
+        "draft_reasons": list(content.draft_reasons),
+        "signature": content.signature,
+        "calibrations": [calibration.as_dict() for calibration in content.calibrations],
+        "missing": list(missing),
+        **provenance,
+        "outputs": [
+            {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}
+            for output in outputs
+        ],
+        "ledger": ledger,
+    }
+    return json.dumps(manifest, ensure_ascii=False, indent=2) + "\n"

@@ -3,7 +3,7 @@
 - MAT: a vector for each channel and a structure ``channel`` with the lists ``name`` and ``units``, as the
   Tire Test Consortium hands its rounds out;
 - text: a line of names, a line of units below it, then rows of numbers, as the Calspan Tire Research Facility
-  writes them with tabs; or the units beside the names (`toolkit.headers`). Lines above the names are a title.
+  writes them with tabs; or the units beside the names (`toolkit.units`). Lines above the names are a title.
 
 What is no quantity of a tire table (radii, temperatures of the tread, normalised forces) is passed over.
 """
@@ -21,12 +21,11 @@ import numpy as np
 
 from toolkit.channels import CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, UnreadableError
-from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign
 from toolkit.recording.safe_open import gate
 from toolkit.recording.sniff import sniff
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,7 +18,7 @@ from toolkit.calibration.registry.difference import differences
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli import calibration
 from toolkit.errors import ToolkitError
-from toolkit.trust.names import name_key
+from toolkit.trust.people import name_key
 
 Run = Callable[..., tuple[int, dict[str, Any]]]
 FROM = ("--in-force-from", "2026-02-01", "--checked-by", "B")

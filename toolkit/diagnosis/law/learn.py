@@ -15,12 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
-from toolkit.diagnosis.law.among_runs import tells_runs_apart_alone
-from toolkit.diagnosis.law.pulses import pulses_of
 from toolkit.diagnosis.law.ranking import p_value, ranked, responses
-from toolkit.diagnosis.law.terms import terms_of
+from toolkit.diagnosis.law.terms import pulses_of, terms_of
 from toolkit.diagnosis.law.trial import Trial, amplitudes
-from toolkit.diagnosis.law.trials import curve_trial, trials_of, unlocked_tone
+from toolkit.diagnosis.law.trials import curve_trial, tells_runs_apart_alone, trials_of, unlocked_tone
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, best_of

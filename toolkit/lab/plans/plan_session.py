@@ -124,7 +124,7 @@ def _feasible(
     """Return what can be loaded: by a file of fixtures, else by the machine's definition, else as before."""
     from toolkit.calibration.registry.judgement import machine_of
     from toolkit.declared import read
-    from toolkit.machine.loading import LoadingFixtures
+    from toolkit.machine.hub import LoadingFixtures
     from toolkit.planning.fixtures import loads_of_fixtures, loads_of_record
 
     machine = machine_of(record.instrument, order.machine)

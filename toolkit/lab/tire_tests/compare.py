@@ -132,7 +132,7 @@ def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, li
 
 def _write_figures(comparison: Comparison, style: Style, stage: Path, folder: Path) -> dict[str, Path]:
     """Write the figures of a comparison; return their paths in their folder by name."""
-    from toolkit.report.comparison.plots import comparison_plots
+    from toolkit.report.comparison.content import comparison_plots
     from toolkit.report.figures import draw
 
     drawn = {}

@@ -82,7 +82,7 @@ def laboratories_answer(
 def _figures(comparison: LaboratoryComparison, folder: Path, together: ExitStack) -> dict[str, Path]:
     from toolkit.publication import publication
     from toolkit.report.figures import draw
-    from toolkit.report.laboratories.plots import laboratory_plots
+    from toolkit.report.laboratories.content import laboratory_plots
 
     stage = together.enter_context(publication(folder))
     plots = laboratory_plots(comparison)

@@ -2,6 +2,8 @@
 
 Errors keep a report from being made; warnings do not. What makes a file unsafe to open is refused
 earlier, by `toolkit.report.word.package`.
+
+What a template check advises: on tables over several pages, and on texts that nobody filled in.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
-from toolkit.report.word.advice import advice, placeholders
+from toolkit.report.word.language import fixed_texts
 from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import (
@@ -31,8 +33,10 @@ from toolkit.report.word.scan import (
 )
 from toolkit.report.word.xml import (
     SDT_CONTENT,
+    SDT_PR,
     W_P,
     W_SDT,
+    W_T,
     W_TC,
     W_TR,
     Element,
@@ -356,3 +360,81 @@ def _broken(parts: list[Story], words: Vocabulary) -> Iterator[LintFinding]:
 
 
 __all__ = ["RULES", "LintFinding", "check_stories", "check_template"]
+
+
+# A text that stands for another one: marks of work undone, the filler of printers, the towns and people of
+# specimen forms, a name in brackets, and the domains that RFC 2606 keeps for examples.
+_PLACEHOLDER = re.compile(
+    r"\b(?:TODO|TBD|FIXME|X{3,}|lorem ipsum|Muster(?:stadt|straße|mann|frau|firma)|Anytown"
+    r"|(?:\w+\.)?example\.(?:com|org|net)|Ville-Exemple)\b"
+    r"|[\[<](?!\s)[^\W\d_]+ [^\[\]<>{}]+[\]>]",
+    re.IGNORECASE,
+)
+
+
+def placeholders(parts: list[Story], style: Style) -> Iterator[LintFinding]:
+    """Yield texts of a template and its style file that stand for what somebody was to write there."""
+    for element in fixed_texts(parts):
+        found = _PLACEHOLDER.search(element.text or "")
+        if found:
+            story = next(story for story in parts if element in story.root.iter(W_T))
+            yield _finding(
+                "placeholder", story, element, f"{found[0]!r} stands for a text of yours: write it"
+            )
+    for story in parts:
+        for control in story.root.iter(W_SDT):
+            prompt = control.find(f"{SDT_PR}/{q('w:showingPlcHdr')}")
+            if prompt is not None and control_tag(control) is None:
+                message = "a control that is not the toolkit's shows its prompt, which would be printed"
+                yield _finding("placeholder", story, control, message)
+    for text in sorted(style.texts):
+        found = _PLACEHOLDER.search(text)
+        if found:
+            yield LintFinding(
+                rule="placeholder", level="warning", part="style file", place=text,
+                message=f"{found[0]!r} stands for a text of yours: write it",
+            )  # fmt: skip
+
+
+def advice(sites: list[Site]) -> Iterator[LintFinding]:
+    """Yield notes on tables that will not read well over several pages, and words that will vanish."""
+    for site in sites:
+        if site.tag.family != "table" or (table := table_of(site)) is None:
+            continue
+        rows = own_rows(table)
+        if len(rows) > 1 and rows[0].find(f"{q('w:trPr')}/{q('w:tblHeader')}") is None:
+            yield _note(
+                site, rows[0], "header-row",
+                f"{site.tag}: no header row is repeated on the next page: Table Layout, Repeat Header Rows",
+            )  # fmt: skip
+        patterns = {id(row): row for other in sites if (row := _prototype(table, other)) is not None}
+        for row in patterns.values() if patterns else rows[-1:]:
+            if row.find(f"{q('w:trPr')}/{q('w:cantSplit')}") is None:
+                yield _note(
+                    site, row, "split-row",
+                    f"{site.tag}: a row may break across pages: Table Properties, Row, clear 'Allow row to "
+                    "break across pages'",
+                )  # fmt: skip
+        if site.form == "literal" and site.element.tag == W_P:
+            rest = LITERAL.sub("", "".join(text.text or "" for text in site.element.iter(W_T))).strip()
+            if rest:
+                yield _note(
+                    site, site.element, "table-paragraph",
+                    f"{site.tag} shares its paragraph with {rest[:40]!r}: let the tag stand alone in it",
+                )  # fmt: skip
+
+
+def _prototype(table: Element, site: Site) -> Element | None:
+    return row_in(table, site.element) if site.tag.family == "row" else None
+
+
+def _finding(rule: str, story: Story, element: Element, message: str) -> LintFinding:
+    return LintFinding(
+        rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message
+    )
+
+
+def _note(site: Site, element: Element, rule: str, message: str) -> LintFinding:
+    return LintFinding(
+        rule=rule, level="note", part=site.story.name, place=place_of(element, site.story), message=message
+    )
