@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 from toolkit.audit.model import CLEAN
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import summary
-from toolkit.characteristics.derivations import half_at_zero, secant
 from toolkit.characteristics.groups import CHANNELS
+from toolkit.characteristics.reading import half_at_zero, secant
 from toolkit.findings import Finding, Level
 from toolkit.machine import load_machine, machine_names
 from toolkit.reduction.physics import RULES
@@ -167,7 +167,7 @@ def _stiffness(near: tuple[Point, Point], load: float, rotation: Rotation) -> li
 
 
 def _pull(F: tuple[float, ...], R: tuple[float, ...], load: float) -> list[Effect]:
-    # In axes that follow the travel; see `toolkit.characteristics.derivations`.
+    # In axes that follow the travel; see `toolkit.characteristics.reading`.
     return [
         Effect(
             load_N=load,

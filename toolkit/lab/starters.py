@@ -28,7 +28,7 @@ FORMS = {
     "session": "toolkit.calibration.session.session_file:SessionFile",
     "machine": "toolkit.machine.definition:Machine",
     "test": "toolkit.recording.folder:StatedTest",
-    "case": "toolkit.diagnosis.case.case_file:CaseFile",
+    "case": "toolkit.diagnosis.case.reader:CaseFile",
     "plan": "toolkit.simulation.plan_file:PlanFile",
 }
 """Word of the command -> the class that declares its file."""

@@ -24,11 +24,11 @@ from toolkit.inputs import PDF_FILE, read_input
 from toolkit.publication import publication
 from toolkit.recording.marks import GENERATOR, refuse_original
 from toolkit.report.content import Plot, ReportContent
+from toolkit.report.word.chart import with_alternatives
 from toolkit.report.word.fill import fill, needed_figures
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
 from toolkit.report.word.package import Template
-from toolkit.report.word.spoken import with_alternatives
 from toolkit.report.word.toc_pages import Printed, print_copies
 from toolkit.report.word.verify import Check, verify_docx, verify_pdf
 

@@ -14,8 +14,8 @@ import typer
 from tests.calibration.calibration_factory import hub_data
 from tests.calibration.registry.test_candidate_legacy import GOOD
 from toolkit.calibration.registry.candidate import calibrate, import_legacy
-from toolkit.calibration.registry.difference import differences
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.response import differences
 from toolkit.cli import calibration
 from toolkit.errors import ToolkitError
 from toolkit.trust.people import name_key

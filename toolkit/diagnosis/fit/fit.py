@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from toolkit.diagnosis.fit.descent import Derivatives, descend
+from toolkit.diagnosis.fit.descent import Derivatives, Space, descend
 from toolkit.diagnosis.fit.noise import (
     Autoregression,
     Layout,
@@ -18,7 +18,6 @@ from toolkit.diagnosis.fit.noise import (
     log_likelihood,
     whiten,
 )
-from toolkit.diagnosis.fit.space import Space
 from toolkit.diagnosis.policy import NOISE
 from toolkit.effects.applied import AppliedEffect
 

@@ -24,10 +24,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.descent import Derivatives
+from toolkit.diagnosis.fit.descent import Derivatives, Space
 from toolkit.diagnosis.fit.fit import Fit, fit, jacobian
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, log_likelihood, whiten
-from toolkit.diagnosis.fit.space import Space
 from toolkit.diagnosis.policy import ROWS, SCATTER
 from toolkit.effects.applied import AppliedEffect
 

@@ -17,8 +17,14 @@ import numpy as np
 from toolkit.diagnosis.fit.folds import hold_out, matters
 from toolkit.diagnosis.law.ranking import p_value, ranked, responses
 from toolkit.diagnosis.law.terms import pulses_of, terms_of
-from toolkit.diagnosis.law.trial import Trial, amplitudes
-from toolkit.diagnosis.law.trials import curve_trial, tells_runs_apart_alone, trials_of, unlocked_tone
+from toolkit.diagnosis.law.trial import (
+    Trial,
+    amplitudes,
+    curve_trial,
+    tells_runs_apart_alone,
+    trials_of,
+    unlocked_tone,
+)
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, best_of

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
-from toolkit.report.word.language import fixed_texts
 from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import (
@@ -23,6 +22,7 @@ from toolkit.report.word.scan import (
     broken_literals,
     control_tag,
     filled_by,
+    fixed_texts,
     misspelt,
     own_rows,
     place_of,

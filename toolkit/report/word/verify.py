@@ -298,7 +298,7 @@ def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
 
 def _pdf_strings(text: str) -> tuple[bytes, bytes]:
     # Alternative texts stand as UTF-16 in hexadecimal in objects that are not packed: in capital letters by
-    # LibreOffice, in small ones where `toolkit.report.word.spoken` wrote them.
+    # LibreOffice, in small ones where `toolkit.report.word.chart` wrote them.
     written = b"<" + (codecs.BOM_UTF16_BE + clean(text).replace("\n", " ").encode("utf-16-be")).hex().encode()
     return written.upper() + b">", written + b">"
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from toolkit.calibration.fit.forward_search import RISK, contradicting
+from toolkit.calibration.fit.robust import RISK, contradicting
 
 
 def plane(rows: int, terms: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
