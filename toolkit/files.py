@@ -175,12 +175,12 @@ def real_path(path: Path) -> Path:
         return path.absolute()
 
 
-def same_file(one: Path, other: Path) -> bool:
+def same_file(path: Path, twin: Path) -> bool:
     """Tell whether two paths lead to one place, by links or where a file system takes A for a."""
     with contextlib.suppress(OSError, ValueError):
-        if one.samefile(other):
+        if path.samefile(twin):
             return True
-    return real_path(one) == real_path(other)
+    return real_path(path) == real_path(twin)
 
 
 def is_number(value: object) -> TypeGuard[int | float]:

@@ -99,18 +99,18 @@ class Delivered:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a person should look at although the report was delivered."""
-        said = [f"{finding.rule}: {finding.message}" for finding in self.filled.lint]
-        said += [f"{check.name}: {check.message}" for check in self.checks if not check.ok]
-        said += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
+        lines = [f"{finding.rule}: {finding.message}" for finding in self.filled.lint]
+        lines += [f"{check.name}: {check.message}" for check in self.checks if not check.ok]
+        lines += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
         if self.untranslated:
-            said += [
+            lines += [
                 f"untranslated: {len(self.untranslated)} finding(s) are printed in English, first: "
                 f"{self.untranslated[0]}"
             ]
-        said += [
+        lines += [
             f"mark-added: the template has no place for the mark {name!r}" for name in self.filled.marks_added
         ]
-        return tuple(said)
+        return tuple(lines)
 
 
 def deliver(

@@ -36,14 +36,14 @@ def list_tags(content: ReportContent | None, style: Style, vocabulary: Vocabular
     """Return every tag as a JSON-ready dict; ``available`` and ``value`` are null without a test."""
     entries = vocabulary.entries
     listed = {entry.path for entry in entries}
-    more = [
+    families = [
         Entry(
             path=path, kind=value.kind, description="coefficient of the calibration record", unit=value.unit
         )
         for path, value in (content.values if content else {}).items()
         if path not in listed
     ]
-    return [_tag(entry, content, style, vocabulary) for entry in (*entries, *more)]
+    return [_tag(entry, content, style, vocabulary) for entry in (*entries, *families)]
 
 
 def _tag(entry: Entry, content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> dict[str, Any]:

@@ -115,8 +115,8 @@ def _run(
 
 def _record_beside(simulation: Simulation, path: Path) -> Path | None:
     """Return the calibration's file where the case names one, None for a registry's id."""
-    named = path.parent / simulation.calibration
-    return named if simulation.calibration and is_regular(named) else None
+    record_file = path.parent / simulation.calibration
+    return record_file if simulation.calibration and is_regular(record_file) else None
 
 
 def _different_files(recording: Recording, path: Path, source: Source) -> None:
@@ -137,15 +137,15 @@ def _different_content(runs: tuple[Run, ...], recording: Recording, source: Sour
     for number, run in enumerate(runs):
         # An output that stands still may well repeat itself.
         if run.sha256 in first and any(len(set(run.columns.get(output, ()))) > 1 for output in outputs):
-            same = f"{run.name}, the same bytes as {first[run.sha256]}"
-            _refuse_twice(number, same, "another recording", source)
+            statement = f"{run.name}, the same bytes as {first[run.sha256]}"
+            _refuse_twice(number, statement, "another recording", source)
         first.setdefault(run.sha256, run.name)
 
 
-def _refuse_twice(number: int, file: str, other: str, source: Source) -> None:
+def _refuse_twice(number: int, file: str, earlier: str, source: Source) -> None:
     fault = Fault(
         key=("recording", "run", number, "file"), got=file, what="a recording stands twice",
-        expected=f"{other}: a run that is held out must not have been seen", form=FORMAT,
+        expected=f"{earlier}: a run that is held out must not have been seen", form=FORMAT,
     )  # fmt: skip
     refuse([fault], source)
 

@@ -63,18 +63,18 @@ def read_run(
     units = {channel.name: channel.unit for channel in channels}
     # Another program's output stands in the unit of the channel that it is held against.
     units = {column: units.get(output, "") for output, column in simulated.items()} | units
-    table, present, own = _read(path, data, machine=machine, units=units)
+    table, present, own_names = _read(path, data, machine=machine, units=units)
     columns: dict[str, NDArray[np.float64]] = {}
     for channel in channels:
         if channel.name in table:
             columns[channel.name] = table[channel.name]
         elif channel.role != "output" or (not predict):
             raise missing_column(path, channel.name, present)
-    others: dict[str, NDArray[np.float64]] = {}
+    further: dict[str, NDArray[np.float64]] = {}
     for output, column in simulated.items():
         if column not in table:
             raise missing_column(path, column, present)
-        others[output] = table[column]
+        further[output] = table[column]
     if not table:
         raise missing_column(path, channels[0].name if channels else "", present)
     rows = len(next(iter(table.values())))
@@ -90,8 +90,8 @@ def read_run(
             filled += [(channel.name, missing)] if missing else []
             columns[channel.name] = _filled(path, channel.name, t, columns[channel.name])
     return Run(
-        name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others,
-        filled=tuple(filled), sha256=sha256_bytes(data), own=own,
+        name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared,
+        simulated=further, filled=tuple(filled), sha256=sha256_bytes(data), own=own_names,
     )  # fmt: skip
 
 
@@ -213,42 +213,42 @@ def read_csv(data: bytes, units: Mapping[str, str], *, where: Path) -> dict[str,
         UnitError: a header states a unit of another dimension
     """
     text = decode(data, where=where)
-    wanted = units.keys()
+    columns = units.keys()
     try:
-        separator = _separator(text, wanted, where)
+        separator = _separator(text, columns, where)
         decimal = _decimal(text, separator, where)
         if decimal == ",":
             text = text.replace(",", ".")
         rows = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True)
-        parted = [split_header(cell, wanted.__contains__) for cell in next(rows, [])]
+        parted = [split_header(cell, columns.__contains__) for cell in next(rows, [])]
         header = [name for name, _ in parted]
-        doubled = sorted({name for name in header if name in wanted and header.count(name) > 1})
+        doubled = sorted({name for name in header if name in columns and header.count(name) > 1})
         if doubled:
             raise ColumnError(
                 "a column stands twice", where=where, got=", ".join(doubled), expected="different names",
                 next_step="rename or remove one", rule="case-run",
             )  # fmt: skip
-        made = _quick(text, header, separator)
-        if made is None:
-            made = _careful(rows, header, wanted, where)
+        table = _quick(text, header, separator)
+        if table is None:
+            table = _careful(rows, header, columns, where)
     except csv.Error as error:
         raise _unreadable(where, str(error), "CSV: a header row and rows of numbers") from error
-    if not len(made):
+    if not len(table):
         raise _unreadable(where, "no rows of numbers", "a header and rows")
     return {
-        name: _converted(made[:, i], stated, units[name], f"{where}, column {name}")
+        name: _converted(table[:, i], stated, units[name], f"{where}, column {name}")
         for i, (name, stated) in enumerate(parted)
-        if name in wanted
+        if name in columns
     }
 
 
-def _separator(text: str, wanted: Collection[str], where: Path) -> str:
-    def known(header: str) -> bool:
-        return split_header(header, wanted.__contains__)[0] in wanted
+def _separator(text: str, columns: Collection[str], where: Path) -> str:
+    def is_column(header: str) -> bool:
+        return split_header(header, columns.__contains__)[0] in columns
 
     head = first_line(text)
     # Where no separator parts any name, the one that parts the most cells says best what is wrong.
-    return separator_of(head, known, where=where) or max(SEPARATORS, key=head.count)
+    return separator_of(head, is_column, where=where) or max(SEPARATORS, key=head.count)
 
 
 def _decimal(text: str, separator: str, where: Path) -> str:
@@ -258,11 +258,11 @@ def _decimal(text: str, separator: str, where: Path) -> str:
 
 
 def _converted(
-    values: NDArray[np.float64], stated: str | None, wanted: str, where: str
+    values: NDArray[np.float64], stated: str | None, channel_unit: str, where: str
 ) -> NDArray[np.float64]:
-    if stated is None or stated == wanted:
+    if stated is None or stated == channel_unit:
         return values
-    source, target = unit(stated, where=where), unit(wanted, where=where)
+    source, target = unit(stated, where=where), unit(channel_unit, where=where)
     if source.dimension != target.dimension:
         raise UnitError(
             "a channel's unit does not fit the recording's", where=where, got=target.text,
@@ -284,14 +284,14 @@ def missing_column(where: Path, name: str, names: Iterable[str]) -> ColumnError:
     )  # fmt: skip
 
 
-def header_of(data: bytes, wanted: Collection[str] = (), *, where: Path) -> list[str]:
+def header_of(data: bytes, columns: Collection[str] = (), *, where: Path) -> list[str]:
     """Return the names in a file's header row; none where it cannot be read."""
     try:
         text = decode(data, where=where)
         rows = csv.reader(
-            io.StringIO(text, newline=""), delimiter=_separator(text, wanted, where), skipinitialspace=True
+            io.StringIO(text, newline=""), delimiter=_separator(text, columns, where), skipinitialspace=True
         )
-        return [split_header(cell, wanted.__contains__)[0] for cell in next(rows, []) if cell.strip()]
+        return [split_header(cell, columns.__contains__)[0] for cell in next(rows, []) if cell.strip()]
     except (UnreadableError, csv.Error):
         return []
 
@@ -312,10 +312,10 @@ def _quick(text: str, header: list[str], separator: str) -> NDArray[np.float64] 
 
 
 def _careful(
-    rows: Iterable[list[str]], header: list[str], wanted: Collection[str], where: Path
+    rows: Iterable[list[str]], header: list[str], columns: Collection[str], where: Path
 ) -> NDArray[np.float64]:
     table: list[list[float]] = []
-    used = [name in wanted for name in header]
+    is_used = [name in columns for name in header]
     for number, row in enumerate(rows, start=2):
         if not any(cell.strip() for cell in row):
             continue
@@ -328,7 +328,7 @@ def _careful(
         table.append(
             [
                 _number(cell, f"{where}, line {number}, column {name}") if use else math.nan
-                for cell, name, use in zip(row, header, used, strict=True)
+                for cell, name, use in zip(row, header, is_used, strict=True)
             ]
         )
     return np.array(table, dtype=np.float64).reshape(len(table), len(header))

@@ -199,7 +199,7 @@ def parameters_of(model: ModelFile, first: tuple[CaseParameter, ...] = ()) -> tu
             bounds=parameter.bounds,
         )
         for parameter in model.parameters
-        if parameter.name not in {each.name for each in first}
+        if parameter.name not in {parameter_before.name for parameter_before in first}
     )
     return (*first, *further)
 

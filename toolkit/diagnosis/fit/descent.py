@@ -63,12 +63,12 @@ class Derivatives:
         """Return the derivatives at a vector: known ones, corrected ones, or those by differences."""
         if self._last is None:
             return self.anew(x)
-        before, there, slopes = self._last
+        before, parts, slopes = self._last
         step = x - before
         if not step.any():
             return slopes
         simulated = self.space.simulated(x)
-        moved = {name: column - there[name] for name, column in simulated.items()}
+        moved = {name: column - parts[name] for name, column in simulated.items()}
         off = {name: change - slopes[name] @ step for name, change in moved.items()}
         if weighing.size(off) > max(_BENT * weighing.size(moved), _NOTHING):
             return self.anew(x)
@@ -88,8 +88,8 @@ class Derivatives:
         simulated = self.space.simulated(x)
         moved = {name: column - there[name] for name, column in simulated.items()}
         off = {name: change - slopes[name] @ (x - begun) for name, change in moved.items()}
-        way = weighing.size(moved)
-        return way < _NOTHING or weighing.size(off) < _STRAIGHT * way
+        step = weighing.size(moved)
+        return step < _NOTHING or weighing.size(off) < _STRAIGHT * step
 
 
 class Weighing:
@@ -191,13 +191,13 @@ class Space:
         """
         active = tuple(applied for applied in active if not applied.effect.from_digits)
         sizes, low, high = [], [], []
-        for one in problem.free:
-            size = one.sd or abs(one.value) or 1.0
+        for nominal in problem.free:
+            size = nominal.sd or abs(nominal.value) or 1.0
             sizes.append(size)
-            bounds = one.bounds or (-math.inf, math.inf)
-            reach = PRIORS.within * one.sd if one.sd else math.inf
-            low.append(max(bounds[0], one.value - reach) / size)
-            high.append(min(bounds[1], one.value + reach) / size)
+            bounds = nominal.bounds or (-math.inf, math.inf)
+            reach = PRIORS.within * nominal.sd if nominal.sd else math.inf
+            low.append(max(bounds[0], nominal.value - reach) / size)
+            high.append(min(bounds[1], nominal.value + reach) / size)
         for applied in active:
             for parameter in applied.searched:
                 size = _size(applied, parameter.name)

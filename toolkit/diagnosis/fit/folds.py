@@ -64,8 +64,8 @@ def folds_of(problem: Problem, fit: Fit) -> Folds:
         masks = []
         for k in range(count):
             mask = np.zeros(problem.rows, dtype=bool)
-            for one in runs[k::count]:
-                mask[one] = True
+            for position in runs[k::count]:
+                mask[position] = True
             masks.append(mask)
         return Folds(held=tuple(masks), by_run=True)
     masks = []
@@ -216,11 +216,11 @@ class UnseenRun:
         stacked = np.stack([residual, np.ones(where.n), simulated / size], axis=1)
         white = whiten(stacked, where, noise)
         columns, innovations = white[:, 1:], white[:, 0]
-        rest = float(innovations @ innovations)
+        remainder = float(innovations @ innovations)
         return UnseenRun(
             n=where.n,
-            constant=log_likelihood(residual, where, noise) + 0.5 * rest,
-            rest=rest,
+            constant=log_likelihood(residual, where, noise) + 0.5 * remainder,
+            rest=remainder,
             inner=columns.T @ columns,
             outer=columns.T @ innovations,
         )
@@ -249,10 +249,10 @@ def scattered_scores(runs: Sequence[UnseenRun], *, by_run: bool) -> tuple[float,
 def _sizes(runs: Sequence[UnseenRun]) -> list[tuple[float, float]]:
     """Return scatters of zero and gain: none, and from below what a run can show to all that it leaves."""
     largest = math.sqrt(max(run.rest for run in runs))
-    seen = np.sqrt(np.max([np.diag(run.inner) for run in runs], axis=0))
+    sizes = np.sqrt(np.max([np.diag(run.inner) for run in runs], axis=0))
     zeros, gains = (
         [0.0, *np.geomspace(SCATTER.least, max(largest, 2 * SCATTER.least), _GRID) / max(one, 1e-150)]
-        for one in seen.tolist()
+        for one in sizes.tolist()
     )
     return [(float(zero), float(gain)) for zero in zeros for gain in gains]
 
@@ -267,8 +267,8 @@ def _scores(runs: Sequence[UnseenRun], zero: float, gain: float) -> tuple[float,
     for run in runs:
         # Woodbury: of the covariance 1 + X S X' only a matrix of two rows is left.
         middle = np.eye(2) + scale[:, None] * run.inner * scale[None, :]
-        taken = scale * run.outer
-        squares.append(max(run.rest - float(taken @ np.linalg.solve(middle, taken)), 0.0))
+        scaled = scale * run.outer
+        squares.append(max(run.rest - float(scaled @ np.linalg.solve(middle, scaled)), 0.0))
         halves.append(0.5 * math.log(max(float(np.linalg.det(middle)), 1.0)))
     n = sum(run.n for run in runs)
     noise = math.sqrt(max(sum(squares) / n, 1.0))  # no rows are quieter for not having been seen

@@ -38,9 +38,9 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
     formula that says the same.
     """
     predicting = any(law.predicts for law in laws.listed)
-    asked = predicting or _leaves_process_noise(search)
+    is_asked = predicting or _leaves_process_noise(search)
     beside = any(step.active.key == applied.key for step in search.steps for applied in laws.fit.active)
-    if not beside or not asked or not laws.complete:
+    if not beside or not is_asked or not laws.complete:
         return search, laws
     alone = learned(search, withdrawn=True, budget=budget)
     if not any(law.predicts for law in alone.listed) or _parameters(alone.fit) >= _parameters(laws.fit):
@@ -63,7 +63,7 @@ def _leaves_process_noise(search: Search) -> bool:
     if motion is None or not motion.integrates:
         return False
     parts = [noise_parts(search.problem, search.augmented, name) for name in search.problem.names]
-    return any(each.process_sd > each.sensor_sd for each in parts)
+    return any(part.process_sd > part.sensor_sd for part in parts)
 
 
 def _same(search: Search, alone: Laws) -> bool:
@@ -98,9 +98,9 @@ def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[
     try:
         for dropped in _choices(search.steps):
             budget.check(f"laws without {', '.join(step.active.effect.name for step in dropped)}")
-            made = _dropped(search, laws, dropped)
-            if made is not None:
-                return without_imitations(*made, budget)
+            refit = _dropped(search, laws, dropped)
+            if refit is not None:
+                return without_imitations(*refit, budget)
     except BudgetSpentError:
         laws = replace(laws, complete=False)
     return search, laws
@@ -145,5 +145,5 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
         held_augmented=held_out,
         structure=search.structure if steps else search.structure_before,
     )
-    told = tuple(replace(law, applied=values.get(law.applied.key, law.applied)) for law in laws.listed)
-    return searched, replace(laws, listed=told, fit=bare, held_out=scores)
+    updated = tuple(replace(law, applied=values.get(law.applied.key, law.applied)) for law in laws.listed)
+    return searched, replace(laws, listed=updated, fit=bare, held_out=scores)

@@ -78,8 +78,8 @@ def _periods(x: Array, _: Array) -> list[dict[str, float]]:
 def _times(_: Array, t: Array) -> list[dict[str, float]]:
     steps = np.diff(t)
     steps = steps[steps > 0]
-    row, whole = float(np.median(steps)), float(np.sum(steps))
-    return [{"tau": tau} for tau in np.geomspace(2 * row, max(whole / 4, 4 * row), LAWS.times).tolist()]
+    row, duration = float(np.median(steps)), float(np.sum(steps))
+    return [{"tau": tau} for tau in np.geomspace(2 * row, max(duration / 4, 4 * row), LAWS.times).tolist()]
 
 
 def _modes(x: Array, t: Array) -> list[dict[str, float]]:

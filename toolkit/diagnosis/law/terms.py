@@ -44,13 +44,13 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
         force = reduced(motion.units(channel)[0])
         listed = _signals(problem, motion, channel, of)
         steady = [signal for signal in listed if signal.steady]
-        made: list[tuple[Shape, tuple[Signal, ...]]] = [
+        arguments: list[tuple[Shape, tuple[Signal, ...]]] = [
             (shape, (signal,)) for signal in listed for shape in ONE
         ]
         for pair in itertools.combinations(steady, 2):
             alike = pair[0].unit == pair[1].unit
-            made += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]
-        for shape, signals in made:
+            arguments += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]
+        for shape, signals in arguments:
             yield from started(problem, shape, signals, "enters", channel, force=force)
 
 
@@ -68,28 +68,28 @@ def _signals(problem: Problem, motion: Moving, channel: str, of: str) -> list[Si
     """Return what a law in the equation of a state may read: itself first, then its position, then others."""
     sizes = motion.sizes(channel, lambda _: 1.0)
     _, speed, position = map(reduced, motion.units(channel))
-    both_ways = np.linspace(-1, 1, 41)
-    own = sizes.fastest * both_ways if of == "velocity" else np.linspace(0, sizes.level, 41)
-    listed = [Signal(written=f"[{ITSELF}]", name=channel, unit=speed, values=own)]
-    known = {channel}
+    symmetric = np.linspace(-1, 1, 41)
+    grid = sizes.fastest * symmetric if of == "velocity" else np.linspace(0, sizes.level, 41)
+    listed = [Signal(written=f"[{ITSELF}]", name=channel, unit=speed, values=grid)]
+    names = {channel}
     if sizes.has_position:
         name = motion.position(channel) or POSITION
-        way = sizes.farthest * both_ways
+        way = sizes.farthest * symmetric
         listed.append(Signal(written=f"[{POSITION}]", name=name, unit=position, values=way))
-        known.add(name)
-    others = [
+        names.add(name)
+    inputs = [
         (state.name, state.unit, np.array(state.quantiles))
         for state in motion.states
-        if state.name not in known
+        if state.name not in names
     ]
     for driver in problem.case.drivers:
         columns = [run.columns[driver.name] for run in problem.runs if driver.name in run.columns]
         if len(columns) == len(problem.runs) and all(np.isfinite(column).all() for column in columns):
-            others.append((driver.name, reduced(problem.case.unit(driver.name)), np.concatenate(columns)))
+            inputs.append((driver.name, reduced(problem.case.unit(driver.name)), np.concatenate(columns)))
     times = np.concatenate([run.t for run in problem.runs])
     moving = [
         Signal(written=f"[{name}]", name=name, unit=text, values=values, steady=name != TIME)
-        for name, text, values in (*others, (TIME, "s", times))
+        for name, text, values in (*inputs, (TIME, "s", times))
         if np.ptp(values) > 1e-9 * np.abs(values).max(initial=0.0)
     ]
     return listed + moving
@@ -118,8 +118,8 @@ def _strongest(
         near = np.abs(run.t[:, None] - np.array(best)).min(axis=1) <= np.diff(grid).max()
         best = _best_pair(problem, base, screen, run, channel, force, run.t[near])
     if best is not None:
-        made = _pulse(problem, run, channel, force, *best, row)
-        yield replace(made, looked=len(grid) * (len(grid) - 1) // 2)
+        best_pulse = _pulse(problem, run, channel, force, *best, row)
+        yield replace(best_pulse, looked=len(grid) * (len(grid) - 1) // 2)
 
 
 def _pulse(

@@ -184,12 +184,16 @@ def _way(problem: Problem, name: str, text: str, speed: Array) -> Signal:
     """Return the way of a recorded speed from the first row of each run on."""
     written = f"way([{name}])"
     law = formula(written)
-    ways = [
+    candidates = [
         law({name: speed[rows]}, {}, run.t) for run, rows in zip(problem.runs, problem.slices, strict=True)
     ]
     unit_of_way = reduced(f"{bracketed(text)}*s")
     return Signal(
-        written=written, name=f"way of {name}", unit=unit_of_way, values=np.concatenate(ways), steady=False
+        written=written,
+        name=f"way of {name}",
+        unit=unit_of_way,
+        values=np.concatenate(candidates),
+        steady=False,
     )
 
 
@@ -234,13 +238,13 @@ def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
             good = problem.kept[output][rows]
             turn = 2 * math.pi * frequency * run.t[good]
             columns = np.stack([np.sin(turn), np.cos(turn)], axis=1)
-            both = np.linalg.lstsq(columns, base.residual[output][rows][good], rcond=None)[0]
-            listed.append(float(np.hypot(*both)))
+            solution = np.linalg.lstsq(columns, base.residual[output][rows][good], rcond=None)[0]
+            listed.append(float(np.hypot(*solution)))
         return np.array(listed)
 
     # A line is as wide as a run is short: between the frequencies of a spectrum stands the true one.
     near = line.frequency + np.linspace(-1, 1, LAWS.tones) / longest
-    frequency = float(max(near, key=lambda each: float(np.sum(amplitudes_at(each) ** 2))))
+    frequency = float(max(near, key=lambda candidate: float(np.sum(amplitudes_at(candidate) ** 2))))
     amplitudes_of = amplitudes_at(frequency)
     time = signals_of(problem, base, output)[-1:]
     start = {"a": float(np.mean(amplitudes_of)), "frequency": frequency, "phase": math.nan}
@@ -266,8 +270,8 @@ def _events(problem: Problem, base: Fit, output: str) -> Iterator[Trial]:
         shape = Shape(form="event", text=text, units={"a": "{y}"})
         times = np.array([event.start, event.end])
         signal = Signal(written="[time]", name="time", unit="s", values=times, steady=False)
-        made = trial_at(problem, shape, (signal,), "adds", output, {})
-        yield replace(made, looked=event.looked, applied=replace(made.applied, runs=frozenset({event.run})))
+        trial = trial_at(problem, shape, (signal,), "adds", output, {})
+        yield replace(trial, looked=event.looked, applied=replace(trial.applied, runs=frozenset({event.run})))
 
 
 def tells_runs_apart_alone(trial: Trial, looked: int, runs: Sequence[tuple[Array, Array, Array]]) -> bool:
@@ -297,10 +301,10 @@ def _parts(runs: Sequence[tuple[Array, Array]]) -> tuple[float, float]:
     designs = [np.column_stack([np.ones(len(simulated)), simulated]) for simulated, _ in runs]
     stacked = np.concatenate([error for _, error in runs])
     common = np.linalg.lstsq(np.vstack(designs), stacked, rcond=None)[0]
-    own = np.concatenate(
+    of_a_run = np.concatenate(
         [
             design @ (np.linalg.lstsq(design, error, rcond=None)[0] - common)
             for design, (_, error) in zip(designs, runs, strict=True)
         ]
     )
-    return float(np.mean((stacked - own) ** 2)), float(np.mean(own**2))
+    return float(np.mean((stacked - of_a_run) ** 2)), float(np.mean(of_a_run**2))

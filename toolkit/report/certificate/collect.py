@@ -203,12 +203,12 @@ def _identity(record: CalibrationRecord, stated: Stated, replaces: str | None, a
             next_step="give --replaces CERT-ID and --amendment-reason TEXT together",
             rule="usage",
         )
-    own = stated.get("number") or f"CC-{record.id}-{record.sha256[:8].upper()}"
+    certificate = stated.get("number") or f"CC-{record.id}-{record.sha256[:8].upper()}"
     if not replaces:
-        return own
+        return certificate
     match = _AMENDED.match(replaces)
     stem, number = (match["stem"], int(match["number"])) if match else (replaces, 0)
-    return f"{own}-A{number + 1}" if stem == own else own
+    return f"{certificate}-A{number + 1}" if stem == certificate else certificate
 
 
 def _found(registry: Registry, record: CalibrationRecord, statements: Statements) -> AsFound | None:
@@ -217,13 +217,13 @@ def _found(registry: Registry, record: CalibrationRecord, statements: Statements
     return as_found_before(registry, record) if statements.phase == "as_left" else None
 
 
-def _found_session(registry: Registry, found: AsFound) -> FoundSession | None:
-    session = registry.load(found.session_record)
+def _found_session(registry: Registry, condition: AsFound) -> FoundSession | None:
+    session = registry.load(condition.session_record)
     loads = stored_loads(registry.folder, session)
     if loads is None:
         return None
     return FoundSession(
-        result=found, session=session, loads=loads, check=stored_check(registry.folder, session)
+        result=condition, session=session, loads=loads, check=stored_check(registry.folder, session)
     )
 
 

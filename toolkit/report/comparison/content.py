@@ -224,8 +224,8 @@ def entries(source: Compared, _style: Style) -> Rows:
     """Return what is compared, with its stated conditions."""
     names = ("surface", "pressure", "day", "operator", "mounting", "calibration")
     for entry in source.comparison.entries:
-        what = entry.condition("tire") if entry.kind == "test" else _KINDS[entry.kind]
-        yield entry.label, what or "-", *(entry.condition(name) or "-" for name in names)
+        condition = entry.condition("tire") if entry.kind == "test" else _KINDS[entry.kind]
+        yield entry.label, condition or "-", *(entry.condition(name) or "-" for name in names)
 
 
 @COMPARISON.table("differences", "differences of characteristics from the reference", _DIFFERENCES)
@@ -330,8 +330,8 @@ def pattern(source: Compared, style: Style) -> Rows:
     """Return the pattern and body effect of each PRAT."""
     for row in source.comparison.pattern:
         unit, factor = shown_unit(row.name, style)
-        shown = (with_U(e, factor, style) for e in (row.regular, row.reversed, row.pattern, row.body))
-        yield row.name, _load(row.load_N, style), unit, *shown
+        texts = (with_U(e, factor, style) for e in (row.regular, row.reversed, row.pattern, row.body))
+        yield row.name, _load(row.load_N, style), unit, *texts
 
 
 @COMPARISON.figures(

@@ -198,7 +198,7 @@ def law_curve(law: FoundLaw) -> bytes | None:
 def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     """Return root mean square residuals over the noise of the first chart, by run and output."""
     problem = search.problem
-    floors = {one.channel: one.noise_floor for one in diagnosis.held_out}
+    floors = {score.channel: score.noise_floor for score in diagnosis.held_out}
     names = [name for name in problem.names if name in floors]
     fits = [("refitted", search.refitted)] + ([("with the effect", search.augmented)] if after else [])
 
@@ -207,21 +207,21 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
         for i, name in enumerate(names):
             noise = max(floors[name], 1e-300)
             for j, run in enumerate(problem.slices):
-                kept = problem.kept[name][run]
-                values = fit.residual[name][run][kept]
+                counting = problem.kept[name][run]
+                values = fit.residual[name][run][counting]
                 share[i, j] = np.sqrt(np.mean(values**2)) / noise if len(values) else np.nan
         return share
 
     def draw(figure: Figure) -> None:
         shares = [table(fit) for _, fit in fits]
-        most = max(2.0, float(np.nanmax(np.stack(shares))))
+        largest = max(2.0, float(np.nanmax(np.stack(shares))))
         panels = figure.subplots(len(fits), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (label, _), values in zip(panels, fits, shares, strict=True):
-            axes.imshow(values, aspect="auto", cmap="YlOrBr", vmin=0, vmax=most)
+            axes.imshow(values, aspect="auto", cmap="YlOrBr", vmin=0, vmax=largest)
             axes.set_yticks(range(len(names)), names)
             axes.set_title(label, loc="left", fontsize=10)
             axes.grid(visible=False)
-            _write_cells(axes, values, most)
+            _write_cells(axes, values, largest)
         panels[-1].set_xticks(
             range(len(problem.runs)), [_short(run.name) for run in problem.runs],
             rotation=0 if len(problem.runs) < 9 else 90,
@@ -230,13 +230,13 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     return draw_svg((8.6, 0.9 + len(fits) * (0.5 + 0.42 * len(names))), draw)
 
 
-def _write_cells(axes: Axes, values: NDArray[np.float64], most: float) -> None:
+def _write_cells(axes: Axes, values: NDArray[np.float64], largest: float) -> None:
     if values.shape[1] > 16:
         return
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             if np.isfinite(values[i, j]):
-                colour = "white" if values[i, j] > 0.6 * most else "#333333"
+                colour = "white" if values[i, j] > 0.6 * largest else "#333333"
                 axes.text(j, i, f"{values[i, j]:.2g}", ha="center", va="center", color=colour, fontsize=9)
 
 
@@ -314,12 +314,18 @@ def variables(search: Search) -> list[Variable]:
         text, seconds = time_unit(problem.case)
         listed.append((f"time [{text}]", np.concatenate([run.t for run in problem.runs]) / seconds, ()))
     listed += [_channel(search, name, drivers[name]) for name in other_drivers]
-    return [one for one in listed if np.isfinite(one[1]).any() and np.nanmax(one[1]) > np.nanmin(one[1])]
+    return [
+        variable
+        for variable in listed
+        if np.isfinite(variable[1]).any() and np.nanmax(variable[1]) > np.nanmin(variable[1])
+    ]
 
 
 def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool) -> bytes | None:
     """Return an output's root mean square residual over its noise, a panel for each variable."""
-    noise = max(next((one.noise_floor for one in diagnosis.held_out if one.channel == channel), 0.0), 1e-300)
+    noise = max(
+        next((score.noise_floor for score in diagnosis.held_out if score.channel == channel), 0.0), 1e-300
+    )
     shown_variables = variables(search)[:_PANELS]
     mask = search.problem.kept[channel]
     if not shown_variables or not mask.any():

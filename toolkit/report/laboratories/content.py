@@ -165,8 +165,8 @@ def assigned(compared: ComparedLaboratories, style: Style) -> Rows:
     """Return the assigned values."""
     for m in compared.comparison.measurands:
         value = round_to_uncertainty(m.assigned, 2 * m.u_assigned) if m.u_assigned else f"{m.assigned:.6g}"
-        shown = (_in(style, value), _uncertain(style, m.u_assigned))
-        yield m.name, _dotted(m.unit), *shown, m.assigned_by, _uncertain(style, m.sigma_pt), m.sigma_by
+        texts = (_in(style, value), _uncertain(style, m.u_assigned))
+        yield m.name, _dotted(m.unit), *texts, m.assigned_by, _uncertain(style, m.sigma_pt), m.sigma_by
 
 
 @LABORATORIES.table(
@@ -238,8 +238,8 @@ def precision(compared: ComparedLaboratories, style: Style) -> Rows:
         if (p := m.precision) is not None:
             spreads = (None if p.s_r is None else p.s_r.value, p.r, p.s_L, p.s_R, p.R)
             mean = _in(style, round_to_uncertainty(p.mean, p.s_R) if p.s_R else f"{p.mean:.5g}")
-            shown = (_uncertain(style, value) for value in spreads)
-            yield m.name, _dotted(m.unit), str(p.laboratories), str(p.n), mean, *shown
+            texts = (_uncertain(style, value) for value in spreads)
+            yield m.name, _dotted(m.unit), str(p.laboratories), str(p.n), mean, *texts
 
 
 @LABORATORIES.table(
@@ -334,28 +334,28 @@ def _bars(
     limits: tuple[tuple[str, float], ...],
 ) -> Plot | None:
     """Return bars of a statistic, grouped by laboratory in the order of the file; None without any."""
-    shown = [m for m in comparison.measurands if any(statistic(score) is not None for score in m.scores)]
-    if not shown:
+    scored = [m for m in comparison.measurands if any(statistic(score) is not None for score in m.scores)]
+    if not scored:
         return None
-    laboratories = list(dict.fromkeys(score.laboratory for m in shown for score in m.scores))
-    width = _BARS / len(shown)
+    laboratories = list(dict.fromkeys(score.laboratory for m in scored for score in m.scores))
+    width = _BARS / len(scored)
     curves, parts = [], []
-    for number, measurand in enumerate(shown):
-        offset = (number - (len(shown) - 1) / 2) * width
+    for number, measurand in enumerate(scored):
+        offset = (number - (len(scored) - 1) / 2) * width
         values = {score.laboratory: statistic(score) for score in measurand.scores}
         bars = {place: values.get(laboratory) for place, laboratory in enumerate(laboratories)}
-        known = {place: value for place, value in bars.items() if value is not None}
+        heights = {place: value for place, value in bars.items() if value is not None}
         curves.append(
             Curve(
-                label=measurand.name, x=tuple(place + offset for place in known), y=tuple(known.values()),
+                label=measurand.name, x=tuple(place + offset for place in heights), y=tuple(heights.values()),
                 group=number, style="bars", width=0.9 * width,
             )
         )  # fmt: skip
-        listed = ", ".join(f"{laboratories[place]} {value:.2f}" for place, value in known.items())
+        listed = ", ".join(f"{laboratories[place]} {value:.2f}" for place, value in heights.items())
         parts.append(f"{measurand.name}: {listed}")
     ends = (-0.5, len(laboratories) - 0.5)
     lines = [
-        Curve(label=label, x=ends, y=(limit, limit), group=len(shown) + label.startswith("1 "), style="line",
+        Curve(label=label, x=ends, y=(limit, limit), group=len(scored) + label.startswith("1 "), style="line",
               open=label.startswith("5 "))
         for label, limit in limits
     ]  # fmt: skip
@@ -383,7 +383,7 @@ def _h_lines(comparison: LaboratoryComparison) -> tuple[tuple[str, float], ...]:
 def _k_lines(comparison: LaboratoryComparison) -> tuple[tuple[str, float], ...]:
     """Return the limits of the number of results that most laboratories have."""
     sizes = Counter(
-        (score.n - 1, sum(other.n - 1 for other in m.scores))
+        (score.n - 1, sum(rival.n - 1 for rival in m.scores))
         for m in comparison.measurands
         for score in m.scores
         if score.k is not None

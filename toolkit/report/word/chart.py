@@ -100,10 +100,10 @@ def chart_book(plot: Plot) -> bytes:
     stream = io.BytesIO()
     book.save(stream)
     still = io.BytesIO()
-    with zipfile.ZipFile(stream) as made, zipfile.ZipFile(still, "w", zipfile.ZIP_DEFLATED) as kept:
-        for member in made.namelist():
-            data = made.read(member)
-            kept.writestr(member, _MODIFIED.sub(b"", data) if member == "docProps/core.xml" else data)
+    with zipfile.ZipFile(stream) as source, zipfile.ZipFile(still, "w", zipfile.ZIP_DEFLATED) as target:
+        for member in source.namelist():
+            data = source.read(member)
+            target.writestr(member, _MODIFIED.sub(b"", data) if member == "docProps/core.xml" else data)
     return undated(still.getvalue())
 
 
@@ -125,11 +125,11 @@ def _named(plot: Plot) -> list[tuple[Curve, str]]:
 
 
 def _series(plot: Plot, scale: float) -> str:
-    made = []
+    elements = []
     for (curve, name), column in zip(_named(plot), count(1, 3), strict=False):
         number = (column - 1) // 3
         bars = curve.error is not None and any(curve.error)
-        made.append(
+        elements.append(
             f'<c:ser><c:idx val="{number}"/><c:order val="{number}"/>'
             f'<c:tx><c:strRef><c:f>{_cells(plot, column + 1, 1, 1)}</c:f><c:strCache><c:ptCount val="1"/>'
             f'<c:pt idx="0"><c:v>{_text(name)}</c:v></c:pt></c:strCache></c:strRef></c:tx>'
@@ -138,7 +138,7 @@ def _series(plot: Plot, scale: float) -> str:
             + f"<c:xVal>{_numbers(plot, curve.x, column)}</c:xVal>"
             f'<c:yVal>{_numbers(plot, curve.y, column + 1)}</c:yVal><c:smooth val="0"/></c:ser>'
         )
-    return "".join(made)
+    return "".join(elements)
 
 
 def _colour(curve: Curve) -> str:
@@ -167,16 +167,16 @@ def _note_of(curve: Curve, scale: float) -> str:
     """Return the label at the end of a line: the series' own name."""
     if not curve.note:
         return ""
-    shown = "".join(
-        f'<c:show{what} val="{int(what == "SerName")}"/>'
-        for what in ("LegendKey", "Val", "CatName", "SerName", "Percent", "BubbleSize")
+    flags = "".join(
+        f'<c:show{flag} val="{int(flag == "SerName")}"/>'
+        for flag in ("LegendKey", "Val", "CatName", "SerName", "Percent", "BubbleSize")
     )
-    none = shown.replace('"1"', '"0"')
+    none = flags.replace('"1"', '"0"')
     look = f"<a:pPr><a:defRPr {_size(7.5 * scale)}/></a:pPr>"
     text = f"<c:txPr><a:bodyPr/><a:lstStyle/><a:p>{look}{_END}</a:p></c:txPr>"
     return (
         f'<c:dLbls><c:dLbl><c:idx val="{len(curve.x) - 1}"/><c:spPr><a:noFill/></c:spPr>{text}'
-        f'<c:dLblPos val="{"t" if curve.y[-1] >= 0 else "b"}"/>{shown}</c:dLbl>{none}</c:dLbls>'
+        f'<c:dLblPos val="{"t" if curve.y[-1] >= 0 else "b"}"/>{flags}</c:dLbl>{none}</c:dLbls>'
     )
 
 
@@ -233,31 +233,31 @@ def _scale(plot: Plot) -> tuple[float, float, float]:
 
 
 def _axis(
-    plot: Plot, own: int, other: int, label: str, ends: str, crosses: str, step: str, scale: float
+    plot: Plot, axis_id: int, crossing_id: int, label: str, ends: str, crosses: str, step: str, scale: float
 ) -> str:
-    title = _title(label, 10 * scale, colour="000000", upright=own == 2) if label else ""
+    title = _title(label, 10 * scale, colour="000000", upright=axis_id == 2) if label else ""
     # LibreOffice takes the decimal sign from the language of the format, Word from the system's region.
     sign = "407" if plot.decimal_comma else "409"
     return (
-        f'<c:valAx><c:axId val="{own}"/><c:scaling><c:orientation val="minMax"/>{ends}</c:scaling>'
-        f'<c:delete val="0"/><c:axPos val="{"b" if own == 1 else "l"}"/>'
+        f'<c:valAx><c:axId val="{axis_id}"/><c:scaling><c:orientation val="minMax"/>{ends}</c:scaling>'
+        f'<c:delete val="0"/><c:axPos val="{"b" if axis_id == 1 else "l"}"/>'
         f"<c:majorGridlines><c:spPr>{_stroke(_GRID, 0.6)}</c:spPr></c:majorGridlines>{title}"
         f'<c:numFmt formatCode="[$-{sign}]General" sourceLinked="0"/><c:majorTickMark val="out"/>'
         f'<c:minorTickMark val="none"/><c:tickLblPos val="low"/><c:spPr>{_stroke(_AXIS, 0.8)}</c:spPr>'
-        f'<c:crossAx val="{other}"/><c:crosses val="{crosses}"/><c:crossBetween val="midCat"/>{step}'
+        f'<c:crossAx val="{crossing_id}"/><c:crosses val="{crosses}"/><c:crossBetween val="midCat"/>{step}'
         "</c:valAx>"
     )
 
 
 def _legend(plot: Plot) -> str:
     """Return the legend: a measured point and its curve share an entry, lines that have a note have none."""
-    seen: set[tuple[str, int]] = set()
+    styles: set[tuple[str, int]] = set()
     hidden = []
     for at, curve in enumerate(plot.curves):
         key = (curve.label, curve.group)
-        if not curve.label or key in seen:
+        if not curve.label or key in styles:
             hidden.append(f'<c:legendEntry><c:idx val="{at}"/><c:delete val="1"/></c:legendEntry>')
-        seen.add(key)
+        styles.add(key)
     return f'<c:legend><c:legendPos val="r"/>{"".join(hidden)}<c:overlay val="0"/></c:legend>'
 
 

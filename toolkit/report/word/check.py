@@ -104,13 +104,13 @@ def vocabulary_of(sites: list[Site], vocabularies: Mapping[str, Vocabulary]) -> 
     The first kind may have the tags of another one too, a report those of a diagnosis: it is meant where the
     template also has a value that the other kind does not know.
     """
-    first, *others = vocabularies
-    for name in others:
+    first, *further = vocabularies
+    for name in further:
         beginning = f"{name}."
         if any(site.tag.path.startswith(beginning) for site in sites):
-            default, other = vocabularies[first], vocabularies[name]
+            default, further_words = vocabularies[first], vocabularies[name]
             shared = any(entry.path.startswith(beginning) for entry in default.values)
-            return default if shared and _beyond(sites, default, other) else other
+            return default if shared and _beyond(sites, default, further_words) else further_words
     return vocabularies[first]
 
 
@@ -156,7 +156,7 @@ def _tags(sites: list[Site], style: Style, words: Vocabulary) -> Iterator[LintFi
 
 def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
     tag, family = site.tag, site.tag.family
-    known: dict[str, Mapping[str, object]] = {
+    families: dict[str, Mapping[str, object]] = {
         "figure": words.figures,
         "chart": dict.fromkeys(words.charts),
         "table": words.tables,
@@ -172,11 +172,11 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
             f"alone: write tk:figure.{tag.name}",
         )
         return
-    asked = family == "if" and not words.knows_condition(tag.name)
+    unknown_condition = family == "if" and not words.knows_condition(tag.name)
     if (
-        asked
+        unknown_condition
         or (family == "value" and not words.knows(tag.path))
-        or (tag.name not in known.get(family, {tag.name: ""}))
+        or (tag.name not in families.get(family, {tag.name: ""}))
     ):
         yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path, words)}")
         return
@@ -220,9 +220,9 @@ def _swallowed(site: Site) -> Iterator[LintFinding]:
     for paragraph in {id(p): p for p in [*site.element.iter(W_P), *site.element.iterancestors(W_P)]}.values():
         inside = [t for t in own_texts(paragraph) if filled_by(t) is site.element]
         for match in LITERAL.finditer("".join(t.text or "" for t in inside)):
-            other = parse_tag(match[1])
-            if other is not None and other.path != site.tag.path:
-                yield _at(site, "overlapping-tags", f"{other} stands inside {site.tag}, which replaces it")
+            tag = parse_tag(match[1])
+            if tag is not None and tag.path != site.tag.path:
+                yield _at(site, "overlapping-tags", f"{tag} stands inside {site.tag}, which replaces it")
 
 
 def _near(path: str, words: Vocabulary) -> str:
@@ -253,10 +253,10 @@ def _in_heading(site: Site) -> bool:
     names = {identity.lower()}
     styles = getattr(site.story.part, "_styles_part", None)
     if styles is not None:
-        for one in styles.element.iter(q("w:style")):
-            if one.get(q("w:styleId")) == identity:
-                names.add((one.find(q("w:name")).get(q("w:val")) or "").lower())
-                if one.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
+        for style_element in styles.element.iter(q("w:style")):
+            if style_element.get(q("w:styleId")) == identity:
+                names.add((style_element.find(q("w:name")).get(q("w:val")) or "").lower())
+                if style_element.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
                     return True
     return any(name.startswith("heading") for name in names)
 
@@ -375,11 +375,11 @@ _PLACEHOLDER = re.compile(
 def placeholders(parts: list[Story], style: Style) -> Iterator[LintFinding]:
     """Yield texts of a template and its style file that stand for what somebody was to write there."""
     for element in fixed_texts(parts):
-        found = _PLACEHOLDER.search(element.text or "")
-        if found:
+        match = _PLACEHOLDER.search(element.text or "")
+        if match:
             story = next(story for story in parts if element in story.root.iter(W_T))
             yield _finding(
-                "placeholder", story, element, f"{found[0]!r} stands for a text of yours: write it"
+                "placeholder", story, element, f"{match[0]!r} stands for a text of yours: write it"
             )
     for story in parts:
         for control in story.root.iter(W_SDT):
@@ -388,11 +388,11 @@ def placeholders(parts: list[Story], style: Style) -> Iterator[LintFinding]:
                 message = "a control that is not the toolkit's shows its prompt, which would be printed"
                 yield _finding("placeholder", story, control, message)
     for text in sorted(style.texts):
-        found = _PLACEHOLDER.search(text)
-        if found:
+        match = _PLACEHOLDER.search(text)
+        if match:
             yield LintFinding(
                 rule="placeholder", level="warning", part="style file", place=text,
-                message=f"{found[0]!r} stands for a text of yours: write it",
+                message=f"{match[0]!r} stands for a text of yours: write it",
             )  # fmt: skip
 
 
@@ -407,7 +407,7 @@ def advice(sites: list[Site]) -> Iterator[LintFinding]:
                 site, rows[0], "header-row",
                 f"{site.tag}: no header row is repeated on the next page: Table Layout, Repeat Header Rows",
             )  # fmt: skip
-        patterns = {id(row): row for other in sites if (row := _prototype(table, other)) is not None}
+        patterns = {id(row): row for neighbour in sites if (row := _prototype(table, neighbour)) is not None}
         for row in patterns.values() if patterns else rows[-1:]:
             if row.find(f"{q('w:trPr')}/{q('w:cantSplit')}") is None:
                 yield _note(
@@ -416,11 +416,11 @@ def advice(sites: list[Site]) -> Iterator[LintFinding]:
                     "break across pages'",
                 )  # fmt: skip
         if site.form == "literal" and site.element.tag == W_P:
-            rest = LITERAL.sub("", "".join(text.text or "" for text in site.element.iter(W_T))).strip()
-            if rest:
+            remainder = LITERAL.sub("", "".join(text.text or "" for text in site.element.iter(W_T))).strip()
+            if remainder:
                 yield _note(
                     site, site.element, "table-paragraph",
-                    f"{site.tag} shares its paragraph with {rest[:40]!r}: let the tag stand alone in it",
+                    f"{site.tag} shares its paragraph with {remainder[:40]!r}: let the tag stand alone in it",
                 )  # fmt: skip
 
 

@@ -83,7 +83,7 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
 
     # Their elements are held, so that an identity stays that of one element.
     written = [field.begin for field in contents_fields(parts[0].root) if can_update(field)]
-    known = {id(one) for one in written}
+    placed = {id(one) for one in written}
     for story in parts:
         for element in story.root.iter(*_TRACKED):
             yield warn("tracked-changes", story, element, "tracked changes: accept or reject them before use")
@@ -108,7 +108,7 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
                 )
             elif word == "IF":
                 yield warn("if-field", story, element, "an IF field is not evaluated; use a tk:if control")
-            elif word in _INDEXES and id(element) not in known:
+            elif word in _INDEXES and id(element) not in placed:
                 yield warn(
                     "contents",
                     story,
@@ -134,9 +134,9 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
 def _style_names(package: object) -> set[str]:
     main = package.main_document_part  # type: ignore[attr-defined]
     return {
-        (one.find(q("w:name")).get(q("w:val")) or "").lower()
-        for one in main._styles_part.element.iter(q("w:style"))
-        if one.find(q("w:name")) is not None
+        (style.find(q("w:name")).get(q("w:val")) or "").lower()
+        for style in main._styles_part.element.iter(q("w:style"))
+        if style.find(q("w:name")) is not None
     }
 
 
@@ -172,21 +172,21 @@ def _unreached(package: Any, parts: list[Story]) -> Iterator[LintFinding]:
 
 def _aside(story: Story) -> Iterator[LintFinding]:
     """Find literal tags beside the text: in alternative texts, drawn words, codes of fields, links."""
-    found = [
+    findings = [
         (element, "an alternative text, a drawn word or another property")
         for element in story.root.iter(etree.Element)
         if element.tag != q("w:alias") and any(_TAG.search(str(value)) for value in element.attrib.values())
     ]
-    found += [
+    findings += [
         (element, "the code of a field") for element, code in walk_fields(story.root) if _TAG.search(code)
     ]
     targets = {rel.rId for rel in story.part.rels.values() if _TAG.search(unquote(rel.target_ref))}
-    found += [
+    findings += [
         (element, "the address of a link")
         for element in story.root.iter(q("w:hyperlink"))
         if element.get(q("r:id")) in targets
     ]
-    for element, where in {id(element): (element, where) for element, where in found}.values():
+    for element, where in {id(element): (element, where) for element, where in findings}.values():
         yield LintFinding(
             rule="wrong-place",
             level="error",
@@ -216,10 +216,10 @@ _SYMBOLS = ("symbol", "wingdings", "wingdings 2", "wingdings 3", "webdings")
 def installed_fonts() -> frozenset[str]:
     """Return the families that fontconfig knows, in lower case; empty where it is not installed."""
     try:
-        done = subprocess.run(["fc-list", ":", "family"], capture_output=True, timeout=20, check=False)
+        process = subprocess.run(["fc-list", ":", "family"], capture_output=True, timeout=20, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return frozenset()
-    text = done.stdout.decode("utf-8", "replace").replace("\n", ",")
+    text = process.stdout.decode("utf-8", "replace").replace("\n", ",")
     return frozenset(name.strip().lower() for name in text.split(",") if name.strip())
 
 
@@ -228,10 +228,10 @@ def missing_fonts(package: object, parts: list[Story]) -> list[str]:
     have = installed_fonts()
     if not have:
         return []
-    wanted = {name for name in _wanted(package, parts) if name}
+    named_fonts = {name for name in _wanted(package, parts) if name}
     return sorted(
         name
-        for name in wanted
+        for name in named_fonts
         if name.lower() not in have and _EQUAL.get(name.lower()) not in have and name.lower() not in _SYMBOLS
     )
 
@@ -239,7 +239,7 @@ def missing_fonts(package: object, parts: list[Story]) -> list[str]:
 def _wanted(package: object, parts: list[Story]) -> Iterator[str]:
     main = package.main_document_part  # type: ignore[attr-defined]
     theme = _theme(main)
-    used = {
+    styles = {
         e.get(q("w:val"))
         for story in parts
         for tag in ("pStyle", "rStyle", "tblStyle")
@@ -251,15 +251,15 @@ def _wanted(package: object, parts: list[Story]) -> Iterator[str]:
     root = main._styles_part.element
     for style in root.iter(q("w:style"), q("w:rPrDefault")):
         default = style.tag == q("w:rPrDefault") or style.get(q("w:default")) == "1"
-        if default or style.get(q("w:styleId")) in used:
+        if default or style.get(q("w:styleId")) in styles:
             for fonts in style.iter(q("w:rFonts")):
                 yield from _names(fonts, theme)
 
 
 def _names(fonts: Element, theme: dict[str, str]) -> Iterator[str]:
     for side in ("ascii", "hAnsi"):
-        named = fonts.get(q(f"w:{side}Theme"))
-        yield theme.get(named[:5], "") if named else fonts.get(q(f"w:{side}")) or ""
+        theme_name = fonts.get(q(f"w:{side}Theme"))
+        yield theme.get(theme_name[:5], "") if theme_name else fonts.get(q(f"w:{side}")) or ""
 
 
 def _theme(main: object) -> dict[str, str]:

@@ -112,8 +112,8 @@ def misspelt(story: Story) -> Iterator[tuple[Element, str]]:
                 yield element, text
         else:
             text = "".join(t.text or "" for t in visible_texts(element))
-            if found := MISSPELT_LITERAL.search(text):
-                yield element, text[found.start() : found.start() + 40]
+            if match := MISSPELT_LITERAL.search(text):
+                yield element, text[match.start() : match.start() + 40]
 
 
 def unbraced(story: Story) -> Iterator[tuple[Element, str]]:
