@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import sys
 import tomllib
 from collections.abc import Iterator
 from typing import Any
@@ -35,15 +36,26 @@ def _help(command: Any, name: str) -> Iterator[str]:
 
 
 def library_text() -> str:
-    """Return signature and docstring of every public name of the package, methods by their first sentence."""
-    return "\n".join(line for name in toolkit.__all__ for line in _entry(name)).rstrip() + "\n"
+    """Return signature and docstring of every public name, then the results that methods alone return."""
+    entries = [(f"toolkit.{name}", getattr(toolkit, name)) for name in toolkit.__all__]
+    entries += [(face.__name__, face) for face in _faces_of_methods()]
+    return "\n".join(line for title, entry in entries for line in _entry(title, entry)).rstrip() + "\n"
 
 
-def _entry(name: str) -> Iterator[str]:
-    thing = getattr(toolkit, name)
-    yield f"## toolkit.{name}\n"
+def _faces_of_methods() -> list[type]:
+    import toolkit.lab.archives.archive
+    from toolkit.lab.faces import Face
+
+    public = {getattr(toolkit, name) for name in toolkit.__all__}
+    # By their names: a class with slots stands a second time, as it was before it had them.
+    faces = {getattr(sys.modules[face.__module__], face.__name__) for face in Face.__subclasses__()}
+    return sorted(faces - public, key=lambda face: str(face.__name__))
+
+
+def _entry(title: str, thing: Any) -> Iterator[str]:
+    yield f"## {title}\n"
     if not inspect.isclass(thing):
-        yield f"```python\n{name}{_signature(thing)}\n```\n"
+        yield f"```python\n{thing.__name__}{_signature(thing)}\n```\n"
     text = inspect.getdoc(thing) or ""
     yield docstring(text if not _DUMP.match(text) else "")
     if inspect.isclass(thing):
@@ -53,16 +65,22 @@ def _entry(name: str) -> Iterator[str]:
         ]
         if lines:
             yield "\n".join(lines) + "\n"
+        for key, member in vars(thing).items():
+            if inspect.isfunction(member) and "Parameters\n---" in (inspect.getdoc(member) or ""):
+                yield f"### {thing.__name__}.{key}\n"
+                yield f"```python\n{key}{_signature(member)}\n```\n"
+                yield docstring(inspect.getdoc(member) or "")
 
 
 def _signature(function: Any) -> str:
     """Return parameters, a line each; a default that is a function is said to be one."""
     signature = inspect.signature(function)
+    parameters = [each for each in signature.parameters.values() if each.name != "self"]
     parts = [
         re.sub(r"<function .*", "a function", re.sub(r"'([^']*)'", r"\1", str(parameter)))
-        for parameter in signature.parameters.values()
+        for parameter in parameters
     ]
-    kinds = [parameter.kind for parameter in signature.parameters.values()]
+    kinds = [parameter.kind for parameter in parameters]
     if inspect.Parameter.KEYWORD_ONLY in kinds:
         parts.insert(kinds.index(inspect.Parameter.KEYWORD_ONLY), "*")
     returned = str(signature.return_annotation).strip("'")

@@ -1,14 +1,13 @@
-"""An archive of recordings audited, as a notebook uses it."""
+"""An archive of recordings audited, as a notebook uses it: what `Laboratory.audit_archive` returns."""
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.lab.faces import Face, Facts, as_path
+from toolkit.lab.faces import Face, Facts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,48 +74,3 @@ class Audit(Face):
             caption="Files by grade.", alt=f"Files by grade: {counted}.",
         )  # fmt: skip
         return {"grades": grades} | audit_plots(self.result.made)
-
-
-def audit_archive(
-    archive: str | Path,
-    *,
-    out: str | Path | None = None,
-    calibrations: str | Path | None = None,
-    home: str | Path | None = None,
-    known_at: dt.date | None = None,
-    workers: int = 1,
-    repair: str | Path | None = None,
-    reports: str | Path | None = None,
-) -> Audit:
-    """Tell for every file of an archive which calibration computed its forces, and what it changes.
-
-    Parameters
-    ----------
-    archive : a folder of recordings, in any depth
-    out : folder for the page and the lines; an audit goes on where it was ended; None writes nothing
-    calibrations, home : the registry, or the laboratory; default the nearest one upward
-    known_at : the registry is judged as known on this day; default today
-    workers : processes that read files
-    repair : folder for corrected copies; the originals are never touched
-    reports : reports of past years, a folder or a CSV
-
-    Raises
-    ------
-    ToolkitError
-        the archive, the registry or a folder cannot be used
-    """
-    from toolkit.lab.archives.audit import AuditOrder, audit
-
-    answer, written = audit(
-        AuditOrder(
-            archive=Path(archive),
-            known_at=known_at,
-            workers=workers,
-            out=as_path(out),
-            repair=as_path(repair),
-            reports=as_path(reports),
-            calibrations=as_path(calibrations),
-            home=as_path(home),
-        )
-    )
-    return Audit(result=answer, written=written)
