@@ -121,7 +121,6 @@ def deliver(
     office: Office | None = None,
     drawer: Drawer | None = None,
     name: str = "report",
-    allow_missing: bool = False,
     keep: bool = False,
     companions: Mapping[str, bytes] | None = None,
     issue: Issue | None = None,
@@ -139,9 +138,7 @@ def deliver(
         template=template, content=content, out=out, name=name, companions=companions or {}, issue=issue,
         stage=stage,
     )  # fmt: skip
-    reports = deliver_all(
-        [job], office=office, drawer=drawer, allow_missing=allow_missing, keep=keep, step=step
-    )
+    reports = deliver_all([job], office=office, drawer=drawer, keep=keep, step=step)
     if isinstance(reports[0], ToolkitError):
         raise reports[0]
     return reports[0]

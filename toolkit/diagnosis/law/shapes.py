@@ -39,11 +39,6 @@ class Shape:
     starts: Starts = lambda _, __: [{}]
     enters: bool = False
 
-    @property
-    def of_two(self) -> bool:
-        """Tell whether it is one of two signals."""
-        return "{z}" in self.text
-
 
 def _spread(x: Array) -> float:
     low, high = np.quantile(x, (0.02, 0.98))

@@ -33,7 +33,7 @@ BOOK_RELATION = "rId1"
 
 # LibreOffice draws no outline around a marker: an empty one would be white on white, a cross is not.
 _MARKERS, _OPEN = ("circle", "square", "triangle", "diamond"), "x"
-_GREY, _GRID, _AXIS, _TEXT = "8A8A8A", "D9D9D9", "606060", "303030"
+_GREY, _GRID, _AXIS = "8A8A8A", "D9D9D9", "606060"
 _POINT = 12700  # EMU
 _SMALLEST = 300  # hundredths of a point
 _STEPS = 8  # of the upright axis, at most

@@ -247,7 +247,7 @@ def _cell_width(cell: Element, room: int) -> int | None:
     grid = grid if any(grid) else [room // max(len(grid), 1)] * len(grid)
     at = 0
     for cell_before in (cell_ for cell_ in row.iter(W_TC) if ancestor(cell_, W_TR) is row):
-        span = _number_of(cell_before, "w:tcPr/w:gridSpan")
+        span = _columns_of(cell_before)
         if cell_before is cell:
             inside = sum(grid[at : at + span])
             return inside - _CELL_MARGIN if inside > _CELL_MARGIN else None
@@ -255,8 +255,8 @@ def _cell_width(cell: Element, room: int) -> int | None:
     return None
 
 
-def _number_of(cell: Element, path: str) -> int:
-    element = cell.find("/".join(q(step) for step in path.split("/")))
+def _columns_of(cell: Element) -> int:
+    element = cell.find(f"{q('w:tcPr')}/{q('w:gridSpan')}")
     text = "" if element is None else element.get(q("w:val")) or ""
     return max(int(text), 1) if text.isdigit() else 1
 
