@@ -1,4 +1,4 @@
-"""What the pages of commands, library and licences print: the command tree, docstrings, hashes."""
+"""What the pages of commands, library, templates and licences print: commands, docstrings, tags, hashes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import inspect
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import toolkit
 from tests.house.source import ROOT
+from toolkit.report.kinds import TITLES
+from toolkit.report.vocabulary import TableEntry, Vocabulary
 
 WIDTH = 100
 """Columns of a printed help."""
@@ -132,6 +134,44 @@ def _items(text: str) -> str:
 
 def _markdown(text: str) -> str:
     return text.replace("``", "`").replace("<", "&lt;").replace("*", "\\*")
+
+
+def tags_text(vocabularies: Iterable[Vocabulary]) -> str:
+    """Return every value, figure, table and condition that templates of each kind can ask for."""
+    return "\n".join(line for vocabulary in vocabularies for line in _chapter(vocabulary))
+
+
+def _chapter(vocabulary: Vocabulary) -> Iterator[str]:
+    yield from (f"## {TITLES[vocabulary.name]}", "")
+    yield from ("A template must hold " + ", ".join(f"`{tag}`" for tag in vocabulary.required) + ".", "")
+    yield from ("### Values", "", "| tag | kind | unit | value |", "|---|---|---|---|")
+    for entry in vocabulary.values:
+        yield _row(f"`tk:{entry.path}`", entry.kind, entry.unit or "", entry.description)
+    yield from ("", "### Figures", "", "Each has its caption as `tk:caption.<name>`.", "")
+    yield from ("| tag | as a chart of Word's own | figure |", "|---|---|---|")
+    for name, description in vocabulary.figures.items():
+        chart = f"`tk:chart.{name}`" if name in vocabulary.charts else ""
+        yield _row(f"`tk:figure.{name}`", chart, description)
+    yield from ("", "### Tables", "")
+    for name, table in vocabulary.tables.items():
+        yield from _table(name, table)
+    yield from ("### Conditions", "")
+    yield from ("Beside these, `tk:if.<name>` takes the name of any value, figure or table.", "")
+    yield from ("| tag | kept when |", "|---|---|")
+    for name, description in vocabulary.conditions.items():
+        yield _row(f"`tk:if.{name}`", description)
+    yield ""
+
+
+def _table(name: str, table: TableEntry) -> Iterator[str]:
+    yield from (f"`tk:table.{name}`: {table.description}.", "", "| tag | unit | column |", "|---|---|---|")
+    for column in table.columns:
+        yield _row(f"`tk:row.{column.name}`", column.unit or "", column.description)
+    yield ""
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
 
 def licences_text() -> str:
