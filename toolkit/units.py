@@ -7,11 +7,10 @@ taken for the other or for a plain number.
 
 pint does the arithmetic; it is imported when the first unit is read.
 
-A column's header -> its name and its unit.
-
-``NAME [unit]`` says it whatever the name is. Spreadsheets and other laboratories' files also write
-``NAME (unit)``, ``NAME / unit``, ``NAME in unit`` or ``NAME_unit``: these count where the file's
-reader knows the name and the unit is one, since each of them may be a name as well.
+A column's header says its name and its unit. ``NAME [unit]`` says it whatever the name is. Spreadsheets and
+other laboratories' files also write ``NAME (unit)``, ``NAME / unit``, ``NAME in unit`` or ``NAME_unit``:
+these count where the file's reader knows the name and the unit is one, since each of them may be a name as
+well.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ def library_text() -> str:
 
 
 def _faces_of_methods() -> list[type]:
-    import toolkit.lab.archives.archive
+    import toolkit.lab.archives.audit
     from toolkit.lab.faces import Face
 
     public = {getattr(toolkit, name) for name in toolkit.__all__}

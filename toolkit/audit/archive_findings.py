@@ -3,11 +3,10 @@
 It changes no grade; but for values that no tire has, it only informs. Files are added one by one, sorted by
 path, as plain answers; what is kept of each is a few bytes.
 
-What a repair does to what a requester reads off a test: cornering stiffness and pull, old and new.
-
-Both are read off the means of the load blocks in one way, so that nothing but the calibration differs: the
-stiffness is the secant through the +-1 deg steps (thesis, SAE), pull the line through the steps next to
-0 deg of a forward and a reversed run, each at the load as it was. `toolkit process` subtracts a tare, carries
+One of them is what a repair does to what a requester reads off a test: cornering stiffness and pull, old and
+new. Both are read off the means of the load blocks in one way, so that nothing but the calibration differs:
+the stiffness is the secant through the +-1 deg steps (thesis, SAE), pull the line through the steps next to 0
+deg of a forward and a reversed run, each at the load as it was. `toolkit process` subtracts a tare, carries
 to a common load and fits curves; this compares without them.
 """
 

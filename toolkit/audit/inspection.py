@@ -1,8 +1,7 @@
 """Inspection: what one recording holds, which calibration computed it, and what would be right.
 
-What the registry offers for a file: asked once an instrument, and once a stretch of days.
-
-Which record is in force changes only on the days that the ledger names, so an archive of thousands of test
+What the registry offers for a file is asked once an instrument, and once a stretch of days (`Choices`): which
+record is in force changes only on the days that the ledger names, so an archive of thousands of test
 dates asks for a few of them.
 """
 

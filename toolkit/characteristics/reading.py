@@ -4,8 +4,6 @@ What is read off a fitted curve is, to first order, a weighted sum of the condit
 with J the model's derivatives at the conditions and g those of what is read, the weights are g J^+ (Gauss's
 normal equations, solved in the tangent plane). Whatever moves a condition moves the reading by its weight.
 
-From readings of curves to characteristics: pull by symmetry, stiffness by secant and slope.
-
 **Pull.** By symmetry conicity keeps FY and flips MZ under x -> -x; plysteer flips FY and keeps MZ under a
 half turn about z. With F and R the values at SA = 0 in machine-fixed axes (cells in the carriage, the drum
 reversed):

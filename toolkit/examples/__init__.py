@@ -1,9 +1,8 @@
 """Examples that come with the package: a real recording, and plans for the virtual machine.
 
-Ten rows of a real M-15 recording, as printed in Figure 4.4 of the source document.
-
-The acquisition program computed the two last columns with a calibration whose E5 terms were negative. The
-figure shows two rows of each of the five load blocks of the 0 deg step; the measured slip angle is -0.30 deg.
+The recording is ten rows of the M-15, as printed in Figure 4.4 of the source document. The acquisition
+program computed the two last columns with a calibration whose E5 terms were negative. The figure shows two
+rows of each of the five load blocks of the 0 deg step; the measured slip angle is -0.30 deg.
 """
 
 from __future__ import annotations

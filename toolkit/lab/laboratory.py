@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.verify import VerifyRow
-    from toolkit.lab.archives.archive import Audit
+    from toolkit.lab.archives.audit import Audit
     from toolkit.lab.tire_tests.test import ProcessedTest, Report, Test
 
 
@@ -166,8 +166,7 @@ class Laboratory(Face):
         ToolkitError
             the archive, the registry or a folder cannot be used
         """
-        from toolkit.lab.archives.archive import Audit
-        from toolkit.lab.archives.audit import AuditOrder, audit
+        from toolkit.lab.archives.audit import Audit, AuditOrder, audit
 
         order = AuditOrder(
             archive=Path(archive), known_at=known_at, workers=workers, out=as_path(out),

@@ -1,6 +1,6 @@
 """A machine definition (TOML): columns and their units, geometry, drum, protocol, what is stated of it.
 
-The next version of a machine definition: the old text, its version one higher, and one more correction.
+Its next version is the old text, its version one higher, and one more correction.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""What a hub's cells measure beside FY and MZ, and where its moments stand.
-
-What a laboratory can hang on a machine's load cells to calibrate them: fixtures, weights, minutes.
-"""
+"""The load cells of the hub: what they measure beside FY and MZ; what can hang there to calibrate them."""
 
 from __future__ import annotations
 

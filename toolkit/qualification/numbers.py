@@ -1,11 +1,9 @@
 """The packaged numbers: one TOML file a certified set, the examples, and the digest of each file.
 
-Published results: lines of ISO/TS 28037, ASTM E74 on the NIST load cell, NIST's certified regressions.
-
-The certified regressions go through the toolkit's own solver and are judged in correct digits. A polynomial
-of degree 10 (Filip) is beyond what a term can name: its powers of the centred variable are given
-as columns, as the solver builds them for lower degrees, and its results are carried back by the binomial
-theorem.
+The examples are lines of ISO/TS 28037, ASTM E74 on the NIST load cell and NIST's certified regressions. The
+certified regressions go through the toolkit's own solver and are judged in correct digits. A polynomial of
+degree 10 (Filip) is beyond what a term can name: its powers of the centred variable are given as columns, as
+the solver builds them for lower degrees, and its results are carried back by the binomial theorem.
 
 Reference: NIST Statistical Reference Datasets, linear least squares.
 """

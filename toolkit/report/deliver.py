@@ -2,7 +2,7 @@
 
 Several reports are converted in one call of LibreOffice, whose start is paid for once.
 
-The hand-over: one manifest of what went in and what came out, and the hash of the content.
+With each goes one manifest: what went in, what came out, and the hash of the content.
 """
 
 from __future__ import annotations

@@ -4,10 +4,9 @@ Nothing here reads a file or knows a file format; `write` does. Each file has a 
 own, derived from the plan's seed and the file's number, so that the noise of one file repeats without the
 others. What a tire remembers from file to file (slip work, warmth) and the clock do go on.
 
-The physical part of the chain over one recording: road, carriage, tire, and what reaches the hub.
-
-Every stage is a function of the signals before it. The load is moved before the wheel is turned, so that the
-drum's run-out adds to what the actuator holds; temperatures follow from the slip work.
+The physical part of the chain is road, carriage, tire, and what reaches the hub. Every stage is a function of
+the signals before it. The load is moved before the wheel is turned, so that the drum's run-out adds to what
+the actuator holds; temperatures follow from the slip work.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Write a whole test into one .xlsx file.
 
-Rows of plain values in an .xlsx file, written straight into the sheets of a workbook that has their heads.
-
-openpyxl builds an object and its elements for every cell, which takes ten times as long.
+Rows of plain values are written straight into the sheets of a workbook that has their heads: openpyxl builds
+an object and its elements for every cell, which takes ten times as long.
 """
 
 from __future__ import annotations

@@ -9,11 +9,10 @@ its half range about its middle, ordinate by max|y|; the four unknowns are
 
 because the cost is far closer to a parabola in ln B and q than in B and E.
 
-Start shapes that come from the data: a grid of Magic Formula shapes, scored against every curve.
-
-The grid is the same for every curve (its abscissa is normalised), so scoring all of it against all curves is
-three matrix products. Where the score is lower than at all neighbours on the grid a basin begins: the
-lowest of these local minima are the starts, diverse by construction and near the data.
+Start shapes come from the data: a grid of Magic Formula shapes is scored against every curve. The grid is the
+same for every curve (its abscissa is normalised), so scoring all of it against all curves is three matrix
+products. Where the score is lower than at all neighbours on the grid a basin begins: the lowest of these
+local minima are the starts, diverse by construction and near the data.
 """
 
 from __future__ import annotations

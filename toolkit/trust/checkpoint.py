@@ -11,10 +11,9 @@ The first line is the log's name, then its size and the root of its tree; each l
 signature: the signer's name, then in base64 the four first bytes of the key's hash and the signature
 (C2SP signed-note). A witness signs the time with it (C2SP tlog-cosignature, ``cosignature/v1``).
 
-A witness: a second place that remembers the last checkpoint of a log and signs only what continues it.
-
-It is a folder (on a share, at another laboratory, on a stick) with one file a log: the newest checkpoint that
-it has countersigned. It keeps no lines; the laboratory proves by a path that its log only grew. A fork is
+A witness is a second place that remembers the last checkpoint of a log and signs only what continues it. It
+is a folder (on a share, at another laboratory, on a stick) with one file a log: the newest checkpoint that it
+has countersigned. It keeps no lines; the laboratory proves by a path that its log only grew. A fork is
 refused, and stays refused: the witness never forgets what it has signed.
 """
 

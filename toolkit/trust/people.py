@@ -4,7 +4,7 @@ Every version of the file is an entry of the log of people, signed by somebody w
 allowed to. An entry of any log is judged by the version of its time; a key that was revoked since, from a
 date on, signed nothing from that date on, whatever the version of that time said.
 
-Names of people, however they are written: two spellings of one name are one person.
+Two spellings of one name are one person (`name_key`).
 """
 
 from __future__ import annotations

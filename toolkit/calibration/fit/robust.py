@@ -2,7 +2,7 @@
 
 Outliers can hide each other: each inflates the scatter by which the other is judged, and no studentised
 residual stands out. Tukey's biweight with a scale from the median is not moved by them where it begins among
-sound rows: at Huber's estimate, or, where rows contradict the others (`forward_search`), at the fit of the
+sound rows: at Huber's estimate, or, where rows contradict the others, at the fit of the
 others, since Huber's is tilted by rows of high leverage. The calibration itself is never fitted so.
 
 The estimates are those of statsmodels' RLM. Its own iteration decomposes all rows anew in each of up to 50
@@ -11,13 +11,12 @@ and they end when no residual moves any more.
 
 References: Huber and Ronchetti, Robust Statistics (2009), ch. 7; Beaton and Tukey, Technometrics 16 (1974).
 
-Rows that contradict the others of a session, found from the half that agrees best.
-
-Rows that are wrong together tilt the fit by which they are judged: their own residuals shrink, and those of
-sound rows grow. So the search begins at the half of the rows that one equation fits best (least trimmed
-squares, which up to half of the rows cannot move) and adds rows in the order in which they agree. It ends
-where the next one deviates by more than Student's quantile at `RISK` over all rows: every row beyond that
-contradicts the others. A curve does not end it, for its rows depart step by step.
+Rows that contradict the others are found from the half that agrees best (`contradicting`). Rows that are
+wrong together tilt the fit by which they are judged: their own residuals shrink, and those of sound rows
+grow. So the search begins at the half of the rows that one equation fits best (least trimmed squares, which
+up to half of the rows cannot move) and adds rows in the order in which they agree. It ends where the next one
+deviates by more than Student's quantile at `RISK` over all rows: every row beyond that contradicts the
+others. A curve does not end it, for its rows depart step by step.
 
 References: Rousseeuw and Van Driessen, Data Mining and Knowledge Discovery 12 (2006), for the half; Hadi and
 Simonoff, Journal of the American Statistical Association 88 (1993), for the order and the test.

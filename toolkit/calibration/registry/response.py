@@ -3,10 +3,9 @@
 A response is d load / d indication, [N or N*m] per [V/V] (or count, N, ...). Records in other units, and with
 other models, are compared by it: of a model with higher terms it is the secant over a range.
 
-What changes from one record to another: each coefficient, and what it moves in the load.
-
-Records in other units are compared as they are in SI: the change is given in the units of the first one, and
-a note says which unit changed and what both responses are in SI.
+The difference of two records is each coefficient, and what it moves in the load. Records in other units are
+compared as they are in SI: the change is given in the units of the first one, and a note says which unit
+changed and what both responses are in SI.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Read a case file: every key checked, every file that it names read whole, or an error that says what.
 
-CASE.toml, declared once: a simulation, the channels, and the recordings with their conditions.
+CASE.toml is declared here, once: a simulation, the channels, and the recordings with their conditions.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Read one run of a case: CSV, or what else holds a recording; columns in the units of the case.
 
-CSV: a header row of column names, then numbers; columns that nobody names may hold anything.
-
-Commas, semicolons or tabs part the cells; a header may state its unit (`toolkit.headers`).
+A CSV has a header row of column names, which may state units (`toolkit.units.split_header`), then numbers;
+commas, semicolons or tabs part the cells, and columns that nobody names may hold anything.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a case says of its simulation, by kind: files and parameters, or a model file of an earlier answer.
 
-The simulation of a case that is a model file: an earlier answer, taken up as it was left.
+A model file is an earlier answer, taken up as it was left.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ where the simulation has left the straight line: on the way they are corrected b
 
 Source: Broyden, Math. Comp. 19 (1965) 577.
 
-The vector that a joint fit searches: free parameters, then the effects' values, each over its size.
+The vector is that of a joint fit (`Space`): free parameters, then the effects' values, each over its size.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """Held-out rows: whole runs; with one run contiguous blocks of it. Never random rows.
 
-How much real runs differ: the log score of rows that no fit has seen, zeros and gains of runs in it.
-
-Two recordings of the same thing never agree to their noise: a zero moves, a gain does, and what a
-simulation leaves on an unseen run is larger than on those it was fitted to. A score that takes its noise
-from the training rows alone throws away an effect that is right in every run but a little off in one.
+Rows that no fit has seen are judged by their log score. Two recordings of the same thing never agree to their
+noise: a zero moves, a gain does, and what a simulation leaves on an unseen run is larger than on those it was
+fitted to. A score that takes its noise from the training rows alone throws away an effect that is right in
+every run but a little off in one.
 
 Here a held-out run's residual has a zero and a gain of its own beside its noise, both normal over the runs.
 How much they scatter, and how much larger the noise is than on the training rows, is what makes all held-out

@@ -1,6 +1,7 @@
 """Laws as the rivals of effects: simpler, and no worse on rows that no fit has seen.
 
-Effects that only imitate a law: beside it nothing is left for them to explain.
+The other way round, effects that only imitate a law are dropped: beside it nothing is left for them to
+explain.
 """
 
 from __future__ import annotations

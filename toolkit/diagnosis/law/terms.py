@@ -1,9 +1,8 @@
 """The laws that may be missing in the equation of a state: of its states, its inputs and the time.
 
-Events in an equation: of every run the stretch of time in which an input would explain most.
-
-A pulse is a step less a later one, so that the responses to a few dozen steps give those to every pair of
-ends; no descent from a coarse grid finds them where the simulation rings, each period being a hill.
+An event is a pulse: of every run the stretch of time in which an input would explain most. A pulse is a step
+less a later one, so that the responses to a few dozen steps give those to every pair of ends; no descent from
+a coarse grid finds them where the simulation rings, each period being a hill.
 """
 
 from __future__ import annotations

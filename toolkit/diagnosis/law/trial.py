@@ -1,13 +1,12 @@
 """One law at one place from one start: what a search for laws tries.
 
-The laws that an output may show: every shape over every signal, events and tones.
+Tried are the laws that an output may show: every shape over every signal, events and tones.
 
-Laws that only tell runs apart: what stands still within a run explains its zero and its gain alone.
-
-Runs of the same thing differ a little, and any signal that has another level in every run (a load, a
-temperature) follows such differences as well as the few runs let it. Hundreds of rows are then no evidence:
-of a run's zero there is one value a run. A law that mends nothing beside zeros and gains of runs has to be
-significant among the runs alone.
+Some laws only tell runs apart: what stands still within a run explains its zero and its gain alone. Runs of
+the same thing differ a little, and any signal that has another level in every run (a load, a temperature)
+follows such differences as well as the few runs let it. Hundreds of rows are then no evidence: of a run's
+zero there is one value a run. A law that mends nothing beside zeros and gains of runs has to be significant
+among the runs alone.
 """
 
 from __future__ import annotations

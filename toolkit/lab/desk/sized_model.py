@@ -1,8 +1,7 @@
 """The model of an answer that a home keeps: sized by hand beside its recordings, and kept as a model file.
 
-The answer of a diagnosis that a home keeps, as a page shows it: answer, figures, predictions.
-
-The figures are those of the answer's own page: drawings in SVG, shown as pictures, in which no script runs.
+A page shows the answer itself (`SeenDiagnosis`): verdict, figures, predictions. The figures are those of the
+answer's own page: drawings in SVG, shown as pictures, in which no script runs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What is compared: tests and makers' tables read to one kind of entry; the figures and the document.
 
-`toolkit compare --laboratories`: an interlaboratory comparison's answer, figures and document.
+So are the results of an interlaboratory comparison (`toolkit compare --laboratories`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Between tire files, TYDEX files, tables and reduced tests; what a target cannot hold is named.
 
-Tires as FMU: of a fit over all loads, or of a tire file.
+An FMU is made of a fit over all loads, or of a tire file.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """From a registry's record to a certificate: who may have one, and what it says.
 
-What a certificate lacks or says of itself: gaps, conformity, state of the record.
+It also says what it lacks: gaps, conformity, state of the record.
 """
 
 from __future__ import annotations

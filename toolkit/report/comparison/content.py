@@ -1,6 +1,6 @@
 """A comparison as a document: its texts, tables and figures, each declared with what builds it.
 
-A comparison's figures as data: characteristics against load, a series an entry (thesis 6.6 to 6.29).
+The figures are data: characteristics against load, a series an entry (thesis 6.6 to 6.29).
 """
 
 from __future__ import annotations

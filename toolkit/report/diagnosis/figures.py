@@ -1,6 +1,6 @@
 """Figures of a diagnosis: error before and after, where the mismatch is, one run in time, runs by output.
 
-Maps of a mismatch: how large the residual is over slip angle, load, condition, revolution and time.
+Maps show how large the residual is over slip angle, load, condition, revolution and time.
 """
 
 from __future__ import annotations

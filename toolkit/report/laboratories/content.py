@@ -1,6 +1,6 @@
 """An interlaboratory comparison as a document: assigned values, scores, consistency and precision.
 
-An interlaboratory comparison's figures as data: means with their U, Mandel's h and k.
+The figures are data: means with their U, Mandel's h and k.
 """
 
 from __future__ import annotations

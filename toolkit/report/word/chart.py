@@ -2,10 +2,9 @@
 
 Source of the elements and their order: ECMA-376, part 1, 21.2 (charts) and 11.3.4 (embedded package).
 
-Charts as they are heard: LibreOffice leaves their alternative texts out of a PDF, and they are put in.
-
-A chart is an element *Figure* of the PDF's tree of structure, with elements of its own for the texts in it
-(ISO 32000-1, 14.7 and 14.9.3). It is known by its size on the page, and by its order.
+LibreOffice leaves the alternative texts of charts out of a PDF, and they are put in. A chart is an element
+*Figure* of the PDF's tree of structure, with elements of its own for the texts in it (ISO 32000-1, 14.7 and
+14.9.3). It is known by its size on the page, and by its order.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Errors keep a report from being made; warnings do not. What makes a file unsafe to open is refused
 earlier, by `toolkit.report.word.package`.
 
-What a template check advises: on tables over several pages, and on texts that nobody filled in.
+It advises, too: on tables over several pages, and on texts that nobody filled in.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Find the tags of a template: content controls and literal ``{{tk:...}}``, in every part.
 
-A template in another language: what stands in it beside its tags, by the catalogue of phrases.
+What stands beside the tags of a template in another language follows the catalogue of phrases.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ PDF/A-3 where the file was PDF/A-2, the code on its last page. The seal is the l
 319 142-1, B-B, with a time stamp B-T). A sealed file has one signature, which covers all of it. Later
 revisions are never looked into: a file that has any is not the one that was sealed.
 
-Files in a PDF: attached before it is sealed (associated files of PDF/A-3, ISO 19005-3).
+Attachments are associated files of PDF/A-3 (ISO 19005-3).
 """
 
 from __future__ import annotations

@@ -8,10 +8,9 @@ Canonical XML drops comments, quotes and spaces inside tags, so that their bytes
 that the toolkit seals therefore says among its signed properties that its file is its canonical form: every
 byte of such a file counts.
 
-The ledger's proof in a digital calibration certificate: its comment, before the certificate is sealed.
-
-What the entry holds is the hash of the certificate's content: its canonical form (C14N 1.0, without comments)
-before the proof and the seal were put into it.
+The ledger's proof stands in a digital calibration certificate as a comment, put in before the certificate is
+sealed. What the entry holds is the hash of the certificate's content: its canonical form (C14N 1.0, without
+comments) before the proof and the seal were put into it.
 """
 
 from __future__ import annotations
