@@ -196,6 +196,19 @@ def is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
+def reads_as_number(text: str) -> bool:
+    """Tell whether a text is a number as Python reads it.
+
+    >>> reads_as_number("-1e3"), reads_as_number("1,5")
+    (True, False)
+    """
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def number_expected(actual: object, expected: str) -> str:
     """Return what is expected in place of a value: where it is a number out of reach, the reach.
 

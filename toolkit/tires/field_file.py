@@ -21,6 +21,7 @@ import numpy as np
 
 from toolkit.channels import CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.files import reads_as_number
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign
 from toolkit.recording.safe_open import gate
@@ -187,18 +188,10 @@ def _of_text(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
             pointed = [cell.translate(_POINTS_FOR_COMMAS) for cell in cells] if has_commas else cells
             rows.append(list(map(float, pointed)))
         except ValueError:
-            bad = next(at for at, cell in enumerate(pointed) if not _is_number(cell))
+            bad = next(at for at, cell in enumerate(pointed) if not reads_as_number(cell))
             raise _cell(path, number, names[bad], repr(cells[bad]), "a number", "text-cell") from None
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     return {name: (values[:, at], text) for at, (name, text) in enumerate(zip(names, units, strict=True))}
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _cell(path: Path, line: int, name: str, actual: str, expected: str, rule: str) -> CellError:

@@ -210,8 +210,8 @@ def ledgers_of(registry: Registry) -> tuple[str, ...]:
 def raw_lines(registry: Registry, instrument: str) -> list[str]:
     """Return the lines of a ledger as they stand, whole or damaged: a proof tells where it was changed."""
     from toolkit.calibration.registry.ledger import LEDGER
+    from toolkit.calibration.registry.lock import content
     from toolkit.calibration.registry.people_log import place_of
-    from toolkit.calibration.registry.settled import content
 
     own = instrument in registry.instruments() or instrument not in ledgers_of(registry)
     folder = registry.folder / instrument if own else place_of(registry.folder)

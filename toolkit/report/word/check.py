@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
-from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
+from toolkit.report.word.lint import RULES, LintFinding, at_element, missing_fonts, surroundings
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import (
     LITERAL,
@@ -25,7 +25,6 @@ from toolkit.report.word.scan import (
     fixed_texts,
     misspelt,
     own_rows,
-    place_of,
     row_in,
     scan,
     table_of,
@@ -333,30 +332,15 @@ def _untagged(site: Site, table: Element, columns: list[str]) -> Iterator[LintFi
 def _broken(parts: list[Story], words: Vocabulary) -> Iterator[LintFinding]:
     for story in parts:
         for paragraph in broken_literals(story):
-            yield LintFinding(
-                rule="malformed-tag",
-                level="error",
-                part=story.name,
-                place=place_of(paragraph, story),
-                message="a literal {{tk: is not closed by }} in the same paragraph",
-            )
+            message = "a literal {{tk: is not closed by }} in the same paragraph"
+            yield at_element("malformed-tag", story, paragraph, message, "error")
         for element, text in misspelt(story):
-            yield LintFinding(
-                rule="malformed-tag",
-                level="error",
-                part=story.name,
-                place=place_of(element, story),
-                message=f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters",
-            )
+            message = f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters"
+            yield at_element("malformed-tag", story, element, message, "error")
         for element, path in unbraced(story):
             if words.entry(path) is not None:
-                yield LintFinding(
-                    rule="malformed-tag",
-                    level="error",
-                    part=story.name,
-                    place=place_of(element, story),
-                    message=f"tk:{path} would be printed as it stands: write {{{{tk:{path}}}}}",
-                )
+                message = f"tk:{path} would be printed as it stands: write {{{{tk:{path}}}}}"
+                yield at_element("malformed-tag", story, element, message, "error")
 
 
 __all__ = ["RULES", "LintFinding", "check_stories", "check_template"]
@@ -378,7 +362,7 @@ def placeholders(parts: list[Story], style: Style) -> Iterator[LintFinding]:
         match = _PLACEHOLDER.search(element.text or "")
         if match:
             story = next(story for story in parts if element in story.root.iter(W_T))
-            yield _finding(
+            yield at_element(
                 "placeholder", story, element, f"{match[0]!r} stands for a text of yours: write it"
             )
     for story in parts:
@@ -386,7 +370,7 @@ def placeholders(parts: list[Story], style: Style) -> Iterator[LintFinding]:
             prompt = control.find(f"{SDT_PR}/{q('w:showingPlcHdr')}")
             if prompt is not None and control_tag(control) is None:
                 message = "a control that is not the toolkit's shows its prompt, which would be printed"
-                yield _finding("placeholder", story, control, message)
+                yield at_element("placeholder", story, control, message)
     for text in sorted(style.texts):
         match = _PLACEHOLDER.search(text)
         if match:
@@ -428,13 +412,5 @@ def _prototype(table: Element, site: Site) -> Element | None:
     return row_in(table, site.element) if site.tag.family == "row" else None
 
 
-def _finding(rule: str, story: Story, element: Element, message: str) -> LintFinding:
-    return LintFinding(
-        rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message
-    )
-
-
 def _note(site: Site, element: Element, rule: str, message: str) -> LintFinding:
-    return LintFinding(
-        rule=rule, level="note", part=site.story.name, place=place_of(element, site.story), message=message
-    )
+    return at_element(rule, site.story, element, message, "note")

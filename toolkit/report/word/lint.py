@@ -45,12 +45,15 @@ RULES = {
 }
 
 
+Level = Literal["error", "warning", "note"]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LintFinding:
     """One finding: rule, level, the part of the package, the place in it, and a sentence."""
 
     rule: str
-    level: Literal["error", "warning", "note"]
+    level: Level
     part: str
     place: str
     message: str
@@ -69,6 +72,15 @@ class LintFinding:
 # The lint around the tags: tracked changes, comments, fields, styles, and tags where nothing is filled.
 
 
+def at_element(
+    rule: str, story: Story, element: Element, message: str, level: Level = "warning"
+) -> LintFinding:
+    """Return what the lint says of an element of a story."""
+    return LintFinding(
+        rule=rule, level=level, part=story.name, place=place_of(element, story), message=message
+    )
+
+
 _INDEXES = ("TOC", "INDEX", "TOA", "BIBLIOGRAPHY")
 _TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "rPrChange", "pPrChange"))
 
@@ -76,40 +88,34 @@ _TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "
 def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[LintFinding]:
     """Yield what around the tags asks for a look, and tags that stand where nothing is filled."""
 
-    def warn(rule: str, story: Story, element: Element, message: str) -> LintFinding:
-        return LintFinding(
-            rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message
-        )
-
     # Their elements are held, so that an identity stays that of one element.
     written = [field.begin for field in contents_fields(parts[0].root) if can_update(field)]
     placed = {id(one) for one in written}
     for story in parts:
         for element in story.root.iter(*_TRACKED):
-            yield warn("tracked-changes", story, element, "tracked changes: accept or reject them before use")
+            yield at_element(
+                "tracked-changes", story, element, "tracked changes: accept or reject them before use"
+            )
             break
         for element in story.root.iter(q("w:del"), q("w:moveFrom")):
             if _TAG.search("".join(one.text or "" for one in element.iter(q("w:delText"), q("w:t")))):
-                yield LintFinding(
-                    rule="tracked-changes",
-                    level="error",
-                    part=story.name,
-                    place=place_of(element, story),
-                    message="a tag stands in a tracked deletion and would be printed: accept the deletion",
-                )
+                message = "a tag stands in a tracked deletion and would be printed: accept the deletion"
+                yield at_element("tracked-changes", story, element, message, "error")
         for element in story.root.iter(q("w:commentReference")):
-            yield warn("comments", story, element, "a comment will stand in the report")
+            yield at_element("comments", story, element, "a comment will stand in the report")
             break
         for element, code in walk_fields(story.root):
             word = code.split()[0].upper() if code.split() else ""
             if word in ("DATE", "TIME"):
-                yield warn(
+                yield at_element(
                     "date-field", story, element, f"{word} becomes the day of printing; use tk:report.date"
                 )
             elif word == "IF":
-                yield warn("if-field", story, element, "an IF field is not evaluated; use a tk:if control")
+                yield at_element(
+                    "if-field", story, element, "an IF field is not evaluated; use a tk:if control"
+                )
             elif word in _INDEXES and id(element) not in placed:
-                yield warn(
+                yield at_element(
                     "contents",
                     story,
                     element,
@@ -187,13 +193,8 @@ def _aside(story: Story) -> Iterator[LintFinding]:
         if element.get(q("r:id")) in targets
     ]
     for element, where in {id(element): (element, where) for element, where in findings}.values():
-        yield LintFinding(
-            rule="wrong-place",
-            level="error",
-            part=story.name,
-            place=place_of(element, story),
-            message=f"a literal tag stands in {where}, where nothing is filled",
-        )
+        message = f"a literal tag stands in {where}, where nothing is filled"
+        yield at_element("wrong-place", story, element, message, "error")
 
 
 # Which fonts a template asks for, and which of them this machine cannot show as they are.
