@@ -16,16 +16,6 @@ if TYPE_CHECKING:
     from toolkit.report.document import Document
     from toolkit.report.word.package import Template
 
-TITLES = {
-    "report": "The report of a test",
-    "certificate": "A calibration certificate",
-    "comparison": "A comparison",
-    "diagnosis": "A diagnosis",
-    "audit": "An audit's summary",
-    "plan": "The sheet of a plan",
-    "laboratories": "An interlaboratory comparison",
-}
-
 
 def list_tags(content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> list[dict[str, Any]]:
     """Return every tag as a JSON-ready dict; ``available`` and ``value`` are null without a test."""
@@ -73,21 +63,22 @@ def _tag(entry: Entry, content: ReportContent | None, style: Style, vocabulary: 
 
 # The report of a test stands first: a template without the tags of another kind is its own.
 _DOCUMENTS = {
-    "report": "test.content.REPORT",
-    "certificate": "certificate.content.CERTIFICATE",
-    "comparison": "comparison.content.COMPARISON",
-    "diagnosis": "diagnosis.answer.DIAGNOSIS",
-    "audit": "audit.content.AUDIT",
-    "plan": "plan.content.PLAN",
-    "laboratories": "laboratories.content.LABORATORIES",
+    "report": ("test.content.REPORT", "The report of a test"),
+    "certificate": ("certificate.content.CERTIFICATE", "A calibration certificate"),
+    "comparison": ("comparison.content.COMPARISON", "A comparison"),
+    "diagnosis": ("diagnosis.answer.DIAGNOSIS", "A diagnosis"),
+    "audit": ("audit.content.AUDIT", "An audit's summary"),
+    "plan": ("plan.content.PLAN", "The sheet of a plan"),
+    "laboratories": ("laboratories.content.LABORATORIES", "An interlaboratory comparison"),
 }
+TITLES = {name: title for name, (_, title) in _DOCUMENTS.items()}
 
 
 class Vocabularies(Mapping[str, "Vocabulary"]):
     """What templates of each kind can ask for, by the name of the kind."""
 
     def __getitem__(self, name: str) -> Vocabulary:
-        module, _, attribute = _DOCUMENTS[name].rpartition(".")
+        module, _, attribute = _DOCUMENTS[name][0].rpartition(".")
         document: Document[object] = getattr(import_module(f"toolkit.report.{module}"), attribute)
         return document.vocabulary
 
