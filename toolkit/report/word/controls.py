@@ -150,12 +150,8 @@ def fill_literals(paragraph: Element, resolve: Callable[[Tag], str]) -> None:
         else:
             for middle in texts[first + 1 : last]:
                 middle.text = ""
-            _keep(texts[last], after)
+            set_text(texts[last], after)
             set_text(texts[first], before + text)
-
-
-def _keep(t: Element, text: str) -> None:
-    set_text(t, text)
 
 
 def set_cell(cell: Element, text: str) -> None:
