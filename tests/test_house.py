@@ -58,7 +58,7 @@ def test_files_are_small() -> None:
 
 def test_the_public_api_is_small_and_there() -> None:
     names = [name for name in dir(toolkit) if not name.startswith("_")]
-    assert len(names) <= 30
+    assert len(names) <= 20
     for name in names:
         assert getattr(toolkit, name) is not None
 

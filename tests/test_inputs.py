@@ -14,11 +14,11 @@ import pytest
 
 from tests.cli.test_main_paths import commands
 from tests.conftest import EXAMPLES
+from toolkit import inputs
 from toolkit.cli.main import run
 from toolkit.errors import ConfigError, TemplateError, ToolkitError, UnreadableError
 from toolkit.files import read_toml, sha256_bytes, sha256_file
 from toolkit.inputs import (
-    FORMS,
     RECORDING_FILE,
     SETTINGS_FILE,
     TIRE_FILE,
@@ -33,6 +33,7 @@ from toolkit.inputs import (
     size_text,
 )
 
+FORMS = [form for form in vars(inputs).values() if isinstance(form, Form)]
 SMALL = Form(title="the tire file", limit=100, reason="of this test")
 SPECIAL = ("pipe", "socket", "folder", "endless", "terminal", "to-pipe")
 

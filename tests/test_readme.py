@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from toolkit.cli.main import run
-from toolkit.examples.fig4_4 import packaged_fig4_4
+from toolkit.examples import packaged_fig4_4
 from toolkit.recording.folder import read_test_folder
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -19,9 +19,10 @@ A record turns indications into loads, each with its expanded uncertainty; units
 >>> list(loads.to_dataframe().columns)
 ['FY [N]', 'U(FY) [N]', 'MZ [N*m]', 'U(MZ) [N*m]', 'MX [N*m]', 'U(MX) [N*m]']
 
-`read_test` and `process` take a test from its recordings to its characteristics, `fit_tire` to tire models,
-`write_report` to the laboratory's Word template; `diagnose`, `simulate` and `audit_archive` are the use cases
-of the same names. docs/library.md walks through all of them.
+`read_test` and `process` take a test from its recordings to its characteristics, `fit_tire` to tire models.
+The laboratory's `write_report` fills its Word template, and its `audit_archive` tells which calibration
+computed old files; `diagnose` and `simulate` are the use cases of the same names. docs/library.md walks
+through all of them.
 """
 
 from __future__ import annotations
@@ -34,61 +35,48 @@ from toolkit.version import __version__ as __version__
 if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.estimate import Estimate
-    from toolkit.lab.archives.archive import Audit, audit_archive
     from toolkit.lab.laboratory import Laboratory, example, open_laboratory
-    from toolkit.lab.records.record import Loads, Record
+    from toolkit.lab.records.record import Record
     from toolkit.lab.studies.cases import Diagnosis, Simulation, diagnose, simulate
     from toolkit.lab.tire_tests.test import (
         ProcessedTest,
         Recording,
-        Report,
         Test,
         read_recording,
         read_test,
-        write_report,
     )
     from toolkit.lab.tire_tests.tires import Tire, TireFit, fit_tire, read_tire
-    from toolkit.machine import Machine, load_machine
 
 __all__ = [
-    "Audit",
     "Diagnosis",
     "Estimate",
     "Laboratory",
-    "Loads",
-    "Machine",
     "ProcessedTest",
     "Record",
     "Recording",
-    "Report",
     "Simulation",
     "Test",
     "Tire",
     "TireFit",
     "ToolkitError",
-    "audit_archive",
     "diagnose",
     "example",
     "fit_tire",
-    "load_machine",
     "open_laboratory",
     "read_recording",
     "read_test",
     "read_tire",
     "simulate",
-    "write_report",
 ]
 
 _PUBLIC = {
     "errors": "ToolkitError",
     "estimate": "Estimate",
-    "lab.archives.archive": "Audit audit_archive",
     "lab.studies.cases": "Diagnosis Simulation diagnose simulate",
     "lab.laboratory": "Laboratory example open_laboratory",
-    "lab.records.record": "Loads Record",
-    "lab.tire_tests.test": "ProcessedTest Recording Report Test read_recording read_test write_report",
+    "lab.records.record": "Record",
+    "lab.tire_tests.test": "ProcessedTest Recording Test read_recording read_test",
     "lab.tire_tests.tires": "Tire TireFit fit_tire read_tire",
-    "machine": "Machine load_machine",
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names.split()}
 

@@ -111,8 +111,8 @@ def signs(source: Axes, target: Axes, rotation: Rotation = "forward") -> dict[st
     >>> signs("ISO-W", "adapted-SAE")
     {'SA': 1, 'FY': -1, 'MZ': -1}
     """
-    one, other = _from_sae(source, rotation), _from_sae(target, rotation)
-    return {symbol: one[symbol] * other[symbol] for symbol in one}
+    from_source, from_target = _from_sae(source, rotation), _from_sae(target, rotation)
+    return {symbol: from_source[symbol] * from_target[symbol] for symbol in from_source}
 
 
 def hub_signs(source: Axes, rotation: Rotation = "forward") -> dict[str, int]:

@@ -43,7 +43,7 @@ class ToolkitError(Exception):
 
     def __init__(
         self,
-        what: str,
+        sentence: str,
         *,
         where: object = None,
         line: str | None = None,
@@ -52,9 +52,9 @@ class ToolkitError(Exception):
         next_step: str | None = None,
         rule: str | None = None,
     ) -> None:
-        what = _readable(what)
-        super().__init__(what)
-        self.what = what
+        sentence = _readable(sentence)
+        super().__init__(sentence)
+        self.what = sentence
         self.where = None if where is None else _readable(where)
         self.line = None if line is None else _readable(line)
         self.got = None if got is None else _readable(got)
@@ -101,8 +101,8 @@ def _readable(part: object) -> str:
     )
 
 
-def _rebuild(cls: type[ToolkitError], what: str, parts: dict[str, str | None]) -> ToolkitError:
-    return cls(what, **{key: value for key, value in parts.items() if key != "what"})
+def _rebuild(cls: type[ToolkitError], sentence: str, parts: dict[str, str | None]) -> ToolkitError:
+    return cls(sentence, **{key: value for key, value in parts.items() if key != "what"})
 
 
 class ConfigError(ToolkitError):

@@ -175,12 +175,12 @@ def real_path(path: Path) -> Path:
         return path.absolute()
 
 
-def same_file(one: Path, other: Path) -> bool:
+def same_file(path: Path, twin: Path) -> bool:
     """Tell whether two paths lead to one place, by links or where a file system takes A for a."""
     with contextlib.suppress(OSError, ValueError):
-        if one.samefile(other):
+        if path.samefile(twin):
             return True
-    return real_path(one) == real_path(other)
+    return real_path(path) == real_path(twin)
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -194,6 +194,19 @@ def is_number(value: object) -> TypeGuard[int | float]:
     """
     # Not math.isfinite: TOML has whole numbers of any length, and one past a float's reach raises there.
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
+
+
+def reads_as_number(text: str) -> bool:
+    """Tell whether a text is a number as Python reads it.
+
+    >>> reads_as_number("-1e3"), reads_as_number("1,5")
+    (True, False)
+    """
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def number_expected(actual: object, expected: str) -> str:

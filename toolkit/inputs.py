@@ -167,24 +167,6 @@ REQUEST_FILE = Form(
     expected="a file that --request wrote, or toolkit sign",
     next_step="check the path",
 )
-FORMS = (
-    SETTINGS_FILE,
-    RECORDING_FILE,
-    TABLE_FILE,
-    TYDEX_FILE,
-    TIRE_FILE,
-    TEMPLATE_FILE,
-    RESULT_FILE,
-    CODE_FILE,
-    FMU_FILE,
-    RECORD_FILE,
-    NAMED_FILE,
-    LIST_FILE,
-    DATA_FILE,
-    PDF_FILE,
-    CERTIFICATE_FILE,
-    REQUEST_FILE,
-)
 
 _SIZE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(?:([KMGT])I?)?B?\s*", re.IGNORECASE)
 _KINDS = (

@@ -56,7 +56,7 @@ _DESCRIBING = (".json", ".toml")
 _DISK = frozenset(
     (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 )
-_EXCHANGE, _HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux
+_EXCHANGE, _AT_FDCWD = 2, -100  # of Linux: RENAME_EXCHANGE, AT_FDCWD
 
 
 @contextlib.contextmanager
@@ -259,12 +259,12 @@ def _enter(folder: Path) -> None:
         _check_ways(entering, folder)
         results = sorted(result_files(entering), key=_described_first)
         for path in results:
-            way = folder / path
-            way.parent.mkdir(parents=True, exist_ok=True)
+            place = folder / path
+            place.parent.mkdir(parents=True, exist_ok=True)
             if is_folder(entering / path):
-                way.mkdir(exist_ok=True)
+                place.mkdir(exist_ok=True)
             else:
-                (entering / path).replace(way)
+                (entering / path).replace(place)
         for place in {(folder / path).parent for path in results}:
             sync_folder(place)
         for path in result_files(entering / SUPERSEDED):
@@ -301,15 +301,15 @@ def _check_names(stage: Path, target: Path) -> None:
     names: dict[str, Path] = {}
     for result in result_files(stage):
         for path in (result, *result.parents[:-1]):
-            other = names.setdefault(_caseless(path), path)
-            if other != path:
-                raise FileExistsError(errno.EEXIST, f"{other} and {path} differ by case alone")
+            namesake = names.setdefault(_caseless(path), path)
+            if namesake != path:
+                raise FileExistsError(errno.EEXIST, f"{namesake} and {path} differ by case alone")
     for folder in {path.parent for path in names.values()}:
         for entry in (target / folder).iterdir() if (target / folder).is_dir() else ():
             path = folder / entry.name
-            other = names.get(_caseless(path), path)
-            if other != path and same_file(target / other, entry):
-                raise FileExistsError(errno.EEXIST, f"{path} is there, and {other} would replace it")
+            namesake = names.get(_caseless(path), path)
+            if namesake != path and same_file(target / namesake, entry):
+                raise FileExistsError(errno.EEXIST, f"{path} is there, and {namesake} would replace it")
 
 
 def _caseless(path: Path) -> str:
@@ -329,14 +329,14 @@ def _exchanged(stage: Path, target: Path) -> bool:
         stage.rename(beside)
     except (OSError, AttributeError):
         return _marked_again(stage, superseded)
-    ways = (_HERE, os.fsencode(beside), _HERE, os.fsencode(target), _EXCHANGE)
-    if exchange(*ways) != 0:
+    arguments = (_AT_FDCWD, os.fsencode(beside), _AT_FDCWD, os.fsencode(target), _EXCHANGE)
+    if exchange(*arguments) != 0:
         beside.rename(stage)
         return _marked_again(stage, superseded)
     try:
         sync_folder(target.parent)
     except OSError:
-        exchange(*ways)
+        exchange(*arguments)
         raise
     for path in result_files(beside):
         if path not in names and not os.path.lexists(target / path):  # it came in that very moment
@@ -355,8 +355,8 @@ def _marked_again(stage: Path, superseded: Iterable[Path]) -> Literal[False]:
 
 def _holds_only(target: Path, names: Container[Path], stage: Path) -> bool:
     """Tell whether a folder holds plain files of these names alone, and nobody works in it."""
-    here = real_path(Path.cwd())
-    if stage.parent != target or target in (here, *here.parents):
+    working_folder = real_path(Path.cwd())
+    if stage.parent != target or target in (working_folder, *working_folder.parents):
         return False
     earlier = [path for path in result_files(target) if path.parts[0] != stage.name]
     return all(path in names and stat.S_ISREG((target / path).lstat().st_mode) for path in earlier)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from toolkit.audit.archive import audit_archive
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app
-from toolkit.examples.fig4_4 import write_fig4_4
+from toolkit.examples import write_fig4_4
 
 HOME = Path(__file__).resolve().parents[2]
 DATED = 'schema = 1\nmachine = "m15"\ndate = 2019-03-01\n'

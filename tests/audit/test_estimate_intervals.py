@@ -3,7 +3,7 @@ import numpy as np
 from tests.audit.audit_factory import FY, changed, columns
 from toolkit.audit.estimate import coefficient_intervals, interval_bounds
 from toolkit.audit.model import columns_of
-from toolkit.examples.fig4_4 import packaged_fig4_4
+from toolkit.examples import packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
 

@@ -21,7 +21,7 @@ from tests.audit.audit_factory import (
 from toolkit.audit.candidates import group_of
 from toolkit.audit.identify import identify_columns, recompute, repair
 from toolkit.audit.model import columns_of
-from toolkit.examples.fig4_4 import packaged_fig4_4
+from toolkit.examples import packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
 

@@ -15,7 +15,7 @@ from toolkit.audit.resume import RESULTS, Results
 from toolkit.audit.serial import from_plain, to_plain
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError
-from toolkit.examples.fig4_4 import write_fig4_4
+from toolkit.examples import write_fig4_4
 
 HOME = Path(__file__).resolve().parents[2]
 

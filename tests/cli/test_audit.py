@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from toolkit.cli.main import _register, app
-from toolkit.examples.fig4_4 import write_fig4_4
+from toolkit.examples import write_fig4_4
 from toolkit.lab.archives.audit_headline import headline_of
 
 HOME = Path(__file__).resolve().parents[2]

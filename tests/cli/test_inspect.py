@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from toolkit.cli import inspect
 from toolkit.errors import ToolkitError
-from toolkit.examples.fig4_4 import ROWS, SYMBOLS, packaged_fig4_4
+from toolkit.examples import ROWS, SYMBOLS, packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording.labview import write_labview
 

@@ -16,7 +16,8 @@ from scipy.signal import lfilter
 
 from tests.coverage.rows import CoverageRow, row_of
 from toolkit.estimate import coverage_factor
-from toolkit.tires import Curve, CurveFit, fit_curves
+from toolkit.tires.fit import fit_curves
+from toolkit.tires.model import Curve, CurveFit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

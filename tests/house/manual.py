@@ -1,15 +1,18 @@
-"""What the pages of commands, library and licences print: the command tree, docstrings, hashes."""
+"""What the pages of commands, library, templates and licences print: commands, docstrings, tags, hashes."""
 
 from __future__ import annotations
 
 import inspect
 import re
+import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import toolkit
 from tests.house.source import ROOT
+from toolkit.report.kinds import TITLES
+from toolkit.report.vocabulary import TableEntry, Vocabulary
 
 WIDTH = 100
 """Columns of a printed help."""
@@ -35,15 +38,26 @@ def _help(command: Any, name: str) -> Iterator[str]:
 
 
 def library_text() -> str:
-    """Return signature and docstring of every public name of the package, methods by their first sentence."""
-    return "\n".join(line for name in toolkit.__all__ for line in _entry(name)).rstrip() + "\n"
+    """Return signature and docstring of every public name, then the results that methods alone return."""
+    entries = [(f"toolkit.{name}", getattr(toolkit, name)) for name in toolkit.__all__]
+    entries += [(face.__name__, face) for face in _faces_of_methods()]
+    return "\n".join(line for title, entry in entries for line in _entry(title, entry)).rstrip() + "\n"
 
 
-def _entry(name: str) -> Iterator[str]:
-    thing = getattr(toolkit, name)
-    yield f"## toolkit.{name}\n"
+def _faces_of_methods() -> list[type]:
+    import toolkit.lab.archives.audit
+    from toolkit.lab.faces import Face
+
+    public = {getattr(toolkit, name) for name in toolkit.__all__}
+    # By their names: a class with slots stands a second time, as it was before it had them.
+    faces = {getattr(sys.modules[face.__module__], face.__name__) for face in Face.__subclasses__()}
+    return sorted(faces - public, key=lambda face: str(face.__name__))
+
+
+def _entry(title: str, thing: Any) -> Iterator[str]:
+    yield f"## {title}\n"
     if not inspect.isclass(thing):
-        yield f"```python\n{name}{_signature(thing)}\n```\n"
+        yield f"```python\n{thing.__name__}{_signature(thing)}\n```\n"
     text = inspect.getdoc(thing) or ""
     yield docstring(text if not _DUMP.match(text) else "")
     if inspect.isclass(thing):
@@ -53,16 +67,22 @@ def _entry(name: str) -> Iterator[str]:
         ]
         if lines:
             yield "\n".join(lines) + "\n"
+        for key, member in vars(thing).items():
+            if inspect.isfunction(member) and "Parameters\n---" in (inspect.getdoc(member) or ""):
+                yield f"### {thing.__name__}.{key}\n"
+                yield f"```python\n{key}{_signature(member)}\n```\n"
+                yield docstring(inspect.getdoc(member) or "")
 
 
 def _signature(function: Any) -> str:
     """Return parameters, a line each; a default that is a function is said to be one."""
     signature = inspect.signature(function)
+    parameters = [each for each in signature.parameters.values() if each.name != "self"]
     parts = [
         re.sub(r"<function .*", "a function", re.sub(r"'([^']*)'", r"\1", str(parameter)))
-        for parameter in signature.parameters.values()
+        for parameter in parameters
     ]
-    kinds = [parameter.kind for parameter in signature.parameters.values()]
+    kinds = [parameter.kind for parameter in parameters]
     if inspect.Parameter.KEYWORD_ONLY in kinds:
         parts.insert(kinds.index(inspect.Parameter.KEYWORD_ONLY), "*")
     returned = str(signature.return_annotation).strip("'")
@@ -114,6 +134,44 @@ def _items(text: str) -> str:
 
 def _markdown(text: str) -> str:
     return text.replace("``", "`").replace("<", "&lt;").replace("*", "\\*")
+
+
+def tags_text(vocabularies: Iterable[Vocabulary]) -> str:
+    """Return every value, figure, table and condition that templates of each kind can ask for."""
+    return "\n".join(line for vocabulary in vocabularies for line in _chapter(vocabulary))
+
+
+def _chapter(vocabulary: Vocabulary) -> Iterator[str]:
+    yield from (f"## {TITLES[vocabulary.name]}", "")
+    yield from ("A template must hold " + ", ".join(f"`{tag}`" for tag in vocabulary.required) + ".", "")
+    yield from ("### Values", "", "| tag | kind | unit | value |", "|---|---|---|---|")
+    for entry in vocabulary.values:
+        yield _row(f"`tk:{entry.path}`", entry.kind, entry.unit or "", entry.description)
+    yield from ("", "### Figures", "", "Each has its caption as `tk:caption.<name>`.", "")
+    yield from ("| tag | as a chart of Word's own | figure |", "|---|---|---|")
+    for name, description in vocabulary.figures.items():
+        chart = f"`tk:chart.{name}`" if name in vocabulary.charts else ""
+        yield _row(f"`tk:figure.{name}`", chart, description)
+    yield from ("", "### Tables", "")
+    for name, table in vocabulary.tables.items():
+        yield from _table(name, table)
+    yield from ("### Conditions", "")
+    yield from ("Beside these, `tk:if.<name>` takes the name of any value, figure or table.", "")
+    yield from ("| tag | kept when |", "|---|---|")
+    for name, description in vocabulary.conditions.items():
+        yield _row(f"`tk:if.{name}`", description)
+    yield ""
+
+
+def _table(name: str, table: TableEntry) -> Iterator[str]:
+    yield from (f"`tk:table.{name}`: {table.description}.", "", "| tag | unit | column |", "|---|---|---|")
+    for column in table.columns:
+        yield _row(f"`tk:row.{column.name}`", column.unit or "", column.description)
+    yield ""
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
 
 def licences_text() -> str:

@@ -1,10 +1,9 @@
 """The pages of ``docs/`` that are printed from the code: ``python -m tests.house.pages`` writes them.
 
 A page is prose, written by hand, above a line that says so, and below it what the declarations say: one page
-for each file format, one each for the effects, the characteristics, the rules, the commands, the library and
-licences. A page that does not exist
-yet is begun with its title; its prose is then to be written. The page of tags is the report's own
-(`toolkit.report.kinds`) and is written with them.
+for each file format, one each for the effects, the characteristics, the rules, the commands, the library, the
+tags of templates and licences. A page that does not exist yet is begun with its title; its prose is then to
+be written.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from toolkit.declared.describe import _sections
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, Stage
 from toolkit.lab.rules import effect_keys, rules_catalogue
-from toolkit.report.kinds import write_manual
+from toolkit.report.kinds import VOCABULARIES
 
 GENERATED = "<!-- Written by `make pages` from here on: change the declarations, not this text. -->"
 
@@ -81,6 +80,7 @@ def generated(root: Path = ROOT) -> dict[str, tuple[str, str]]:
         "answers.md": ("Answers of the commands", _answers_text()),
         "commands.md": ("The commands", manual.commands_text()),
         "api.md": ("Public names of the library", manual.library_text()),
+        "templates.md": ("Templates", manual.tags_text(VOCABULARIES.values())),
         "licences.md": ("Licences of what others wrote", manual.licences_text()),
     }
     for cls in formats(root):
@@ -172,11 +172,6 @@ def main() -> int:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
             print(path.relative_to(ROOT))  # noqa: T201
-    tags = ROOT / "docs" / "templates.md"
-    present = tags.read_text(encoding="utf-8")
-    write_manual(tags)
-    if tags.read_text(encoding="utf-8") != present:
-        print(tags.relative_to(ROOT))  # noqa: T201
     return 0
 
 

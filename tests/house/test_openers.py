@@ -34,7 +34,6 @@ ALLOWED = {
     ("toolkit.report.word.office", "read_text"): "the system's figures of its own processes",
     ("toolkit.report.word.office", "ZipFile"): "a document that was just written",
     ("toolkit.report.word.filled", "iterparse"): "a part of an archive in memory",
-    ("toolkit.report.kinds", "read_text"): "a page of the manual, while the project is built",
     ("toolkit.report.pages.kit", "read_text"): "data of the package",
     ("toolkit.lab.rules", "read_text"): "data of the package",
     ("toolkit.lab.home", "copyfile"): "data of the package",

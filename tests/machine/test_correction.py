@@ -13,8 +13,7 @@ import pytest
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import sha256_file
 from toolkit.machine import Correction, load_machine
-from toolkit.machine.definition import machine_file, machine_of_text
-from toolkit.machine.next_version import next_version
+from toolkit.machine.definition import machine_file, machine_of_text, next_version
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
 from toolkit.reduction.corrections import corrected, u_SA

@@ -9,7 +9,7 @@ import pytest
 
 from toolkit.declared import read
 from toolkit.errors import ConfigError
-from toolkit.machine.loading import LoadingFixtures
+from toolkit.machine.hub import LoadingFixtures
 from toolkit.planning.fixtures import FeasibleLoads, loads_of_fixtures
 from toolkit.planning.knowledge import Knowledge
 from toolkit.units import to_si

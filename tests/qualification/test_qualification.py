@@ -18,9 +18,19 @@ from tests.conftest import SHARED_DATA
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.files import read_toml
 from toolkit.lab.home import packaged_home
-from toolkit.qualification.examples import check_certified, check_e74, check_lines, solve
 from toolkit.qualification.model import QualificationRecord, correct_digits, printed_check
-from toolkit.qualification.numbers import DIGESTS, FOLDER, SETS, check_whole, identity, read_set
+from toolkit.qualification.numbers import (
+    DIGESTS,
+    FOLDER,
+    SETS,
+    check_certified,
+    check_e74,
+    check_lines,
+    check_whole,
+    identity,
+    read_set,
+    solve,
+)
 from toolkit.qualification.run import check_golden, qualify
 
 DAY = date(2026, 11, 21)

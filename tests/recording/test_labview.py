@@ -13,7 +13,7 @@ import openpyxl
 import pytest
 
 from toolkit.errors import OutputError
-from toolkit.examples.fig4_4 import NAMES, ROWS, SPREADSHEET_ROWS, SYMBOLS, packaged_fig4_4, write_fig4_4
+from toolkit.examples import NAMES, ROWS, SPREADSHEET_ROWS, SYMBOLS, packaged_fig4_4, write_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording import machine_of, read_recording
 from toolkit.recording.labview import write_labview

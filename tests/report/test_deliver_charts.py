@@ -20,8 +20,8 @@ from toolkit.report.deliver import Delivered, deliver
 from toolkit.report.kinds import check
 from toolkit.report.style import Style, read_style, style_file
 from toolkit.report.test.content import REPORT, build_content
+from toolkit.report.word.chart import with_alternatives
 from toolkit.report.word.package import read_template
-from toolkit.report.word.spoken import with_alternatives
 from toolkit.report.word.toc_pages import pdf_text
 
 pytestmark = pytest.mark.skipif(

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 import toolkit.report.test
+from tests.house.manual import tags_text
 from tests.recipes import file_of
 from tests.report.report_factory import make_record, make_result
 from tests.report.template_factory import FOLDER, make, p, tbl, texts
-from toolkit.report.kinds import VOCABULARIES, check, list_tags, reference_page, write_manual
+from toolkit.report.kinds import VOCABULARIES, check, list_tags
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, build_content
 from toolkit.report.vocabulary import Entry, TableEntry, Vocabulary, columns_of
@@ -30,7 +31,6 @@ KINDS = {
     "comparison": "comparison",
     "diagnosis": "diagnosis",
 }
-MANUAL = FOLDER.parent / "docs" / "templates.md"
 WORDS = Vocabulary(
     name="audit",
     values=(
@@ -103,7 +103,7 @@ def test_a_new_table_is_one_declaration(tmp_path: Path, monkeypatch: pytest.Monk
     try:
         entries = {entry["tag"]: entry for entry in list_tags(None, Style(), REPORT.vocabulary)}
         assert entries["tk:table.heaviest"]["columns"] == ["file", "FZ", "U_FZ"]
-        assert "`tk:table.heaviest`: the conditions" in reference_page([REPORT.vocabulary])
+        assert "`tk:table.heaviest`: the conditions" in tags_text([REPORT.vocabulary])
         found = check(read_template(path), Style(), fonts=False)
         assert [finding for finding in found if finding.level != "note"] == []
         content = build_content(make_result(), make_record(), style=Style(force="lbf"))
@@ -117,10 +117,3 @@ def test_a_new_table_is_one_declaration(tmp_path: Path, monkeypatch: pytest.Monk
         for derived in ("declarations", "vocabulary"):
             vars(REPORT).pop(derived, None)
     assert check(read_template(path), Style(), fonts=False)[0].rule == "unknown-tag"
-
-
-def test_the_manual_lists_what_is_declared(tmp_path: Path) -> None:
-    page = tmp_path / "templates.md"
-    page.write_bytes(MANUAL.read_bytes())
-    write_manual(page)
-    assert MANUAL.read_text() == page.read_text(), "run: python -m toolkit.report.kinds docs/templates.md"

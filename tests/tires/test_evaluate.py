@@ -6,8 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from toolkit.errors import FitError
-from toolkit.tires import Curve, estimate_at, fit_curves, slope_at, slope_estimate_at, value_at, zero_crossing
+from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
+from toolkit.tires.fit import fit_curves
 from toolkit.tires.global_data import load_blocks
+from toolkit.tires.model import Curve
 from toolkit.tires.models import find, model, model_names
 from toolkit.tires.models.magic_formula import value
 from toolkit.tires.quality import error_percent, scatter_floor_percent

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from toolkit.errors import FitError
-from toolkit.tires import Curve, fit_curves, value_at, why_not
-from toolkit.tires.fit import MIN_POINTS
+from toolkit.tires.evaluate import value_at
+from toolkit.tires.fit import MIN_POINTS, fit_curves, why_not
+from toolkit.tires.model import Curve
 from toolkit.tires.models.magic_formula import slope, value
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

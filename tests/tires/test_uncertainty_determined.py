@@ -9,9 +9,9 @@ from toolkit.characteristics.model import Characteristics
 from toolkit.estimate import coverage_factor
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
-from toolkit.tires import Curve, fit_curves
 from toolkit.tires.colour import noise_of
-from toolkit.tires.fit import _normalise
+from toolkit.tires.fit import _normalise, fit_curves
+from toolkit.tires.model import Curve
 from toolkit.tires.solver import solve
 from toolkit.tires.uncertainty import curve_columns, spread
 

@@ -10,11 +10,10 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
 from toolkit.errors import TrustError
-from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
+from toolkit.trust.checkpoint import Checkpoint, countersign, parse_checkpoint, place
 from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import leaf_hash, root_of
 from toolkit.trust.ssh import parse_public, public_of, sign_with
-from toolkit.trust.witness import countersign, place
 
 # golang.org/x/mod/sumdb/note, package example: the note, its signature line and its verifier key.
 NOTE = "If you think cryptography is the answer to your problem,\nthen you don't know what your problem is.\n"

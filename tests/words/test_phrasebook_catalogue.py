@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from tests.report.template_factory import FOLDER
-from toolkit.report.word.language import fixed_texts, phrase_of
 from toolkit.report.word.package import open_package, read_template
+from toolkit.report.word.scan import fixed_texts, phrase_of
 from toolkit.report.word.xml import stories
 from toolkit.words.phrasebook import PLACE, SOURCE, languages, locale_of, phrasebook, phrases
 

@@ -18,8 +18,7 @@ from tests.workbench.conftest import Served, filled, serving
 from tests.workbench.test_home_page import command
 from tests.workbench.test_page import ANSWER
 from toolkit.cli.main import run
-from toolkit.lab.archives.archive import audit_archive
-from toolkit.lab.laboratory import example
+from toolkit.lab.laboratory import example, open_laboratory
 
 Capture = pytest.CaptureFixture[str]
 _FILE = re.compile(r"\.(xlsx|png|csv|json|js|css|docx|pdf|toml|txt)$")
@@ -36,7 +35,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     (home / "tests" / "few").mkdir(parents=True)
     shutil.copy(example("fig4_4"), home / "tests" / "few")
     (home / "tests" / "few" / "test.toml").write_text('schema = 1\nmachine = "m15"\ndate = 2019-05-31\n')
-    audit_archive(home / "tests" / "few", out=home / "audits" / "one", calibrations=home / "calibrations")
+    open_laboratory(calibrations=home / "calibrations").audit_archive(
+        home / "tests" / "few", out=home / "audits" / "one"
+    )
     for kind, words in PLANS.items():
         said = io.StringIO()
         with contextlib.redirect_stdout(said), pytest.raises(SystemExit) as ended:

@@ -11,8 +11,8 @@ import pytest
 
 from tests.benchmarks.archive_factory import KNOWN_AT, make_archive
 from tests.workbench.conftest import Served, plain, serving
-from toolkit.lab.archives.archive import audit_archive
 from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.laboratory import open_laboratory
 
 ALL = holding_id("audits/all")
 
@@ -24,8 +24,8 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     made = make_archive(home, files=40, rows=100)
     if made.calibrations != home / "calibrations":
         made.calibrations.rename(home / "calibrations")
-    audit_archive(
-        made.folder, out=home / "audits" / "all", calibrations=home / "calibrations", known_at=KNOWN_AT
+    open_laboratory(calibrations=home / "calibrations").audit_archive(
+        made.folder, out=home / "audits" / "all", known_at=KNOWN_AT
     )
     with serving(home) as bench:
         yield bench

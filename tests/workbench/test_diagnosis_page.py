@@ -14,7 +14,7 @@ from tests.workbench.conftest import ROOT, Served, plain, serving
 from tests.workbench.test_jobs_page import done
 from toolkit.errors import UnreadableError
 from toolkit.lab.desk.holdings import holding_id
-from toolkit.lab.desk.seen_diagnosis import read_diagnosis
+from toolkit.lab.desk.sized_model import read_diagnosis
 
 CASE, ANSWER = holding_id("cases/cell"), holding_id("diagnoses/cases/cell")
 TOML = """schema = 1

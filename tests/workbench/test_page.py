@@ -12,10 +12,9 @@ from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.workbench.conftest import ROOT, Served, serving
 from tests.workbench.test_app import DARK_PHONE, LIGHT, browser, objections, opened, settled
-from toolkit.lab.archives.archive import audit_archive
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.desk.jobs import Job, write_job
-from toolkit.lab.laboratory import example
+from toolkit.lab.laboratory import example, open_laboratory
 
 __all__ = ["browser"]
 ONE, FEW, AUDIT, MANY = map(holding_id, ("tests/one", "tests/few", "audits/one", "audits/many"))
@@ -46,7 +45,9 @@ def working(tmp_path_factory: pytest.TempPathFactory, virtual_test: Path) -> Ite
     (home / "tests" / "few").mkdir()
     shutil.copy(example("fig4_4"), home / "tests" / "few")
     (home / "tests" / "few" / "test.toml").write_text('schema = 1\nmachine = "m15"\ndate = 2019-05-31\n')
-    audit_archive(home / "tests" / "few", out=home / "audits" / "one", calibrations=home / "calibrations")
+    open_laboratory(calibrations=home / "calibrations").audit_archive(
+        home / "tests" / "few", out=home / "audits" / "one"
+    )
     _many(home / "audits" / "one" / "audit.jsonl", home / "audits" / "many")
     shutil.copytree(ROOT / "report_templates", home / "report_templates", ignore=_but_one)
     (home / "diagnoses" / "cell" / "predictions").mkdir(parents=True)

@@ -41,7 +41,7 @@ class Sums:
     """What all files of an archive amount to, whatever the registry says now.
 
     ``grades`` has every grade, ``instruments`` those of the files, sorted. ``findings`` are of single files,
-    ``notes`` what informs only; ``tests`` plain values (`toolkit.audit.effects.TestSums.summary`).
+    ``notes`` what informs only; ``tests`` plain values (`toolkit.audit.archive_findings.TestSums.summary`).
     """
 
     grades: Mapping[str, int]

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from toolkit.audit.candidates import cannot_correct
-from toolkit.audit.choices import Choices
 from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
+from toolkit.audit.inspection import Choices
 from toolkit.audit.model import Grade, Identification, columns_of
 from toolkit.audit.quality import impossible, quality
 from toolkit.calibration.registry.clock import in_future

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.audit.candidates import cannot_correct
-from toolkit.audit.choices import Choices
 from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
+from toolkit.audit.inspection import Choices
 from toolkit.audit.model import columns_of
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.calibration.control.as_found import AsFound, as_found, as_found_history, phase_of

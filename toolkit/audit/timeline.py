@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from toolkit.audit.choices import Choices
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
+from toolkit.audit.inspection import Choices
 from toolkit.audit.model import CLEAN, columns_of
 from toolkit.errors import ToolkitError
 from toolkit.recording.read import read_recording

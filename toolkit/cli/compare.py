@@ -193,7 +193,7 @@ def _laboratories(
 ) -> int:
     from datetime import date as calendar
 
-    from toolkit.lab.tire_tests.laboratories import laboratories_answer
+    from toolkit.lab.tire_tests.compare import laboratories_answer
 
     payload, text, findings = laboratories_answer(
         path, reference=reference, sigma=sigma, figures=figures, opened=opened, out=out,

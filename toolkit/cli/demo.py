@@ -156,7 +156,7 @@ def _stage(out: Path) -> Iterator[Path]:
 
 
 def _steps(stage: Path) -> list[Step]:
-    from toolkit.examples.fig4_4 import packaged_fig4_4
+    from toolkit.examples import packaged_fig4_4
     from toolkit.lab.home import packaged_home
     from toolkit.machine.default import SIMULATED_MACHINE
 

@@ -95,6 +95,7 @@ def command(
     Example: toolkit fit tire.csv --model magic_formula --model mf61 --model brush --figures figures
     """
     from toolkit.lab.answers import refuse_unwritable
+    from toolkit.lab.tire_tests.convert import check_fmu, write_fit_fmu
     from toolkit.lab.tire_tests.fit_answer import fit_payload, fit_text
     from toolkit.lab.tire_tests.fit_models import (
         fit_options,
@@ -104,7 +105,6 @@ def command(
         refuse_other_files,
         write_figures,
     )
-    from toolkit.lab.tire_tests.fmu_files import check_fmu, write_fit_fmu
     from toolkit.lab.tire_tests.tire_files import check_tir, write_fit
     from toolkit.publication import publication
     from toolkit.tires.field_file import is_field_file

@@ -114,7 +114,7 @@ def correct(
     from toolkit.diagnosis.answer.correction import correction_of, machine_of
     from toolkit.machine import load_machine
     from toolkit.machine.default import DEFAULT_MACHINE
-    from toolkit.machine.next_version import next_version
+    from toolkit.machine.definition import next_version
     from toolkit.publication import write_result
     from toolkit.simulation.model_file import read_model
 

@@ -144,6 +144,13 @@ Home = Annotated[
     ),
 ]
 Id = Annotated[str, typer.Argument(help="Record id, such as rig-r2.")]
+ReportTemplate = Annotated[
+    Path | None,
+    typer.Option("--template", help="Word template; default: report_templates/org.docx of the home."),
+]
+AllowMissing = Annotated[
+    bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
+]
 CalibrationId = Annotated[
     str | None,
     typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),

@@ -10,6 +10,7 @@ import typer
 
 from toolkit.cli.console import answers
 from toolkit.cli.options import (
+    AllowMissing,
     CalibrationId,
     Draft,
     IssueOptions,
@@ -17,6 +18,7 @@ from toolkit.cli.options import (
     Output,
     ProtocolFile,
     Reader,
+    ReportTemplate,
     day,
     into_folder,
 )
@@ -31,10 +33,7 @@ def command(
         list[Path],
         typer.Argument(metavar="TEST...", help="Folders with test.toml and recordings, or reduced tests."),
     ],
-    template: Annotated[
-        Path | None,
-        typer.Option("--template", help="Word template; default: report_templates/org.docx of the home."),
-    ] = None,
+    template: ReportTemplate = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -97,9 +96,7 @@ def command(
     ] = False,
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
-    allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
-    ] = False,
+    allow_missing: AllowMissing = False,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep a report that was not verified in rejected/ of the folder.")
     ] = False,

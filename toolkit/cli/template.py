@@ -192,8 +192,8 @@ def words(
 
     Example: toolkit template words --language fr
     """
-    from toolkit.report.word.language import fixed_texts, phrase_of
     from toolkit.report.word.package import open_package, read_template
+    from toolkit.report.word.scan import fixed_texts, phrase_of
     from toolkit.report.word.xml import stories
     from toolkit.words.phrasebook import SOURCE, languages, phrasebook, phrases
 
@@ -255,8 +255,8 @@ def new(
     from toolkit.lab.home import packaged_home
     from toolkit.publication import publication
     from toolkit.report.style import style_file, style_in_language
-    from toolkit.report.word.language import in_language
     from toolkit.report.word.package import read_template
+    from toolkit.report.word.scan import in_language
     from toolkit.words.phrasebook import SOURCE, languages
 
     sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}

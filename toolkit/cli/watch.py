@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from toolkit.cli.console import answers
-from toolkit.cli.options import Output, RegistryOptions, into_folder
+from toolkit.cli.options import AllowMissing, Output, RegistryOptions, ReportTemplate, into_folder
 
 NAME = "watch"
 
@@ -22,10 +22,7 @@ def command(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", help="Folder in which tests arrive, each with test.toml.")
     ],
-    template: Annotated[
-        Path | None,
-        typer.Option("--template", help="Word template; default: report_templates/org.docx of the home."),
-    ] = None,
+    template: ReportTemplate = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -54,9 +51,7 @@ def command(
             "before stay. Default: the style file's.",
         ),
     ] = None,
-    allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
-    ] = False,
+    allow_missing: AllowMissing = False,
     *,
     place: RegistryOptions,
     output: Output,

@@ -41,12 +41,11 @@ _MOST_STEPS = 10_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robust:
-    """Robust mean and standard deviation of ``n`` results, and how many of them were drawn in."""
+    """Robust mean and standard deviation of ``n`` results."""
 
     mean: float
     sd: float
     n: int
-    drawn_in: int
 
     @property
     def u(self) -> float:
@@ -76,9 +75,7 @@ def algorithm_a(values: NDArray[np.float64], *, factor: float = FACTOR) -> Robus
         if settled:
             break
     sd = 0.0 if sd <= 1e-6 * scale else sd
-    return Robust(
-        mean=mean, sd=sd, n=len(values), drawn_in=int(np.count_nonzero(np.abs(values - mean) > _CUT * sd))
-    )
+    return Robust(mean=mean, sd=sd, n=len(values))
 
 
 Signal = Literal["action", "warning"]

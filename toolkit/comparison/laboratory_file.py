@@ -20,10 +20,9 @@ from typing import TYPE_CHECKING, NoReturn
 
 from toolkit.comparison.laboratories import K, Results
 from toolkit.errors import CellError, ColumnError, UnreadableError
-from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign, number_or_text
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
     from toolkit.units import Unit

@@ -35,7 +35,6 @@ from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.errors import CellError, ColumnError, FitError, UnreadableError
 from toolkit.findings import Finding
-from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.machine import TypeB
 from toolkit.reduction.model import Condition
@@ -45,7 +44,7 @@ from toolkit.tires.model import Curve
 from toolkit.tires.plausibility import demand_possible
 from toolkit.tires.table import TireTable, read_table
 from toolkit.tires.table_fit import axes_findings, fit_findings, repeat_findings, table_curves
-from toolkit.units import from_si, unit
+from toolkit.units import from_si, split_header, unit
 
 if TYPE_CHECKING:
     from toolkit.tires.model import CurveFit

@@ -185,8 +185,8 @@ def kept_model(model: ModelFile, sized: Sequence[Sized], folder: Path) -> str:
     if tuple(sized) != before:
         table["answer"] |= {"verdict": BY_HAND, "complete": False}
     table["effect"] = [
-        _entry(entry, effect, own)
-        for entry, effect, own in zip(table.get("effect", []), sized, before, strict=True)
+        _entry(entry, effect, effect_before)
+        for entry, effect, effect_before in zip(table.get("effect", []), sized, before, strict=True)
         if effect.on
     ]
     return f"# Kept from {model.path.name} of a diagnosis; nobody edits it.\n{toml_text(table)}"

@@ -16,9 +16,8 @@ from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, with
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of
-from toolkit.diagnosis.law.imitations import without_imitations
 from toolkit.diagnosis.law.learn import Laws, learned
-from toolkit.diagnosis.law.rivals import judged_by_laws
+from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Search, search
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget

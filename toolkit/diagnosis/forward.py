@@ -13,8 +13,8 @@ import numpy as np
 
 from toolkit.declared import Entry, Format, Keyed, build
 from toolkit.diagnosis.case.case import Case, CaseChannel
-from toolkit.diagnosis.case.model_file import corrections_of, parameters_of, simulation_of
 from toolkit.diagnosis.case.recordings import read_run
+from toolkit.diagnosis.case.simulation import corrections_of, parameters_of, simulation_of
 from toolkit.diagnosis.fit.predict import csv_of, prediction_names
 from toolkit.diagnosis.policy import WORKER
 from toolkit.diagnosis.simulators.build_simulator import model_of

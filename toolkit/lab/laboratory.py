@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from toolkit.lab.faces import Face, Facts
+from toolkit.lab.faces import Face, Facts, as_path
 from toolkit.lab.home import calibrations_folder, find_home, home_template, open_registry
 from toolkit.lab.records.record import Record, Records
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.verify import VerifyRow
-    from toolkit.lab.archives.archive import Audit
+    from toolkit.lab.archives.audit import Audit
     from toolkit.lab.tire_tests.test import ProcessedTest, Report, Test
 
 
@@ -97,18 +98,82 @@ class Laboratory(Face):
         return read_test(path, calibrations=self.calibrations)
 
     def write_report(
-        self, test: ProcessedTest, out: str | Path, *, template: str | Path | None = None, **options: Any
+        self,
+        test: ProcessedTest,
+        out: str | Path,
+        *,
+        template: str | Path | None = None,
+        models: Sequence[str] = (),
+        hand_over: bool = False,
+        allow_missing: bool = False,
+        step: Callable[[str], None] = lambda _text: None,
     ) -> Report:
-        """Return `toolkit.write_report` by a template of this laboratory; default ``org.docx``."""
-        from toolkit.lab.tire_tests.test import write_report
+        """Fill a Word template with a test and deliver it with its verified PDF, or deliver nothing.
 
-        return write_report(test, out, template=template or self.template("org.docx"), **options)
+        Parameters
+        ----------
+        out : the report's folder, new or an earlier report's
+        template : default ``org.docx`` of this laboratory
+        models : tire models that the report compares
+        hand_over : test.xlsx, test.tdx and tire.tir too
+        allow_missing : print n/a for a value that the test has not
+        step : told what is done
 
-    def audit_archive(self, archive: str | Path, **options: Any) -> Audit:
-        """Return `toolkit.audit_archive` by the records of this laboratory."""
-        from toolkit.lab.archives.archive import audit_archive
+        Raises
+        ------
+        ToolkitError
+            the template cannot be used, or the PDF does not show every value and figure
+        """
+        from toolkit.lab.tire_tests.fit_models import model_choice
+        from toolkit.lab.tire_tests.reports import Options, make_reports
+        from toolkit.lab.tire_tests.test import Report
+        from toolkit.report.word.package import read_template
 
-        return audit_archive(archive, calibrations=self.calibrations, **options)
+        options = Options(
+            template=read_template(Path(template) if template else self.template("org.docx")),
+            resolve=lambda _path: test.result,
+            models=model_choice(models) if models else (),
+            xlsx=hand_over, tydex=hand_over, tir=hand_over, allow_missing=allow_missing,
+        )  # fmt: skip
+        (report,) = make_reports([test.path], options, Path(out), step=step)
+        if isinstance(report.outcome, Exception):
+            raise report.outcome
+        return Report(result=report.outcome, made=report)
+
+    def audit_archive(
+        self,
+        archive: str | Path,
+        *,
+        out: str | Path | None = None,
+        known_at: dt.date | None = None,
+        workers: int = 1,
+        repair: str | Path | None = None,
+        reports: str | Path | None = None,
+    ) -> Audit:
+        """Tell for every file of an archive which calibration computed its forces, and what it changes.
+
+        Parameters
+        ----------
+        archive : a folder of recordings, in any depth
+        out : folder for the page and the lines; an audit goes on where it was ended; None writes nothing
+        known_at : the registry is judged as known on this day; default today
+        workers : processes that read files
+        repair : folder for corrected copies; the originals are never touched
+        reports : reports of past years, a folder or a CSV
+
+        Raises
+        ------
+        ToolkitError
+            the archive, the registry or a folder cannot be used
+        """
+        from toolkit.lab.archives.audit import Audit, AuditOrder, audit
+
+        order = AuditOrder(
+            archive=Path(archive), known_at=known_at, workers=workers, out=as_path(out),
+            repair=as_path(repair), reports=as_path(reports), calibrations=self.calibrations,
+        )  # fmt: skip
+        answer, written = audit(order)
+        return Audit(result=answer, written=written)
 
     def template(self, name: str) -> Path:
         """Return a template of ``report_templates/``; the packaged one where the laboratory has none."""
@@ -196,7 +261,7 @@ def example(name: str) -> Path:
     'tire.tir'
     """
     from toolkit.errors import ConfigError
-    from toolkit.examples.fig4_4 import packaged_fig4_4
+    from toolkit.examples import packaged_fig4_4
     from toolkit.lab.home import packaged_home
 
     virtual = Path(__file__).parents[1] / "examples" / "virtual"

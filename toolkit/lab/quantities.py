@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.errors import ColumnError, UnitError
-from toolkit.headers import split_header
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,14 +21,14 @@ from toolkit.declared import Source, refuse
 from toolkit.declared.describe import outline
 from toolkit.declared.text import attempt, value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
-from toolkit.headers import is_unit, split_header
 from toolkit.inputs import RECORDING_FILE, read_input
+from toolkit.units import is_unit, split_header
 
 FORMS = {
     "session": "toolkit.calibration.session.session_file:SessionFile",
     "machine": "toolkit.machine.definition:Machine",
     "test": "toolkit.recording.folder:StatedTest",
-    "case": "toolkit.diagnosis.case.case_file:CaseFile",
+    "case": "toolkit.diagnosis.case.reader:CaseFile",
     "plan": "toolkit.simulation.plan_file:PlanFile",
 }
 """Word of the command -> the class that declares its file."""

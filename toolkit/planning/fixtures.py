@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.session.table import Table
-    from toolkit.machine.loading import Loading
+    from toolkit.machine.hub import Loading
 
 _NONE: Mapping[str, float] = MappingProxyType({})
 _BEYOND = 1.1  # of the largest load that was put on: further the record says nothing of the cells

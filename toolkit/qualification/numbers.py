@@ -1,16 +1,30 @@
-"""The packaged numbers: one TOML file a certified set, the examples, and the digest of each file."""
+"""The packaged numbers: one TOML file a certified set, the examples, and the digest of each file.
+
+The examples are lines of ISO/TS 28037, ASTM E74 on the NIST load cell and NIST's certified regressions. The
+certified regressions go through the toolkit's own solver and are judged in correct digits. A polynomial of
+degree 10 (Filip) is beyond what a term can name: its powers of the centred variable are given as columns, as
+the solver builds them for lower degrees, and its results are carried back by the binomial theorem.
+
+Reference: NIST Statistical Reference Datasets, linear least squares.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.calibration.fit.inverse import StraightLine, x_from_y
+from toolkit.calibration.fit.odr import fit_odr
+from toolkit.calibration.fit.regression import TermFit, fit_terms
+from toolkit.calibration.standards.e74 import evaluate_e74
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import is_number, read_toml, sha256_bytes, sha256_file
-from toolkit.qualification.model import Check
+from toolkit.qualification.model import Check, correct_digits, digits_check, not_run, printed_check
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -118,3 +132,158 @@ def identity(folder: Path) -> str:
     """Return one hash of all packaged numbers, as they are."""
     lines = [f"{path.name} {sha256_file(path)}" for path in sorted(folder.glob("*.toml"))]
     return sha256_bytes("\n".join(lines).encode())
+
+
+CERTIFIED = "NIST StRD linear"
+_NAMED_POWERS = 9
+
+
+def check_certified(folder: Path) -> list[Check]:
+    """Solve every certified set; one check a quantity."""
+    checks: list[Check] = []
+    for name in SETS:
+        try:
+            checks += _checks(read_set(name, folder))
+        except (ToolkitError, np.linalg.LinAlgError, ValueError, KeyError) as error:
+            checks.append(not_run(CERTIFIED, name, str(error)))
+    return checks
+
+
+def solve(certified: CertifiedSet) -> tuple[tuple[float, ...], tuple[float, ...], float]:
+    """Return estimates, their standard errors and the residual standard deviation of a certified set."""
+    power = len(certified.terms) - 1
+    if certified.terms[-2:] == (f"x^{power}", "intercept") and power > _NAMED_POWERS:
+        return _high_polynomial(certified.columns["x"], certified.y, power)
+    fit = fit_terms(terms=certified.terms, columns=certified.columns, load=certified.y)
+    return fit.coefficients, tuple(fit.standard_errors.tolist()), fit.residual_sd
+
+
+def _checks(certified: CertifiedSet) -> list[Check]:
+    estimates, errors, sd = solve(certified)
+    reached = (
+        min(correct_digits(a, b) for a, b in zip(estimates, certified.estimates, strict=True)),
+        min(correct_digits(a, b) for a, b in zip(errors, certified.errors, strict=True)),
+        correct_digits(sd, certified.residual_sd),
+    )
+    return [
+        digits_check(
+            CERTIFIED, certified.name, quantity.replace("_", " "), required, computed, _note(public, required)
+        )
+        for quantity, required, public, computed in zip(
+            QUANTITIES, certified.required, certified.public, reached, strict=True
+        )
+    ]
+
+
+def _note(public: float, required: float) -> str:
+    short = ", more than is asked for here" if required < math.floor(min(public, 14.0)) else ""
+    return f"public QR solvers reach {public:g}{short}"
+
+
+def _high_polynomial(
+    x: NDArray[np.float64], y: NDArray[np.float64], degree: int
+) -> tuple[tuple[float, ...], tuple[float, ...], float]:
+    centre = float(np.mean(x))
+    half = math.ldexp(1.0, math.frexp(float(np.abs(x - centre).max()))[1])
+    z = (x - centre) / half
+    names = tuple(f"z{power}" for power in range(1, degree + 1))
+    columns = {name: z**power for power, name in enumerate(names, start=1)}
+    fit = fit_terms(terms=(*names, "intercept"), columns=columns, load=y)
+    powers = (*range(1, degree + 1), 0)
+    back = [
+        [
+            math.comb(j, i) * Fraction(-centre) ** (j - i) / Fraction(half) ** j if j >= i else Fraction(0)
+            for j in powers
+        ]
+        for i in powers
+    ]
+    solved = [Fraction(value) for value in fit.coefficients]
+    estimates = tuple(float(sum(a * b for a, b in zip(row, solved, strict=True))) for row in back)
+    matrix = np.array([[float(value) for value in row] for row in back])
+    errors = np.sqrt(np.einsum("ij,jk,ik->i", matrix, fit.covariance, matrix))
+    return estimates, tuple(errors.tolist()), fit.residual_sd
+
+
+LINES = "ISO/TS 28037"
+E74 = "ASTM E74"
+LINES_FILE = "iso_ts_28037.toml"
+E74_FILE = "e74_pontius.toml"
+_BROKEN = (KeyError, TypeError, ValueError, AttributeError, np.linalg.LinAlgError)
+
+
+def check_lines(folder: Path) -> list[Check]:
+    """Solve the straight lines with known uncertainties, of y or of both variables, and predict by them."""
+    try:
+        examples = read_toml(folder / LINES_FILE)["example"]
+        return [check for example in examples for check in _line(example, folder / LINES_FILE)]
+    except ToolkitError as error:
+        return [not_run(LINES, "examples", str(error))]
+    except _BROKEN as error:
+        return [not_run(LINES, "examples", str(damaged(folder / LINES_FILE, repr(error))))]
+
+
+def check_e74(folder: Path) -> list[Check]:
+    """Evaluate the NIST load cell by ASTM E74 at each published degree, and choose the degree."""
+    try:
+        return _e74(read_toml(folder / E74_FILE), folder)
+    except ToolkitError as error:
+        return [not_run(E74, "Pontius", str(error))]
+    except _BROKEN as error:
+        return [not_run(E74, "Pontius", str(damaged(folder / E74_FILE, repr(error))))]
+
+
+def _line(example: dict[str, Any], where: Path) -> list[Check]:
+    name = str(example["name"])
+    fit = _solved(example, where)
+    line = StraightLine.of(fit)
+    values = {
+        "a": line.a, "b": line.b, "u_a": line.u_a, "u_b": line.u_b, "cov_ab": line.cov_ab,
+        "chi2": np.nan if fit.chi2 is None else fit.chi2,
+    }  # fmt: skip
+    checks = [printed_check(LINES, name, key, text, values[key]) for key, text in example["printed"].items()]
+    if "prediction" in example:
+        prediction = example["prediction"]
+        at = number(prediction["y0"], where)
+        solution = x_from_y(line, at, u_y0=number(prediction["u_y0"], where))
+        checks += [
+            printed_check(LINES, f"{name}, x at y = {at:g}", "x0", prediction["x0"], solution.value),
+            printed_check(LINES, f"{name}, x at y = {at:g}", "u_x0", prediction["u_x0"], solution.u),
+        ]
+    return checks
+
+
+def _solved(example: dict[str, Any], where: Path) -> TermFit:
+    x, y, u = (numbers(example[key], where) for key in ("x", "y", "u_y"))
+    terms, columns = ("x", "intercept"), {"x": x}
+    if example["method"] == "wls":
+        return fit_terms(terms=terms, columns=columns, load=y, u=u)
+    if example["method"] != "odr":
+        raise damaged(where, f"method {example['method']!r}")
+    u_x = set(numbers(example["u_x"], where).tolist())
+    if len(u_x) != 1:
+        # `fit_odr` knows one uncertainty an indication, as the published example has.
+        raise damaged(where, f"u_x {sorted(u_x)}")
+    return fit_odr(terms=terms, columns=columns, load=y, u=u, u_cells=np.array([*u_x]))
+
+
+def _e74(example: dict[str, Any], folder: Path) -> list[Check]:
+    data = read_set(example["set"], folder)
+    force, runs = data.columns["x"], int(example["runs"])
+    run = np.repeat(np.arange(runs), len(force) // runs)
+    checks: list[Check] = []
+    best = evaluate_e74(force=force, indication=data.y, run=run)
+    curves = {curve.degree: curve for curve in best.curves}
+    for degree in example["degree"]:
+        curve = curves[degree["degree"]]
+        lack = curve.lack_of_fit
+        values = {"s_m": curve.s_m, "llf": curve.llf, "lack_of_fit_F": np.nan if lack is None else lack.F}
+        checks += [
+            printed_check(E74, f"Pontius, degree {curve.degree}", key, text, values[key])
+            for key, text in degree["printed"].items()
+        ]
+    expected = int(example["degree_of_best_fit"])
+    degree_check = Check(
+        group=E74, name="Pontius", quantity="degree of best fit", measure="text", required=str(expected),
+        reached=str(best.degree), passed=best.degree == expected,
+    )  # fmt: skip
+    return [*checks, degree_check]

@@ -20,9 +20,9 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.qualification import numbers
-from toolkit.qualification.examples import check_certified, check_e74, check_lines
 from toolkit.qualification.gates import check_gates
 from toolkit.qualification.model import Check, NotCovered, QualificationRecord, not_run
+from toolkit.qualification.numbers import check_certified, check_e74, check_lines
 from toolkit.version import __version__
 
 if TYPE_CHECKING:

@@ -14,10 +14,9 @@ from typing import NoReturn, cast
 
 from toolkit.channels import CHANNELS, channel_of
 from toolkit.errors import ColumnError, UnitError
-from toolkit.headers import split_header
 from toolkit.machine import Machine
 from toolkit.machine.definition import Column, Role
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 _EXTRA_ROLES: dict[str, Role] = {"t": "time", "TIRE_ANGLE": "angle", "DRUM_ANGLE": "angle"}
 _LONGEST = 200

@@ -1,11 +1,14 @@
 """Make reports and hand them over: staged, verified, then published in their output folders.
 
 Several reports are converted in one call of LibreOffice, whose start is paid for once.
+
+With each goes one manifest: what went in, what came out, and the hash of the content.
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -16,16 +19,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import RenderError, ToolkitError
+from toolkit.files import sha256_bytes, sha256_file
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.publication import publication
-from toolkit.recording.marks import refuse_original
+from toolkit.recording.marks import GENERATOR, refuse_original
 from toolkit.report.content import Plot, ReportContent
-from toolkit.report.handover import MANIFEST, content_hash, manifest_json
+from toolkit.report.word.chart import with_alternatives
 from toolkit.report.word.fill import fill, needed_figures
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
 from toolkit.report.word.package import Template
-from toolkit.report.word.spoken import with_alternatives
 from toolkit.report.word.toc_pages import Printed, print_copies
 from toolkit.report.word.verify import Check, verify_docx, verify_pdf
 
@@ -96,18 +99,18 @@ class Delivered:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a person should look at although the report was delivered."""
-        said = [f"{finding.rule}: {finding.message}" for finding in self.filled.lint]
-        said += [f"{check.name}: {check.message}" for check in self.checks if not check.ok]
-        said += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
+        lines = [f"{finding.rule}: {finding.message}" for finding in self.filled.lint]
+        lines += [f"{check.name}: {check.message}" for check in self.checks if not check.ok]
+        lines += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
         if self.untranslated:
-            said += [
+            lines += [
                 f"untranslated: {len(self.untranslated)} finding(s) are printed in English, first: "
                 f"{self.untranslated[0]}"
             ]
-        said += [
+        lines += [
             f"mark-added: the template has no place for the mark {name!r}" for name in self.filled.marks_added
         ]
-        return tuple(said)
+        return tuple(lines)
 
 
 def deliver(
@@ -118,7 +121,6 @@ def deliver(
     office: Office | None = None,
     drawer: Drawer | None = None,
     name: str = "report",
-    allow_missing: bool = False,
     keep: bool = False,
     companions: Mapping[str, bytes] | None = None,
     issue: Issue | None = None,
@@ -136,9 +138,7 @@ def deliver(
         template=template, content=content, out=out, name=name, companions=companions or {}, issue=issue,
         stage=stage,
     )  # fmt: skip
-    reports = deliver_all(
-        [job], office=office, drawer=drawer, allow_missing=allow_missing, keep=keep, step=step
-    )
+    reports = deliver_all([job], office=office, drawer=drawer, keep=keep, step=step)
     if isinstance(reports[0], ToolkitError):
         raise reports[0]
     return reports[0]
@@ -357,3 +357,65 @@ def _reject(stage: Path, out: Path, name: str, reason: str) -> None:
             if file.is_file():
                 file.replace(rejected / file.name)
         (rejected / "reason.txt").write_text(reason + "\n")
+
+
+MANIFEST = "manifest.json"
+_OF_THE_DAY = ("tk:report.date",)
+
+
+def content_hash(filled: Filled, template: Template) -> str:
+    """Return the SHA-256 of what a report says: every printed value, cell, figure, and the template.
+
+    Neither a .docx nor a PDF is the same byte for byte twice, so the content is hashed. The day of issue
+    is left out, and so is what a run took: the same inputs give the same hash on another day. (A row of a
+    table with such a value is hashed by its other values, not as a row of cells.)
+    """
+    passing = {*_OF_THE_DAY, *filled.of_the_run}
+    printed = {
+        "template": template.sha256,
+        "values": [
+            [entry.tag, entry.text, entry.part] for entry in filled.manifest if entry.tag not in passing
+        ],
+        "cells": [row for at, row in enumerate(filled.cells) if at not in filled.rows_of_the_run],
+        "figures": [[tag, alt] for tag, alt in filled.figures],
+        "pictures": filled.pictures,
+        "contents": [[entry.text, entry.level] for entry in filled.contents.entries],
+    }
+    return sha256_bytes(json.dumps(printed, ensure_ascii=False, separators=(",", ":")).encode())
+
+
+def manifest_json(
+    provenance: Mapping[str, Any],
+    content: ReportContent,
+    template: Template,
+    digest: str,
+    outputs: Sequence[Path],
+    ledger: Mapping[str, Any] | None = None,
+    *,
+    missing: Sequence[str] = (),
+) -> str:
+    """Return the manifest: inputs, calibration, software and outputs, each with its SHA-256.
+
+    ``provenance`` holds what the caller knows: the inputs and the software; ``ledger`` is the proof of a
+    document that was issued, ``missing`` are the tags that print a mark in place of a value.
+    """
+    manifest = {
+        "generator": GENERATOR,
+        "schema": 1,
+        "report": content.identity,
+        "issued": content.issued,
+        "content_sha256": digest,
+        "template": {"name": template.path.name, "sha256": template.sha256},
+        "draft": bool(content.draft_reasons),
+        "draft_reasons": list(content.draft_reasons),
+        "signature": content.signature,
+        "calibrations": [calibration.as_dict() for calibration in content.calibrations],
+        "missing": list(missing),
+        **provenance,
+        "outputs": [
+            {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}
+            for output in outputs
+        ],
+        "ledger": ledger,
+    }
+    return json.dumps(manifest, ensure_ascii=False, indent=2) + "\n"

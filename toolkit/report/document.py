@@ -385,15 +385,17 @@ def printed_number(number: Number, entry: Entry, style: Style) -> Value:
     Decimals that the style file gives this very tag rule; those of its unit are for numbers without an
     uncertainty.
     """
-    shown, factor = style.unit(entry.unit)
-    digits = style.digits(entry.path, shown)
+    unit_text, factor = style.unit(entry.unit)
+    digits = style.digits(entry.path, unit_text)
     spec = f".{digits}f" if digits is not None and entry.spec.endswith("f") else entry.spec
     if not isinstance(number, Estimate):
-        return Value(kind="number", value=None if number is None else number * factor, unit=shown, spec=spec)
+        return Value(
+            kind="number", value=None if number is None else number * factor, unit=unit_text, spec=spec
+        )
     scaled = number.scaled(factor, "")
     U = scaled.expanded()[0] if style.digits(entry.path) is None else math.nan
     stated = U if has_interval(scaled.value, U) else None
-    return Value(kind="number", value=scaled.value, unit=shown, spec=spec, U=stated)
+    return Value(kind="number", value=scaled.value, unit=unit_text, spec=spec, U=stated)
 
 
 def printed_table(declared: DeclaredTable[Source], rows: Rows, style: Style) -> Table:

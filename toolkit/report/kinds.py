@@ -2,48 +2,33 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.report.content import ReportContent, Value
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN
-from toolkit.report.vocabulary import Entry, TableEntry, Vocabulary
+from toolkit.report.vocabulary import Entry, Vocabulary
 from toolkit.report.word.check import LintFinding, check_template
 
 if TYPE_CHECKING:
     from toolkit.report.document import Document
     from toolkit.report.word.package import Template
 
-# The list of tags of a kind of document: for programs, and as the page of the manual.
-
-
-TITLES = {
-    "report": "The report of a test",
-    "certificate": "A calibration certificate",
-    "comparison": "A comparison",
-    "diagnosis": "A diagnosis",
-    "audit": "An audit's summary",
-    "plan": "The sheet of a plan",
-    "laboratories": "An interlaboratory comparison",
-}
-
 
 def list_tags(content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> list[dict[str, Any]]:
     """Return every tag as a JSON-ready dict; ``available`` and ``value`` are null without a test."""
     entries = vocabulary.entries
     listed = {entry.path for entry in entries}
-    more = [
+    families = [
         Entry(
             path=path, kind=value.kind, description="coefficient of the calibration record", unit=value.unit
         )
         for path, value in (content.values if content else {}).items()
         if path not in listed
     ]
-    return [_tag(entry, content, style, vocabulary) for entry in (*entries, *more)]
+    return [_tag(entry, content, style, vocabulary) for entry in (*entries, *families)]
 
 
 def _tag(entry: Entry, content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> dict[str, Any]:
@@ -76,61 +61,24 @@ def _tag(entry: Entry, content: ReportContent | None, style: Style, vocabulary: 
     }
 
 
-def reference_page(vocabularies: Iterable[Vocabulary]) -> str:
-    """Return the page of the manual: every value, figure, table and condition of every kind, as Markdown."""
-    return "\n".join(line for vocabulary in vocabularies for line in _chapter(vocabulary))
-
-
-def _chapter(vocabulary: Vocabulary) -> Iterator[str]:
-    yield from (f"## {TITLES[vocabulary.name]}", "")
-    yield from ("A template must hold " + ", ".join(f"`{tag}`" for tag in vocabulary.required) + ".", "")
-    yield from ("### Values", "", "| tag | kind | unit | value |", "|---|---|---|---|")
-    for entry in vocabulary.values:
-        yield _row(f"`tk:{entry.path}`", entry.kind, entry.unit or "", entry.description)
-    yield from ("", "### Figures", "", "Each has its caption as `tk:caption.<name>`.", "")
-    yield from ("| tag | as a chart of Word's own | figure |", "|---|---|---|")
-    for name, description in vocabulary.figures.items():
-        chart = f"`tk:chart.{name}`" if name in vocabulary.charts else ""
-        yield _row(f"`tk:figure.{name}`", chart, description)
-    yield from ("", "### Tables", "")
-    for name, table in vocabulary.tables.items():
-        yield from _table(name, table)
-    yield from ("### Conditions", "")
-    yield from ("Beside these, `tk:if.<name>` takes the name of any value, figure or table.", "")
-    yield from ("| tag | kept when |", "|---|---|")
-    for name, description in vocabulary.conditions.items():
-        yield _row(f"`tk:if.{name}`", description)
-    yield ""
-
-
-def _table(name: str, table: TableEntry) -> Iterator[str]:
-    yield from (f"`tk:table.{name}`: {table.description}.", "", "| tag | unit | column |", "|---|---|---|")
-    for column in table.columns:
-        yield _row(f"`tk:row.{column.name}`", column.unit or "", column.description)
-    yield ""
-
-
-def _row(*cells: str) -> str:
-    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
-
-
 # The report of a test stands first: a template without the tags of another kind is its own.
 _DOCUMENTS = {
-    "report": "test.content.REPORT",
-    "certificate": "certificate.content.CERTIFICATE",
-    "comparison": "comparison.content.COMPARISON",
-    "diagnosis": "diagnosis.answer.DIAGNOSIS",
-    "audit": "audit.content.AUDIT",
-    "plan": "plan.content.PLAN",
-    "laboratories": "laboratories.content.LABORATORIES",
+    "report": ("test.content.REPORT", "The report of a test"),
+    "certificate": ("certificate.content.CERTIFICATE", "A calibration certificate"),
+    "comparison": ("comparison.content.COMPARISON", "A comparison"),
+    "diagnosis": ("diagnosis.answer.DIAGNOSIS", "A diagnosis"),
+    "audit": ("audit.content.AUDIT", "An audit's summary"),
+    "plan": ("plan.content.PLAN", "The sheet of a plan"),
+    "laboratories": ("laboratories.content.LABORATORIES", "An interlaboratory comparison"),
 }
+TITLES = {name: title for name, (_, title) in _DOCUMENTS.items()}
 
 
 class Vocabularies(Mapping[str, "Vocabulary"]):
     """What templates of each kind can ask for, by the name of the kind."""
 
     def __getitem__(self, name: str) -> Vocabulary:
-        module, _, attribute = _DOCUMENTS[name].rpartition(".")
+        module, _, attribute = _DOCUMENTS[name][0].rpartition(".")
         document: Document[object] = getattr(import_module(f"toolkit.report.{module}"), attribute)
         return document.vocabulary
 
@@ -142,19 +90,8 @@ class Vocabularies(Mapping[str, "Vocabulary"]):
 
 
 VOCABULARIES = Vocabularies()
-GENERATED = "<!-- generated -->\n"
 
 
 def check(template: Template, style: Style, *, fonts: bool = True) -> tuple[LintFinding, ...]:
     """Return what is wrong with a template of any kind (see `toolkit.report.word.check.check_template`)."""
     return check_template(template, style, VOCABULARIES, fonts=fonts)
-
-
-def write_manual(page: Path) -> None:
-    """Write the lists of tags into a page of the manual, below the line that says that they are generated."""
-    head, mark, _ = page.read_text(encoding="utf-8").partition(GENERATED)
-    page.write_text(f"{head}{mark}\n{reference_page(VOCABULARIES.values())}", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    write_manual(Path(sys.argv[1]))

@@ -144,10 +144,10 @@ class Style:
         What is no phrase of the toolkit stays as it is; ``alternative`` takes the words of alternative texts
         too.
         """
-        own = self.words + self.alt if alternative else self.words
+        phrases = self.words + self.alt if alternative else self.words
         if self.language != SOURCE or self.decimal_comma:
-            text = phrasebook(self.language, decimal_comma=self.decimal_comma, own=own).say(text)
-        return replace_terms(text, dict(own))
+            text = phrasebook(self.language, decimal_comma=self.decimal_comma, own=phrases).say(text)
+        return replace_terms(text, dict(phrases))
 
     def lacks(self, text: str) -> bool:
         """Tell whether a sentence of the toolkit has no translation in the organisation's language."""
@@ -167,10 +167,10 @@ class Style:
         if unit is None:
             return None, 1.0
         head, slash, tail = unit.partition("/")
-        chosen = {"N": self.force, "N*m": self.moment}.get(head)
-        if chosen is None or chosen == head:
+        preferred = {"N": self.force, "N*m": self.moment}.get(head)
+        if preferred is None or preferred == head:
             return unit, 1.0
-        return f"{chosen}{slash}{tail}", 1 / si_scale(chosen)
+        return f"{preferred}{slash}{tail}", 1 / si_scale(preferred)
 
 
 def replace_terms(text: str, words: Mapping[str, str]) -> str:

@@ -53,10 +53,10 @@ def columns_of(lines: str) -> tuple[Column, ...]:
 
 
 def _columns(line: str) -> list[Column]:
-    name, description, *more = line.split("|")
-    if not more:
+    name, description, *formats = line.split("|")
+    if not formats:
         return [Column(name=name, kind="text", description=description)]
-    unit, spec, *options = more
+    unit, spec, *options = formats
     if name.endswith(" ±"):
         name = name.removesuffix(" ±")
         U = f"U_{name}"

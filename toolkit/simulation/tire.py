@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 # A passenger-car tire: the Magic Formula and coefficients of Bakker, Nyborg and Pacejka (1987).
 
 
-SOURCE = "Bakker, Nyborg, Pacejka: SAE 870421 (1987)"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coefficients:
     """The numbers of one table of the paper: C, a1 to a8, and a9 to a13 for the inclination angle."""

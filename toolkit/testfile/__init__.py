@@ -4,7 +4,7 @@ The file is for people and for programs: every number is a number, every text a 
 file gives back the same result. A hash of the content tells an edited file.
 """
 
-from toolkit.testfile.read import is_test_file, read_test_file
+from toolkit.testfile.read import read_test_file
 from toolkit.testfile.write import write_test_file
 
-__all__ = ["is_test_file", "read_test_file", "write_test_file"]
+__all__ = ["read_test_file", "write_test_file"]

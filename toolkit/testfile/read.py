@@ -39,16 +39,6 @@ from toolkit.tires.model import CurveFit, Parameter
 Cells = dict[str, Any]
 
 
-def is_test_file(path: Path) -> bool:
-    """Tell whether a file is a whole test as `write_test_file` makes it."""
-    from python_calamine import CalamineError
-
-    try:
-        return set(SHEETS) <= set(_open(path).sheet_names)
-    except (RecordingError, CalamineError):
-        return False
-
-
 def read_test_file(path: Path) -> TestResult:
     """Read a whole test.
 

@@ -3,7 +3,7 @@
 - MAT: a vector for each channel and a structure ``channel`` with the lists ``name`` and ``units``, as the
   Tire Test Consortium hands its rounds out;
 - text: a line of names, a line of units below it, then rows of numbers, as the Calspan Tire Research Facility
-  writes them with tabs; or the units beside the names (`toolkit.headers`). Lines above the names are a title.
+  writes them with tabs; or the units beside the names (`toolkit.units`). Lines above the names are a title.
 
 What is no quantity of a tire table (radii, temperatures of the tread, normalised forces) is passed over.
 """
@@ -21,12 +21,12 @@ import numpy as np
 
 from toolkit.channels import CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, UnreadableError
-from toolkit.headers import split_header
+from toolkit.files import reads_as_number
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign
 from toolkit.recording.safe_open import gate
 from toolkit.recording.sniff import sniff
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -188,18 +188,10 @@ def _of_text(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
             pointed = [cell.translate(_POINTS_FOR_COMMAS) for cell in cells] if has_commas else cells
             rows.append(list(map(float, pointed)))
         except ValueError:
-            bad = next(at for at, cell in enumerate(pointed) if not _is_number(cell))
+            bad = next(at for at, cell in enumerate(pointed) if not reads_as_number(cell))
             raise _cell(path, number, names[bad], repr(cells[bad]), "a number", "text-cell") from None
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     return {name: (values[:, at], text) for at, (name, text) in enumerate(zip(names, units, strict=True))}
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _cell(path: Path, line: int, name: str, actual: str, expected: str, rule: str) -> CellError:

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.tires.kernel import Problems, State, assess, at_limit, sine, theta_of
+from toolkit.tires.kernel import Problems, State, assess, at_limit, pick, sine, theta_of
 from toolkit.tires.quality import median, shares
-from toolkit.tires.starts import pick
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -25,11 +25,10 @@ from toolkit.channels import AXES, CHANNELS, Axes, channel_of
 from toolkit.declared import nearest
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
-from toolkit.headers import split_header
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign, first_line
 from toolkit.tires.plausibility import LARGEST, load_of
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -3,11 +3,14 @@
 Every version of the file is an entry of the log of people, signed by somebody whom the version before it
 allowed to. An entry of any log is judged by the version of its time; a key that was revoked since, from a
 date on, signed nothing from that date on, whatever the version of that time said.
+
+Two spellings of one name are one person (`name_key`).
 """
 
 from __future__ import annotations
 
 import functools
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -16,7 +19,6 @@ from typing import Annotated, ClassVar, Literal
 from toolkit.declared import AtLeast, Distinct, Entry, Fault, Format, Size, Text, read_text, toml_text
 from toolkit.errors import TrustError
 from toolkit.files import sha256_bytes
-from toolkit.trust.names import name_key
 from toolkit.trust.ssh import PublicKey, parse_public
 
 FILE = "people.toml"
@@ -354,3 +356,22 @@ def objections(
     if len({key for _, keys in named for key in keys}) < sum(len(keys) for _, keys in named):
         reasons.append(f"{' and '.join(map(repr, stated))} are one person")
     return reasons
+
+
+# Small letters that are drawn like Latin ones, of the confusables of Unicode Technical Standard 39.
+_CYRILLIC = str.maketrans("асеіјорѕухһԁԛԝвкмнт", "aceijopsyxhdqwbkmht")
+_GREEK = str.maketrans("αορνυικτχβηζ", "aopvuiktxbhz")
+
+
+def name_key(name: str) -> str:
+    """Return what two spellings of one name have in common; empty where nothing can be seen.
+
+    >>> name_key(" J.  Smith ") == name_key("j. smith") == name_key("J. S\u200bmith")
+    True
+    """
+    # Compatibility forms first: they may unfold to spaces, capitals and marks.
+    text = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
+    visible = "".join(
+        c for c in text if unicodedata.category(c) not in ("Cf", "Cc", "Cn", "Co") or c.isspace()
+    )
+    return " ".join(visible.split()).translate(_CYRILLIC).translate(_GREEK)

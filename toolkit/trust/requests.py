@@ -201,9 +201,7 @@ def shown(value: object) -> str:
     )
 
 
-def check_standing(
-    request: Request, *, seq: int, prev: str, since: str = "", now: datetime | None = None
-) -> None:
+def check_standing(request: Request, *, seq: int, prev: str, since: str = "") -> None:
     """Refuse an answer that no longer extends the ledger, is of other people, or has waited too long.
 
     ``since`` is the time of the newest version of the people.
@@ -227,7 +225,7 @@ def check_standing(
             "the people of the laboratory changed since the request was made", request.path,
             f"made at {request.time}", f"a time from {since} on", _AGAIN,
         )  # fmt: skip
-    at, present = moment(request.time), now or datetime.now(tz=UTC)
+    at, present = moment(request.time), datetime.now(tz=UTC)
     if at is None or not -timedelta(minutes=5) <= present - at <= HOLDS:
         raise bad_request(
             "a signing request has waited too long, or is of the future", request.path,

@@ -36,8 +36,8 @@ def phrases(language: str, folder: Path = DOCUMENTS) -> dict[str, str]:
     from babel.messages.pofile import read_po
 
     if language == SOURCE:
-        others = languages(folder)[1:]
-        return {phrase: phrase for name in others for phrase in phrases(name, folder)}
+        further = languages(folder)[1:]
+        return {phrase: phrase for name in further for phrase in phrases(name, folder)}
     catalogue = read_po(io.BytesIO((folder / f"{language}.po").read_bytes()), locale=language)
     return {str(message.id): str(message.string) for message in catalogue if message.id}
 
@@ -93,13 +93,13 @@ class Phrasebook:
 
     def __init__(self, catalogue: Mapping[str, str], *, decimal_comma: bool = False) -> None:
         """Take a catalogue: phrase to translation; those without a translation are unknown."""
-        said = {phrase: text for phrase, text in catalogue.items() if text}
+        sentences = {phrase: text for phrase, text in catalogue.items() if text}
         # Within a paragraph a sentence is parted from the next one by its stop.
-        said |= {p[:-1]: t[:-1] for p, t in said.items() if p.endswith(".") and t.endswith(".")}
-        self._whole = {phrase: text for phrase, text in said.items() if not PLACE.search(phrase)}
-        with_places = [phrase for phrase in said if phrase not in self._whole]
+        sentences |= {p[:-1]: t[:-1] for p, t in sentences.items() if p.endswith(".") and t.endswith(".")}
+        self._whole = {phrase: text for phrase, text in sentences.items() if not PLACE.search(phrase)}
+        with_places = [phrase for phrase in sentences if phrase not in self._whole]
         with_places.sort(key=lambda phrase: -_letters(phrase))
-        self._places = tuple((_pattern(phrase), said[phrase]) for phrase in with_places)
+        self._places = tuple((_pattern(phrase), sentences[phrase]) for phrase in with_places)
         self._comma = decimal_comma
         self._known: dict[str, str | None] = {}
 
@@ -143,9 +143,9 @@ class Phrasebook:
         return self._parts(core) if spoken is None else spoken
 
     def _phrase(self, text: str) -> str | None:
-        whole = self._whole.get(text)
-        if whole is not None:
-            return whole
+        sentence = self._whole.get(text)
+        if sentence is not None:
+            return sentence
         for pattern, translation in self._places:
             match = pattern.fullmatch(text)
             if match is not None:

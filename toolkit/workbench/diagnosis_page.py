@@ -16,8 +16,14 @@ from toolkit.errors import ToolkitError
 from toolkit.lab.desk.built_case import is_open, kinds
 from toolkit.lab.desk.holdings import ANSWER, CASE, holding_id
 from toolkit.lab.desk.jobs import start_job
-from toolkit.lab.desk.seen_diagnosis import read_diagnosis
-from toolkit.lab.desk.sized_model import MODELS, keep_model, sizable_model, sized_from, trial_answer
+from toolkit.lab.desk.sized_model import (
+    MODELS,
+    keep_model,
+    read_diagnosis,
+    sizable_model,
+    sized_from,
+    trial_answer,
+)
 from toolkit.lab.desk.uploads import hand_in_case
 from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tests.calibration.virtual_factory import PACKAGED, Change, columns, failed, judged, rules, write_virtual
-from toolkit.calibration.registry.difference import differences
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.response import differences
 from toolkit.units import unit
 
 LBF = 0.45359237 * 9.80665

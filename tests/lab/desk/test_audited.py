@@ -12,8 +12,8 @@ import pytest
 from tests.benchmarks.archive_factory import KNOWN_AT, make_archive
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
-from toolkit.lab.archives.archive import audit_archive
 from toolkit.lab.desk.audited import Audited, read_audited, stamp
+from toolkit.lab.laboratory import open_laboratory
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, list[dic
     folder = tmp_path_factory.mktemp("audited")
     archive = make_archive(folder, files=40, rows=100)
     out = folder / "out"
-    audit_archive(archive.folder, out=out, calibrations=archive.calibrations, known_at=KNOWN_AT)
+    open_laboratory(calibrations=archive.calibrations).audit_archive(
+        archive.folder, out=out, known_at=KNOWN_AT
+    )
     lines = [json.loads(line) for line in (out / "audit.jsonl").read_text().splitlines()[1:]]
     return out, archive.calibrations, lines
 

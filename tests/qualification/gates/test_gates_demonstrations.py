@@ -13,7 +13,7 @@ import pytest
 
 import toolkit
 from toolkit.calibration.registry import gates, judgement
-from toolkit.examples.fig4_4 import ROWS, SYMBOLS
+from toolkit.examples import ROWS, SYMBOLS
 from toolkit.files import read_toml
 from toolkit.qualification.gates import bench, check_gates, demonstrations, virtual_hub
 from toolkit.qualification.gates.values import FIGURE

@@ -17,8 +17,7 @@ from toolkit.comparison.model import Comparison, Entry
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.report.comparison.cells import conclusion, named, p_text, shown_rows, with_U
-from toolkit.report.comparison.content import COMPARISON, build_comparison_content
-from toolkit.report.comparison.plots import comparison_plots
+from toolkit.report.comparison.content import COMPARISON, build_comparison_content, comparison_plots
 from toolkit.report.style import Style
 
 CHECKOUT = Path(__file__).resolve().parents[3]

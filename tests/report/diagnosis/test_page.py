@@ -14,7 +14,7 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.findings import Finding
 from toolkit.lab.studies.diagnosis import diagnosis_text
 from toolkit.report.diagnosis import figures
-from toolkit.report.diagnosis.maps import size_maps, variables
+from toolkit.report.diagnosis.figures import size_maps, variables
 from toolkit.report.diagnosis.numbers import chance, few, over
 from toolkit.report.diagnosis.page import HEADLINES, cause, condition, headline, page
 

@@ -16,8 +16,8 @@ from toolkit.lab.tire_tests import resolve
 from toolkit.lab.tire_tests.reports import Options, _compared, _job
 from toolkit.lab.tire_tests.resolve import Resolved
 from toolkit.report.content import ReportContent
+from toolkit.report.deliver import content_hash
 from toolkit.report.figures import draw, draw_svg
-from toolkit.report.handover import content_hash
 from toolkit.report.test.content import REPORT, build_content
 from toolkit.report.test.models import model_plots, model_rows
 from toolkit.report.word.fill import fill, needed_figures

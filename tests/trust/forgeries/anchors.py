@@ -23,8 +23,7 @@ from toolkit.errors import ToolkitError
 from toolkit.lab.signatures.people import anchor_document, check_against, checkpoint_of
 from toolkit.lab.signatures.people import lines_of as texts_of
 from toolkit.trust.anchor import parse_anchor
-from toolkit.trust.checkpoint import parse_checkpoint
-from toolkit.trust.witness import countersign
+from toolkit.trust.checkpoint import countersign, parse_checkpoint
 
 
 def forgeries() -> Iterator[Forgery]:

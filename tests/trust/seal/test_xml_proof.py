@@ -10,8 +10,7 @@ from lxml import etree
 
 from tests.calibration.dcc.dcc_factory import plain_dcc
 from tests.trust.seal.seal_factory import key, trust
-from toolkit.trust.seal.xml import check_xml, seal_xml
-from toolkit.trust.seal.xml_proof import content_hash, proof_in, with_proof
+from toolkit.trust.seal.xml import check_xml, content_hash, proof_in, seal_xml, with_proof
 
 PROOF = '{"line": "<a> & \\"b\\"", "checkpoint": "m15\\n\\n— anna x\\n"}'
 

@@ -14,9 +14,9 @@ from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
 from toolkit.calibration.fit.balance_report import balance_findings
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, loadings, replicate_groups
-from toolkit.calibration.fit.forward_search import contradicting, deviating
 from toolkit.calibration.fit.printed_digits import copies, own_scatter
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
+from toolkit.calibration.fit.robust import contradicting, deviating
 from toolkit.calibration.fit.run_scale import RunScale, run_scales
 from toolkit.calibration.fit.session_fit import fit_session, session_statements
 from toolkit.calibration.fit.session_rows import groups_of, mean_of

@@ -20,7 +20,7 @@ from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.errors import RegistryError, ToolkitError
 from toolkit.findings import Finding
 from toolkit.inputs import read_regular
-from toolkit.trust.names import name_key
+from toolkit.trust.people import name_key
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

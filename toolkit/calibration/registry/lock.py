@@ -106,7 +106,7 @@ def _lock_file(folder: Path) -> Iterator[None]:
 def _wait(path: Path, until: float | None = None) -> None:
     """Wait until a lock file is gone; one whose process has ended is removed."""
     until = time.monotonic() + PATIENCE_S if until is None else until
-    while (holder := _holder(path)) is not None:
+    while (holder := content(path)) is not None:
         if _ended(holder):
             _remove(path, holder)
         elif time.monotonic() > until:
@@ -123,13 +123,6 @@ def _wait(path: Path, until: float | None = None) -> None:
             time.sleep(_PAUSE_S)
 
 
-def _holder(path: Path) -> bytes | None:
-    try:
-        return read_regular(path)
-    except FileNotFoundError:
-        return None
-
-
 def _remove(path: Path, holder: bytes) -> None:
     # Two who both saw that a process has ended must not remove the lock file of the first of them. Both are
     # processes of this computer, where a name in the abstract namespace belongs to one until it ends.
@@ -141,7 +134,7 @@ def _remove(path: Path, holder: bytes) -> None:
         except OSError:
             time.sleep(_PAUSE_S)
             return
-        if _holder(path) == holder:
+        if content(path) == holder:
             path.unlink()
 
 
@@ -213,3 +206,11 @@ def _without_locks(folder: Path, error: OSError) -> RegistryError:
         "nothing was changed",
         rule="no-locks",
     )
+
+
+def content(path: Path) -> bytes | None:
+    """Return a file's content, None where there is none."""
+    try:
+        return read_regular(path)
+    except FileNotFoundError:
+        return None

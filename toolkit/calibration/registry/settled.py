@@ -15,7 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from toolkit.calibration.registry.ledger import BRINGING, HEAD, LEDGER, Ledger, head_bytes, parse_ledger
-from toolkit.calibration.registry.lock import LOCK_FILE, reading
+from toolkit.calibration.registry.lock import LOCK_FILE, content, reading
 from toolkit.errors import RegistryError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
@@ -150,14 +150,6 @@ def before(
     if any("/" in name or not name.startswith(f"{entry['id']}.") for name in files):
         raise ValueError("it brings files that are not those of its record")
     return (present[:size] if size else None), old, files
-
-
-def content(path: Path) -> bytes | None:
-    """Return a file's content, None where there is none."""
-    try:
-        return read_regular(path)
-    except FileNotFoundError:
-        return None
 
 
 def damaged(folder: Path, damage: str) -> RegistryError:

@@ -25,8 +25,8 @@ from typing import Any
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.clock import check_after
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, head_bytes, next_line
-from toolkit.calibration.registry.lock import writing
-from toolkit.calibration.registry.settled import JOURNAL, before, content, damaged, is_part, state_of
+from toolkit.calibration.registry.lock import content, writing
+from toolkit.calibration.registry.settled import JOURNAL, before, damaged, is_part, state_of
 from toolkit.calibration.registry.signatures import signed_event, timed_event
 from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes, write_atomic

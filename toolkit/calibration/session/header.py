@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 from toolkit.calibration.session.cells import Cells, is_empty
 from toolkit.errors import SessionError, ToolkitError
-from toolkit.headers import split_header
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 COMMENT = "comment"
 RUNS = ("run", "direction", "rotation")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolkit.characteristics.characteristic import CURVE_BUDGET, PULL, Characteristic, Figure
-from toolkit.characteristics.derivations import COVERS_ZERO, CURVE_FY, half_at_zero
+from toolkit.characteristics.reading import COVERS_ZERO, CURVE_FY, half_at_zero
 
 _FIGURE = Figure(name="conicity", title="conicity", text="conicity against load")
 

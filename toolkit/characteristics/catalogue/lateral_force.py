@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolkit.characteristics.characteristic import AT_ANGLES, CURVE_BUDGET, Characteristic
-from toolkit.characteristics.derivations import CURVE_FY, curve_value
+from toolkit.characteristics.reading import CURVE_FY, curve_value
 
 CHARACTERISTIC = Characteristic(
     name="FY",

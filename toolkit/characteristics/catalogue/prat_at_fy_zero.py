@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolkit.characteristics.characteristic import CURVE_BUDGET, PRAT_FIGURE, PULL, Characteristic, Figure
-from toolkit.characteristics.derivations import (
+from toolkit.characteristics.reading import (
     COVERS_ZERO,
     CURVE_FY,
     CURVE_MZ,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolkit.characteristics.characteristic import CURVE_BUDGET, PULL_THESIS, Characteristic
-from toolkit.characteristics.derivations import COVERS_ZERO, CURVE_FY, CURVE_MZ, ZERO_OF_FY, residual_moment
+from toolkit.characteristics.reading import COVERS_ZERO, CURVE_FY, CURVE_MZ, ZERO_OF_FY, residual_moment
 
 CHARACTERISTIC = Characteristic(
     name="residual_reverse",

@@ -9,7 +9,7 @@ from toolkit.characteristics.characteristic import (
     STIFFNESS,
     Characteristic,
 )
-from toolkit.characteristics.derivations import STEPS, secant
+from toolkit.characteristics.reading import STEPS, secant
 
 CHARACTERISTIC = Characteristic(
     name="secant_aligning",

@@ -9,7 +9,7 @@ from toolkit.characteristics.characteristic import (
     STIFFNESS,
     Characteristic,
 )
-from toolkit.characteristics.derivations import CURVE_MZ, SLOPE_MZ, slope
+from toolkit.characteristics.reading import CURVE_MZ, SLOPE_MZ, slope
 
 CHARACTERISTIC = Characteristic(
     name="slope_aligning",

@@ -9,7 +9,7 @@ from toolkit.characteristics.characteristic import (
     STIFFNESS,
     Characteristic,
 )
-from toolkit.characteristics.derivations import CURVE_FY, SLOPE_FY, slope
+from toolkit.characteristics.reading import CURVE_FY, SLOPE_FY, slope
 
 CHARACTERISTIC = Characteristic(
     name="slope_cornering",

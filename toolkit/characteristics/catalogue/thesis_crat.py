@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolkit.characteristics.characteristic import CURVE_BUDGET, PULL_THESIS, Characteristic
-from toolkit.characteristics.derivations import COVERS_ZERO, CURVE_MZ, half_at_zero
+from toolkit.characteristics.reading import COVERS_ZERO, CURVE_MZ, half_at_zero
 
 CHARACTERISTIC = Characteristic(
     name="thesis_CRAT",

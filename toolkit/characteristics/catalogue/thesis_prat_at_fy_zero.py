@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolkit.characteristics.characteristic import CURVE_BUDGET, PULL_THESIS, Characteristic
-from toolkit.characteristics.derivations import (
+from toolkit.characteristics.reading import (
     COVERS_ZERO,
     CURVE_FY,
     CURVE_MZ,

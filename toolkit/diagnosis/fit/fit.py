@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from toolkit.diagnosis.fit.descent import Derivatives, descend
+from toolkit.diagnosis.fit.descent import Derivatives, Space, descend
 from toolkit.diagnosis.fit.noise import (
     Autoregression,
     Layout,
@@ -18,7 +18,6 @@ from toolkit.diagnosis.fit.noise import (
     log_likelihood,
     whiten,
 )
-from toolkit.diagnosis.fit.space import Space
 from toolkit.diagnosis.policy import NOISE
 from toolkit.effects.applied import AppliedEffect
 
@@ -158,18 +157,18 @@ def fit(
     if plain is None:
         alternative = _plain(space, layouts, solved, derivatives)
         plain = alternative is not None and _absorbs(solved, alternative, layouts)
-        chosen = alternative if plain and alternative is not None else solved
+        solution = alternative if plain and alternative is not None else solved
     else:
-        chosen = _plain(space, layouts, solved, derivatives) or solved if plain else solved
-    p, values = space.split(chosen.x)
+        solution = _plain(space, layouts, solved, derivatives) or solved if plain else solved
+    p, values = space.split(solution.x)
     fitted = Fit(
         p=tuple(p),
         active=values,
-        residual=chosen.residual,
-        simulated=chosen.simulated,
-        noise=chosen.noise,
-        log_posterior=chosen.score,
-        covariance=_covariance(space, chosen, None if plain else alternative, layouts, plain=plain)
+        residual=solution.residual,
+        simulated=solution.simulated,
+        noise=solution.noise,
+        log_posterior=solution.score,
+        covariance=_covariance(space, solution, None if plain else alternative, layouts, plain=plain)
         if intervals
         else np.zeros((0, 0)),
         rows=rows,
@@ -178,8 +177,8 @@ def fit(
     if len(values) == len(active):
         return fitted
     moved = iter(values)
-    whole = tuple(applied if applied.effect.from_digits else next(moved) for applied in active)
-    return _resimulated(problem, fitted, whole)
+    effects = tuple(applied if applied.effect.from_digits else next(moved) for applied in active)
+    return _resimulated(problem, fitted, effects)
 
 
 def _coloured(
@@ -256,9 +255,9 @@ def replace_effects(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...
     """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
     before, after = _columns(problem, fit.active), _columns(problem, active)
     covariance = np.zeros((len(after), len(after)))
-    there = [i for i, applied in enumerate(after) if applied in before]
-    places = [before.index(after[i]) for i in there]
-    covariance[np.ix_(there, there)] = fit.covariance[np.ix_(places, places)]
+    positions = [i for i, applied in enumerate(after) if applied in before]
+    places = [before.index(after[i]) for i in positions]
+    covariance[np.ix_(positions, positions)] = fit.covariance[np.ix_(places, places)]
     return replace(_resimulated(problem, fit, active), covariance=covariance)
 
 

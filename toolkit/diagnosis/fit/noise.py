@@ -152,16 +152,18 @@ def fit_noise(
             score = math.log(max(innovation, 1e-300)) + order * math.log(n) / n
             if score < best_score - 1e-12:
                 best, best_score = order, score
-    chosen = tuple(reflection[:best])
-    white = whiten(residual, where, Autoregression(reflection=chosen, sd=1.0))
+    coefficients = tuple(reflection[:best])
+    white = whiten(residual, where, Autoregression(reflection=coefficients, sd=1.0))
     dof = max(n - used, 1)
     sd_of_innovations = math.sqrt(float(np.sum(white**2)) / dof)
     if sd is not None:
         sd_of_innovations = max(
             sd_of_innovations,
-            sd * math.sqrt(math.prod(1 - k * k for k in chosen)) if not chosen else sd_of_innovations,
+            sd * math.sqrt(math.prod(1 - k * k for k in coefficients))
+            if not coefficients
+            else sd_of_innovations,
         )
-    return Autoregression(reflection=chosen, sd=max(sd_of_innovations, floor))
+    return Autoregression(reflection=coefficients, sd=max(sd_of_innovations, floor))
 
 
 def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:

@@ -81,13 +81,13 @@ def _by_repeats(problem: Problem, fit: Fit, name: str) -> float | None:
         again = places[run.name]
         if first is None or first == again or first.stop - first.start != again.stop - again.start:
             continue
-        both = problem.kept[name][first] & problem.kept[name][again]
-        if both.sum() < NOISE.fewest:
+        counting = problem.kept[name][first] & problem.kept[name][again]
+        if counting.sum() < NOISE.fewest:
             continue
         # Of the residuals, not of the outputs: the inputs of a repeat are never quite the same.
-        apart = (fit.residual[name][first] - fit.residual[name][again])[both]
+        apart = (fit.residual[name][first] - fit.residual[name][again])[counting]
         squares += float(np.sum((apart - apart.mean()) ** 2)) / 2
-        dof += int(both.sum()) - 1
+        dof += int(counting.sum()) - 1
     return math.sqrt(squares / dof) if dof else None
 
 

@@ -15,12 +15,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
-from toolkit.diagnosis.law.among_runs import tells_runs_apart_alone
-from toolkit.diagnosis.law.pulses import pulses_of
 from toolkit.diagnosis.law.ranking import p_value, ranked, responses
-from toolkit.diagnosis.law.terms import terms_of
-from toolkit.diagnosis.law.trial import Trial, amplitudes
-from toolkit.diagnosis.law.trials import curve_trial, trials_of, unlocked_tone
+from toolkit.diagnosis.law.terms import pulses_of, terms_of
+from toolkit.diagnosis.law.trial import (
+    Trial,
+    amplitudes,
+    curve_trial,
+    tells_runs_apart_alone,
+    trials_of,
+    unlocked_tone,
+)
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, best_of
@@ -119,8 +123,8 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     strained = any(abs(off) > PRIORS.far for off in problem.off_priors(base.p))
     motion = problem.model.capability.motion
     solved = motion is not None and motion.integrates
-    shown = {each.output for each in structure if solved or each.is_lawful or each.is_too_large}
-    return tuple(name for name in problem.names if strained or name in shown)
+    affected = {part.output for part in structure if solved or part.is_lawful or part.is_too_large}
+    return tuple(name for name in problem.names if strained or name in affected)
 
 
 def _next(
@@ -159,8 +163,8 @@ def _next(
     # What was met once explains and does not predict: it is asked where nothing that predicts stands.
     for events in (False, True):
         entries = [entry for entry in fitted if (entry[1].form == "event") is events]
-        for _, trial, made in _simplest_first(entries)[: LAWS.judged]:
-            law = _judged(search, base, held_out, trial, made, looked)
+        for _, trial, refit in _simplest_first(entries)[: LAWS.judged]:
+            law = _judged(search, base, held_out, trial, refit, looked)
             if law is not None:
                 return law
     return None
@@ -172,9 +176,9 @@ def _fitted(
     """Return joint fits with their log-posterior less their parameters' cost, the best first."""
     fitted = []
     for trial in trials:
-        made = joint_fit(problem, base, (trial.applied,))
-        if made is not None and not at_bound(made.active[-1]):
-            fitted.append((made.log_posterior - weight * trial.cost, trial, made))
+        refit = joint_fit(problem, base, (trial.applied,))
+        if refit is not None and not at_bound(refit.active[-1]):
+            fitted.append((refit.log_posterior - weight * trial.cost, trial, refit))
     return sorted(fitted, key=lambda entry: -entry[0])
 
 
@@ -191,21 +195,21 @@ def _simplest_first(fitted: Sequence[tuple[float, Trial, Fit]]) -> list[tuple[fl
 
 
 def _judged(
-    search: Search, base: Fit, held_out: HeldOut, trial: Trial, made: Fit, looked: int
+    search: Search, base: Fit, held_out: HeldOut, trial: Trial, refit: Fit, looked: int
 ) -> tuple[Law, Fit, HeldOut] | None:
     problem = search.problem
-    applied = made.active[-1]
-    if not _told_from_none(made):
+    applied = refit.active[-1]
+    if not _told_from_none(refit):
         return None
     gain: float | None = None
     scores = held_out
     if trial.form == "event":
-        share = _taken(problem, base.residual, made.residual)
+        share = _taken(problem, base.residual, refit.residual)
         if share < LAWS.share:
             return None
     else:
         try:
-            scores = hold_out(problem, search.folds, made.active, made)
+            scores = hold_out(problem, search.folds, refit.active, refit)
         except FitError:
             return None
         gain = scores.total - held_out.total
@@ -218,14 +222,14 @@ def _judged(
         share = _taken(problem, *errors)
         name = str(applied.channel)
         if search.folds.by_run and name in problem.names:
-            kept = [rows.start + np.flatnonzero(problem.kept[name][rows]) for rows in problem.slices]
+            counting = [rows.start + np.flatnonzero(problem.kept[name][rows]) for rows in problem.slices]
             columns = (held_out.simulated[name], *(each[name] for each in errors))
-            runs = [tuple(column[at] for column in columns) for at in kept if len(at)]
+            runs = [tuple(column[at] for column in columns) for at in counting if len(at)]
             if tells_runs_apart_alone(trial, looked, runs):
                 return None
     moved = [
         parameter.name
-        for parameter, before, after in zip(problem.free, base.p, made.p, strict=True)
+        for parameter, before, after in zip(problem.free, base.p, refit.p, strict=True)
         if parameter.sd and abs(after - before) > LAWS.moved * parameter.sd
     ]
     law = Law(
@@ -237,16 +241,16 @@ def _judged(
         confounded=tuple(moved),
         resembles=_resembling(search, base, replace(trial, applied=applied)),
     )
-    return law, made, scores
+    return law, refit, scores
 
 
-def _told_from_none(made: Fit) -> bool:
+def _told_from_none(refit: Fit) -> bool:
     """Tell whether one of the sizes of a fit's last effect, a law, is none only outside of its interval."""
     from scipy.stats import norm
 
-    reach, applied = float(norm.ppf((1 + VERDICT.interval) / 2)), made.active[-1]
-    at = len(made.covariance) - len(applied.searched)
-    sds = np.sqrt(np.clip(np.diag(made.covariance)[at:], 0.0, None))
+    reach, applied = float(norm.ppf((1 + VERDICT.interval) / 2)), refit.active[-1]
+    at = len(refit.covariance) - len(applied.searched)
+    sds = np.sqrt(np.clip(np.diag(refit.covariance)[at:], 0.0, None))
     return any(
         parameter.off is not None and abs(applied.values[parameter.name]) > reach * sd
         for parameter, sd in zip(applied.searched, sds.tolist(), strict=True)
@@ -272,13 +276,13 @@ def _resembling(search: Search, base: Fit, trial: Trial) -> tuple[tuple[str, flo
     screen = LinearisedFit.of(problem, base)
     amount = np.array([trial.applied.values[name] for name in amplitudes(trial.applied)])
     law = {name: columns @ amount[:, None] for name, columns in directions.items()}
-    _, own = screen.quick(law)
+    _, response = screen.quick(law)
     distances: dict[str, float] = {}
     for scored in best_of(search.scored):
         _, block = screen.quick(scored.directions)
-        if not own.shape[1] or not block.shape[1]:
+        if not response.shape[1] or not block.shape[1]:
             continue
-        distance = math.sqrt(max(0.0, 1 - float(np.sum((block.T @ own[:, 0]) ** 2))))
+        distance = math.sqrt(max(0.0, 1 - float(np.sum((block.T @ response[:, 0]) ** 2))))
         name = scored.active.effect.name
         distances[name] = min(distance, distances.get(name, 1.0))
     near = sorted(((d, name) for name, d in distances.items() if d < LAWS.alike))

@@ -66,10 +66,10 @@ def _entry(trial: Trial) -> tuple[object, ...]:
     return trial.applied.channel, trial.applied.runs
 
 
-def _part(waiting: list[int], trials: Sequence[Trial], most: int) -> list[int]:
+def _part(waiting: list[int], trials: Sequence[Trial], limit: int) -> list[int]:
     """Take the next laws from the end of those that wait, with so many columns, one law at the least."""
     part, columns = [waiting.pop()], 0
-    while waiting and columns < most:
+    while waiting and columns < limit:
         part.append(waiting.pop())
         columns += len(amplitudes(trials[part[-1]].applied))
     return part
@@ -172,7 +172,7 @@ def _moved(trial: Trial, offset: Mapping[str, float]) -> Trial:
 def _within(trial: Trial) -> bool:
     """Tell whether what shapes a law lies inside its bounds."""
     values = trial.applied.values
-    return all(values[each.name] > each.bounds[0] for each in trial.applied.effect.parameters)
+    return all(values[parameter.name] > parameter.bounds[0] for parameter in trial.applied.effect.parameters)
 
 
 def p_value(trial: Trial, looked: int) -> float:
@@ -225,12 +225,12 @@ def _evaluated(problem: Problem, base: Fit, trial: Trial) -> Array:
     for run, rows in zip(problem.runs, problem.slices, strict=True):
         if not applied.acts_in(run):
             continue
-        own = base.simulated[output][rows]
-        signals = {ITSELF: own, "time": run.t}
+        simulated = base.simulated[output][rows]
+        signals = {ITSELF: simulated, "time": run.t}
         signals |= {name: run.columns[name] for name in law.signals if name in run.columns}
         for k, name in enumerate(names):
             values = _unit(applied, name).values
             with np.errstate(all="ignore"):
                 change = np.broadcast_to(cast("Array", law(signals, values, run.t)), run.rows)
-            columns[rows, k] = own * change if trial.acts == "multiplies" else change
+            columns[rows, k] = simulated * change if trial.acts == "multiplies" else change
     return columns

@@ -1,21 +1,33 @@
-"""Laws as the rivals of effects: simpler, and no worse on rows that no fit has seen."""
+"""Laws as the rivals of effects: simpler, and no worse on rows that no fit has seen.
+
+The other way round, effects that only imitate a law are dropped: beside it nothing is left for them to
+explain.
+"""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.folds import hold_out
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.policy import LAWS, STEP
+from toolkit.diagnosis.search.search import without
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.folds import HeldOut
+    from toolkit.diagnosis.search.forward_step import Step
     from toolkit.diagnosis.search.search import Search
-    from toolkit.diagnosis.search.time_budget import TimeBudget
+    from toolkit.effects.applied import AppliedEffect
 
 
 def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
@@ -27,9 +39,9 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
     formula that says the same.
     """
     predicting = any(law.predicts for law in laws.listed)
-    asked = predicting or _leaves_process_noise(search)
+    is_asked = predicting or _leaves_process_noise(search)
     beside = any(step.active.key == applied.key for step in search.steps for applied in laws.fit.active)
-    if not beside or not asked or not laws.complete:
+    if not beside or not is_asked or not laws.complete:
         return search, laws
     alone = learned(search, withdrawn=True, budget=budget)
     if not any(law.predicts for law in alone.listed) or _parameters(alone.fit) >= _parameters(laws.fit):
@@ -52,7 +64,7 @@ def _leaves_process_noise(search: Search) -> bool:
     if motion is None or not motion.integrates:
         return False
     parts = [noise_parts(search.problem, search.augmented, name) for name in search.problem.names]
-    return any(each.process_sd > each.sensor_sd for each in parts)
+    return any(part.process_sd > part.sensor_sd for part in parts)
 
 
 def _same(search: Search, alone: Laws) -> bool:
@@ -74,3 +86,65 @@ def _same(search: Search, alone: Laws) -> bool:
 
 def _parameters(fit: Fit) -> int:
     return sum(len(applied.searched) for applied in fit.active)
+
+
+def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
+    """Return a search and its laws without the effects that the laws made superfluous.
+
+    Part of a law's answer looks like this effect or that one, and the search has only effects to name. One is
+    dropped where the held-out score of the laws beside refitted parameters is as good without it.
+    """
+    if not any(law.predicts for law in laws.listed):
+        return search, laws
+    try:
+        for dropped in _choices(search.steps):
+            budget.check(f"laws without {', '.join(step.active.effect.name for step in dropped)}")
+            refit = _dropped(search, laws, dropped)
+            if refit is not None:
+                return without_imitations(*refit, budget)
+    except BudgetSpentError:
+        laws = replace(laws, complete=False)
+    return search, laws
+
+
+def _choices(steps: tuple[Step, ...]) -> Iterator[tuple[Step, ...]]:
+    """Give all effects together, then every one alone: two may hold each other up."""
+    for count in sorted({len(steps), 1} - {0}, reverse=True):
+        yield from itertools.combinations(steps, count)
+
+
+def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Search, Laws] | None:
+    """Return both without some effects, None where they are needed."""
+    problem = search.problem
+
+    def remaining(active: tuple[AppliedEffect, ...]) -> tuple[AppliedEffect, ...]:
+        for step in dropped:
+            active = without(active, step.active)
+        return active
+
+    listed = remaining(laws.fit.active)
+    if len(listed) == len(laws.fit.active):  # the laws began without them
+        return None
+    try:
+        bare = fit(problem, listed, start=laws.fit.p)
+        scores = hold_out(problem, search.folds, bare.active, bare)
+        if laws.held_out.total - scores.total >= STEP.least_gain:
+            return None
+        steps = tuple(step for step in search.steps if step not in dropped)
+        if steps:
+            augmented = fit(problem, remaining(search.augmented.active), start=search.augmented.p)
+            held_out = hold_out(problem, search.folds, augmented.active, augmented)
+        else:
+            augmented, held_out = search.refitted, search.held_refitted
+    except FitError:
+        return None
+    values = {applied.key: applied for applied in (*bare.active, *augmented.active)}
+    searched = replace(
+        search,
+        steps=tuple(replace(step, active=values[step.active.key]) for step in steps),
+        augmented=augmented,
+        held_augmented=held_out,
+        structure=search.structure if steps else search.structure_before,
+    )
+    updated = tuple(replace(law, applied=values.get(law.applied.key, law.applied)) for law in laws.listed)
+    return searched, replace(laws, listed=updated, fit=bare, held_out=scores)

@@ -30,19 +30,12 @@ class Shape:
 
     ``units`` are those of its parameters, of ``{y}`` what the law acts on, ``{x}`` and ``{z}``;
     ``starts`` gives values of the parameters that shape it: (signal, time), each (rows,), to a list of them.
-    ``enters`` says that it may stand in an equation: it remembers nothing.
     """
 
     form: Form
     text: str
     units: Mapping[str, str]
     starts: Starts = lambda _, __: [{}]
-    enters: bool = False
-
-    @property
-    def of_two(self) -> bool:
-        """Tell whether it is one of two signals."""
-        return "{z}" in self.text
 
 
 def _spread(x: Array) -> float:
@@ -78,8 +71,8 @@ def _periods(x: Array, _: Array) -> list[dict[str, float]]:
 def _times(_: Array, t: Array) -> list[dict[str, float]]:
     steps = np.diff(t)
     steps = steps[steps > 0]
-    row, whole = float(np.median(steps)), float(np.sum(steps))
-    return [{"tau": tau} for tau in np.geomspace(2 * row, max(whole / 4, 4 * row), LAWS.times).tolist()]
+    row, duration = float(np.median(steps)), float(np.sum(steps))
+    return [{"tau": tau} for tau in np.geomspace(2 * row, max(duration / 4, 4 * row), LAWS.times).tolist()]
 
 
 def _modes(x: Array, t: Array) -> list[dict[str, float]]:
@@ -98,7 +91,7 @@ def _reaches(x: Array, _: Array) -> list[dict[str, float]]:
 
 
 def _static(text: str, starts: Starts | None = None, **units: str) -> Shape:
-    return Shape(form="static", text=text, units=units, enters=True, starts=starts or (lambda _, __: [{}]))
+    return Shape(form="static", text=text, units=units, starts=starts or (lambda _, __: [{}]))
 
 
 _TURN = "2*pi"
@@ -155,7 +148,7 @@ TONE = Shape(
 def pulse(start: float, end: float, row: float) -> Shape:
     """Return an event in an equation: an input that is there for a while, with edges as long as a row [s]."""
     text = f"a*pulse([time], {start:.9g}, {end:.9g}, {row:.4g})"
-    return Shape(form="event", text=text, units={"a": "{y}"}, enters=True)
+    return Shape(form="event", text=text, units={"a": "{y}"})
 
 
 UNLOCKED = Shape(
@@ -169,4 +162,4 @@ def curve(x: Array) -> Shape:
     knots = np.unique(np.quantile(x, np.linspace(0.01, 0.99, LAWS.knots)))
     points = ", ".join(f"{knot:.6g}, a{i}" for i, knot in enumerate(knots, start=1))
     units = {f"a{i}": "{y}" for i in range(1, len(knots) + 1)}
-    return Shape(form="static", text=f"spline({{x}}, {points})", units=units, enters=True)
+    return Shape(form="static", text=f"spline({{x}}, {points})", units=units)

@@ -1,22 +1,37 @@
-"""The laws that may be missing in the equation of a state: of its states, its inputs and the time."""
+"""The laws that may be missing in the equation of a state: of its states, its inputs and the time.
+
+An event is a pulse: of every run the stretch of time in which an input would explain most. A pulse is a step
+less a later one, so that the responses to a few dozen steps give those to every pair of ends; no descent from
+a coarse grid finds them where the simulation rings, each period being a hill.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.law.shapes import ALIKE, ONE, TWO, Shape
-from toolkit.diagnosis.law.trial import Signal, Trial, started
+from toolkit.diagnosis.law.ranking import all_responses
+from toolkit.diagnosis.law.shapes import ALIKE, ONE, TWO, Shape, pulse
+from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
+from toolkit.diagnosis.policy import LAWS
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.law import ITSELF, POSITION, TIME
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Run
+    from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.diagnosis.search.screen import LinearisedFit
     from toolkit.diagnosis.simulators.simulator import Moving
+
+    Array = NDArray[np.float64]
 
 
 def terms_of(problem: Problem) -> Iterator[Trial]:
@@ -28,13 +43,13 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
         force = reduced(motion.units(channel)[0])
         listed = _signals(problem, motion, channel, of)
         steady = [signal for signal in listed if signal.steady]
-        made: list[tuple[Shape, tuple[Signal, ...]]] = [
+        arguments: list[tuple[Shape, tuple[Signal, ...]]] = [
             (shape, (signal,)) for signal in listed for shape in ONE
         ]
         for pair in itertools.combinations(steady, 2):
             alike = pair[0].unit == pair[1].unit
-            made += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]
-        for shape, signals in made:
+            arguments += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]
+        for shape, signals in arguments:
             yield from started(problem, shape, signals, "enters", channel, force=force)
 
 
@@ -52,28 +67,88 @@ def _signals(problem: Problem, motion: Moving, channel: str, of: str) -> list[Si
     """Return what a law in the equation of a state may read: itself first, then its position, then others."""
     sizes = motion.sizes(channel, lambda _: 1.0)
     _, speed, position = map(reduced, motion.units(channel))
-    both_ways = np.linspace(-1, 1, 41)
-    own = sizes.fastest * both_ways if of == "velocity" else np.linspace(0, sizes.level, 41)
-    listed = [Signal(written=f"[{ITSELF}]", name=channel, unit=speed, values=own)]
-    known = {channel}
+    symmetric = np.linspace(-1, 1, 41)
+    grid = sizes.fastest * symmetric if of == "velocity" else np.linspace(0, sizes.level, 41)
+    listed = [Signal(written=f"[{ITSELF}]", name=channel, unit=speed, values=grid)]
+    names = {channel}
     if sizes.has_position:
         name = motion.position(channel) or POSITION
-        way = sizes.farthest * both_ways
+        way = sizes.farthest * symmetric
         listed.append(Signal(written=f"[{POSITION}]", name=name, unit=position, values=way))
-        known.add(name)
-    others = [
+        names.add(name)
+    inputs = [
         (state.name, state.unit, np.array(state.quantiles))
         for state in motion.states
-        if state.name not in known
+        if state.name not in names
     ]
     for driver in problem.case.drivers:
         columns = [run.columns[driver.name] for run in problem.runs if driver.name in run.columns]
         if len(columns) == len(problem.runs) and all(np.isfinite(column).all() for column in columns):
-            others.append((driver.name, reduced(problem.case.unit(driver.name)), np.concatenate(columns)))
+            inputs.append((driver.name, reduced(problem.case.unit(driver.name)), np.concatenate(columns)))
     times = np.concatenate([run.t for run in problem.runs])
     moving = [
         Signal(written=f"[{name}]", name=name, unit=text, values=values, steady=name != TIME)
-        for name, text, values in (*others, (TIME, "s", times))
+        for name, text, values in (*inputs, (TIME, "s", times))
         if np.ptp(values) > 1e-9 * np.abs(values).max(initial=0.0)
     ]
     return listed + moving
+
+
+def pulses_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterator[Trial]:
+    """Give for every state that an input may enter, and every run, the pulse that explains most."""
+    motion = problem.model.capability.motion
+    if motion is None or not motion.integrates:
+        return
+    for channel in entered(problem, motion):
+        force = reduced(motion.units(channel)[0])
+        for run in problem.runs:
+            if run.rows >= LAWS.event_rows:
+                yield from _strongest(problem, base, screen, run, channel, force)
+
+
+def _strongest(
+    problem: Problem, base: Fit, screen: LinearisedFit, run: Run, channel: str, force: str
+) -> Iterator[Trial]:
+    """Give the pulse of one run, its ends on rows: first on a coarse grid, then on all rows nearby."""
+    row = float(np.median(np.diff(run.t)))
+    grid = run.t[np.unique(np.linspace(0, run.rows - 1, LAWS.ends).astype(int))]
+    best = _best_pair(problem, base, screen, run, channel, force, grid)
+    if best is not None:
+        near = np.abs(run.t[:, None] - np.array(best)).min(axis=1) <= np.diff(grid).max()
+        best = _best_pair(problem, base, screen, run, channel, force, run.t[near])
+    if best is not None:
+        best_pulse = _pulse(problem, run, channel, force, *best, row)
+        yield replace(best_pulse, looked=len(grid) * (len(grid) - 1) // 2)
+
+
+def _pulse(
+    problem: Problem, run: Run, channel: str, force: str, start: float, end: float, row: float
+) -> Trial:
+    time = Signal(written=f"[{TIME}]", name=TIME, unit="s", values=run.t, steady=False)
+    trial = trial_at(problem, pulse(start, end, row), (time,), "enters", channel, {}, force=force)
+    return replace(trial, applied=replace(trial.applied, runs=frozenset({run.name})))
+
+
+def _best_pair(
+    problem: Problem, base: Fit, screen: LinearisedFit, run: Run, channel: str, force: str, ends: Array
+) -> tuple[float, float] | None:
+    """Return the two of some times between which a pulse explains most, None where none is of use."""
+    row = float(np.median(np.diff(run.t)))
+    after = float(2 * run.t[-1] - run.t[0])  # a step lasts beyond the last row
+    trials = [_pulse(problem, run, channel, force, end, after, row) for end in ends.tolist()]
+    none = {name: np.zeros((problem.rows, 1)) for name in problem.names}
+    steps = [none if step is None else step for step in all_responses(problem, base, trials)]
+    whitened = screen.rows({name: np.hstack([step[name] for step in steps]) for name in problem.names})
+    under = screen.coloured
+    whitened -= under.span @ (under.span.T @ whitened)
+    along, gram = whitened.T @ under.left, whitened.T @ whitened
+    first, last = np.triu_indices(len(ends), 1)
+    lasts = ends[last] - ends[first]
+    size = gram[first, first] + gram[last, last] - 2 * gram[first, last]
+    usable = (lasts >= LAWS.event_least * row) & (lasts <= LAWS.event_most * (run.t[-1] - run.t[0]))
+    usable &= size > LAWS.apart * float(np.diag(gram).max(initial=0.0))
+    if not usable.any():
+        return None
+    strength = np.where(usable, (along[first] - along[last]) ** 2 / np.where(usable, size, 1.0), 0.0)
+    at = int(np.argmax(strength))
+    return float(ends[first[at]]), float(ends[last[at]])

@@ -1,22 +1,37 @@
-"""One law at one place from one start: what a search for laws tries."""
+"""One law at one place from one start: what a search for laws tries.
+
+Tried are the laws that an output may show: every shape over every signal, events and tones.
+
+Some laws only tell runs apart: what stands still within a run explains its zero and its gain alone. Runs of
+the same thing differ a little, and any signal that has another level in every run (a load, a temperature)
+follows such differences as well as the few runs let it. Hundreds of rows are then no evidence: of a run's
+zero there is one value a run. A law that mends nothing beside zeros and gains of runs has to be significant
+among the runs alone.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.law.shapes import Form, Shape
+from toolkit.diagnosis.law.shapes import MODE, ONE, REMEMBERING, TONE, TWO, UNLOCKED, Form, Shape, curve, rung
+from toolkit.diagnosis.policy import LAWS, STRUCTURE
+from toolkit.diagnosis.search.unexplained import beyond_its_past, strongest_events, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
+from toolkit.diagnosis.simulators.setting import dimension
 from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.law import ITSELF, Acts, conversion, law_effect, law_name
+from toolkit.effects.law import ITSELF, Acts, conversion, formula, law_effect, law_name
 from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
     Array = NDArray[np.float64]
@@ -124,3 +139,171 @@ def _filled(template: str, units: Mapping[str, str]) -> str:
 def bracketed(text: str) -> str:
     """Return a unit in brackets where it is put together of several."""
     return f"({text})" if any(mark in text for mark in "*/^") and not text.startswith("(") else text
+
+
+_SPEEDS = ("speed", "frequency")
+
+
+def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
+    """Return what a law on an output may depend on: inputs, their rates and ways, the output itself, time."""
+    case, timed = problem.case, problem.case.has_time
+    listed = []
+
+    def with_rate(name: str, of: str, values: Array, text: str) -> None:
+        if np.ptp(values) <= 1e-9 * np.abs(values).max(initial=0.0):
+            return
+        listed.append(Signal(written=f"[{name}]", name=of, unit=text, values=values))
+        if timed:
+            rates = [
+                np.gradient(values[rows], run.t) if run.rows > 1 else np.zeros(run.rows)
+                for run, rows in zip(problem.runs, problem.slices, strict=True)
+            ]
+            rate, per_second = np.concatenate(rates), f"{bracketed(text)}/s"
+            listed.append(
+                Signal(
+                    written=f"rate([{name}])", name=f"d{of}/dt", unit=per_second, values=rate, steady=False
+                )
+            )
+
+    for channel in case.drivers:
+        if all(channel.name in run.columns for run in problem.runs):
+            values = np.concatenate([run.columns[channel.name] for run in problem.runs])
+            if np.isfinite(values).all():
+                with_rate(channel.name, channel.name, values, channel.unit)
+                if timed and dimension(channel.unit) in _SPEEDS:
+                    listed.append(_way(problem, channel.name, channel.unit, values))
+    with_rate(ITSELF, output, base.simulated[output], channel_unit(case, problem.model, output))
+    if timed:
+        times = np.concatenate([run.t for run in problem.runs])
+        listed.append(Signal(written="[time]", name="time", unit="s", values=times, steady=False))
+    return tuple(listed)
+
+
+def _way(problem: Problem, name: str, text: str, speed: Array) -> Signal:
+    """Return the way of a recorded speed from the first row of each run on."""
+    written = f"way([{name}])"
+    law = formula(written)
+    candidates = [
+        law({name: speed[rows]}, {}, run.t) for run, rows in zip(problem.runs, problem.slices, strict=True)
+    ]
+    unit_of_way = reduced(f"{bracketed(text)}*s")
+    return Signal(
+        written=written,
+        name=f"way of {name}",
+        unit=unit_of_way,
+        values=np.concatenate(candidates),
+        steady=False,
+    )
+
+
+def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[Trial]:
+    """Give every law that some outputs may show, at every start, without gains."""
+    for output in outputs:
+        signals = signals_of(problem, base, output)
+        for signal in signals:
+            for shape in ONE:
+                yield from started(problem, shape, (signal,), "adds", output)
+                if ITSELF not in signal.written:
+                    yield from started(problem, shape, (signal,), "multiplies", output)
+            for shape in REMEMBERING if problem.case.has_time and signal.name != "time" else ():
+                yield from started(problem, shape, (signal,), "adds", output)
+        steady = [signal for signal in signals if signal.steady]
+        for pair in itertools.combinations(steady, 2):
+            for shape in TWO:
+                yield from started(problem, shape, pair, "adds", output)
+        line = strongest_line(problem, output, base.residual[output])
+        if line is not None:
+            yield trial_at(problem, TONE, signals[-1:], "adds", output, {"frequency": line.frequency})
+            for signal, start in itertools.product(signals[:-1], rung(line.frequency)):
+                yield trial_at(problem, MODE, (signal,), "adds", output, start)
+        yield from _events(problem, base, output)
+
+
+def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
+    """Return a tone whose phase differs from run to run, with its mean amplitude; None without a clear one.
+
+    It explains and does not predict: of another run nobody knows the phase.
+    """
+    line = strongest_line(problem, output, base.residual[output])
+    if line is None or line.p_value >= STRUCTURE.line or line.share <= STRUCTURE.line_share:
+        return None
+    if beyond_its_past(problem, output, base.residual[output], line) >= STRUCTURE.line:
+        return None
+    longest = max(float(np.ptp(run.t)) for run in problem.runs if run.rows)
+
+    def amplitudes_at(frequency: float) -> Array:
+        listed = []
+        for run, rows in zip(problem.runs, problem.slices, strict=True):
+            good = problem.kept[output][rows]
+            turn = 2 * math.pi * frequency * run.t[good]
+            columns = np.stack([np.sin(turn), np.cos(turn)], axis=1)
+            solution = np.linalg.lstsq(columns, base.residual[output][rows][good], rcond=None)[0]
+            listed.append(float(np.hypot(*solution)))
+        return np.array(listed)
+
+    # A line is as wide as a run is short: between the frequencies of a spectrum stands the true one.
+    near = line.frequency + np.linspace(-1, 1, LAWS.tones) / longest
+    frequency = float(max(near, key=lambda candidate: float(np.sum(amplitudes_at(candidate) ** 2))))
+    amplitudes_of = amplitudes_at(frequency)
+    time = signals_of(problem, base, output)[-1:]
+    start = {"a": float(np.mean(amplitudes_of)), "frequency": frequency, "phase": math.nan}
+    return replace(trial_at(problem, UNLOCKED, time, "adds", output, start), gain=line.share)
+
+
+def curve_trial(problem: Problem, trial: Trial) -> Trial | None:
+    """Return the law of one signal as a curve without a formula; None of two signals, or with a memory."""
+    if len(trial.signals) != 1 or trial.form != "static":
+        return None
+    shape = curve(trial.signals[0].values)
+    if len(shape.units) < 3:
+        return None
+    force = trial.unit if trial.acts == "enters" else ""
+    channel = str(trial.applied.channel)
+    return trial_at(problem, shape, trial.signals, trial.acts, channel, {}, force=force)
+
+
+def _events(problem: Problem, base: Fit, output: str) -> Iterator[Trial]:
+    """Give for every run the stretch of its time that stands off the rest most clearly."""
+    for event in strongest_events(problem, output, base.residual[output]):
+        text = f"a*between([time], {event.start:.9g}, {event.end:.9g})"
+        shape = Shape(form="event", text=text, units={"a": "{y}"})
+        times = np.array([event.start, event.end])
+        signal = Signal(written="[time]", name="time", unit="s", values=times, steady=False)
+        trial = trial_at(problem, shape, (signal,), "adds", output, {})
+        yield replace(trial, looked=event.looked, applied=replace(trial.applied, runs=frozenset({event.run})))
+
+
+def tells_runs_apart_alone(trial: Trial, looked: int, runs: Sequence[tuple[Array, Array, Array]]) -> bool:
+    """Tell whether a law takes only what differs from run to run, and no more of it than chance gives.
+
+    Parameters
+    ----------
+    looked : laws that were looked at
+    runs : of every run the simulated output, and its held-out errors without and with the law
+    """
+    from scipy.stats import chi2
+
+    (within, among), (within_after, among_after) = (
+        _parts([(simulated, errors[k]) for simulated, *errors in runs]) for k in (0, 1)
+    )
+    if within_after < (1 - LAWS.share) * within:
+        return False
+    gain = len(runs) * math.log(max(among, 1e-300) / max(among_after, 1e-300))
+    return float(chi2.sf(max(gain, 0.0), trial.cost)) * max(looked, 1) * trial.looked >= LAWS.alpha
+
+
+def _parts(runs: Sequence[tuple[Array, Array]]) -> tuple[float, float]:
+    """Return the mean squares of errors less what zeros and gains of runs take, and of what these take.
+
+    A zero and a gain that all runs have alike are none of a run's own.
+    """
+    designs = [np.column_stack([np.ones(len(simulated)), simulated]) for simulated, _ in runs]
+    stacked = np.concatenate([error for _, error in runs])
+    common = np.linalg.lstsq(np.vstack(designs), stacked, rcond=None)[0]
+    of_a_run = np.concatenate(
+        [
+            design @ (np.linalg.lstsq(design, error, rcond=None)[0] - common)
+            for design, (_, error) in zip(designs, runs, strict=True)
+        ]
+    )
+    return float(np.mean((stacked - of_a_run) ** 2)), float(np.mean(of_a_run**2))

@@ -44,7 +44,7 @@ def _instrument(registry: Registry, name: str, today: dt.date) -> dict[str, Any]
 def _witnesses(registry: Registry, instrument: str) -> list[dict[str, Any]]:
     """Return what each witness has countersigned of a ledger: how many entries, and whether they stand."""
     from toolkit.lab.signatures.people import check_against
-    from toolkit.trust.witness import SUFFIX, remembered
+    from toolkit.trust.checkpoint import SUFFIX, remembered
 
     rows: list[dict[str, Any]] = []
     for path in sorted((registry.folder.parent / "trust" / "witnessed").glob(f"{instrument}-*{SUFFIX}")):

@@ -20,7 +20,7 @@ from toolkit.declared.declaration import fields_of
 from toolkit.declared.describe import summary
 from toolkit.declared.kinds import FileKind
 from toolkit.declared.tables import FormsKind, TableKind
-from toolkit.diagnosis.case.case_file import CONDITIONS, CaseFile
+from toolkit.diagnosis.case.reader import CONDITIONS, CaseFile
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import parse_toml, write_atomic
 from toolkit.inputs import NAMED_FILE, RECORDING_FILE, SETTINGS_FILE, check_size, read_input

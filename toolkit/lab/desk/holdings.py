@@ -57,7 +57,7 @@ def holding_id(place: str) -> str:
 
 def holdings_of(home: Path) -> Holdings:
     """Look through a home. Links are not followed; hidden folders, registry and templates are left out."""
-    from toolkit.report.handover import MANIFEST
+    from toolkit.report.deliver import MANIFEST
 
     by_kind: dict[Kind, dict[str, str]] = {kind: {} for kind in _marks()}
     manifests: list[str] = []
@@ -103,7 +103,7 @@ def archives_of(home: Path) -> dict[str, str]:
 
 def reported_inputs(holdings: Holdings) -> frozenset[str]:
     """Return the hashes of what the delivered reports of a home rest on."""
-    from toolkit.report.handover import MANIFEST
+    from toolkit.report.deliver import MANIFEST
 
     return frozenset(
         sha256 for place in holdings.manifests for sha256 in _inputs(holdings.home / place / MANIFEST)

@@ -98,7 +98,7 @@ def fixtures_of(home: Path) -> dict[str, str]:
     """Return the loading fixtures of a home by id: those in it and in `FIXTURES` in it."""
     from toolkit.declared import read
     from toolkit.errors import ToolkitError
-    from toolkit.machine.loading import LoadingFixtures
+    from toolkit.machine.hub import LoadingFixtures
 
     places = {}
     for folder in (home, home / FIXTURES):

@@ -80,7 +80,7 @@ def read_preview(home: Path, test_id: str) -> Preview | None:
     ToolkitError
         poppler is not installed, or the style file of the template cannot be read
     """
-    from toolkit.report.handover import MANIFEST
+    from toolkit.report.deliver import MANIFEST
     from toolkit.report.style import read_style, style_file
     from toolkit.report.word.preview import pages_of
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from toolkit.declared.answers import merged
 from toolkit.errors import ConfigError
+from toolkit.files import reads_as_number
 from toolkit.lab.answers import findings_text, one_line, table
 from toolkit.lab.plans.plan_sheets import _Sheet
 from toolkit.planning.session_plan import SessionPlan
@@ -124,7 +125,7 @@ def _feasible(
     """Return what can be loaded: by a file of fixtures, else by the machine's definition, else as before."""
     from toolkit.calibration.registry.judgement import machine_of
     from toolkit.declared import read
-    from toolkit.machine.loading import LoadingFixtures
+    from toolkit.machine.hub import LoadingFixtures
     from toolkit.planning.fixtures import loads_of_fixtures, loads_of_record
 
     machine = machine_of(record.instrument, order.machine)
@@ -348,20 +349,14 @@ def _csv(rows: Sequence[Sequence[str]]) -> str:
     csv.writer(stream, lineterminator="\n").writerows(
         # A text that a spreadsheet would take for a formula is none: a direction such as +FY.
         [
-            f" {cell}" if cell[:1] in ("=", "@", "+") or (cell[:1] == "-" and not _is_number(cell)) else cell
+            f" {cell}"
+            if cell[:1] in ("=", "@", "+") or (cell[:1] == "-" and not reads_as_number(cell))
+            else cell
             for cell in row
         ]
         for row in rows
     )
     return stream.getvalue()
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _wrong(problem: str, where: object, actual: object, expected: str) -> ConfigError:

@@ -263,7 +263,7 @@ def _event(entry: LedgerEntry) -> Event:
 
 def difference(registry: Registry, first: str, second: str) -> tuple[dict[str, Any], str, bool]:
     """Return two records term by term as JSON and as text, and whether they differ."""
-    from toolkit.calibration.registry.difference import differences
+    from toolkit.calibration.registry.response import differences
 
     terms = differences(registry.load(first), registry.load(second))
     rows: list[dict[str, Any]] = []

@@ -114,7 +114,7 @@ class Issuing:
 
     def _digital(self, file: Path, ledger: Mapping[str, Any]) -> bytes:
         from toolkit.inputs import DCC_FILE
-        from toolkit.trust.seal.xml_proof import with_proof
+        from toolkit.trust.seal.xml import with_proof
 
         data = with_proof(read_input(file, DCC_FILE), json.dumps(ledger, ensure_ascii=False))
         return data if self.sealing is None else self.sealing.seal_xml(data)
@@ -151,6 +151,6 @@ def open_issuing(
 def _hash(file: Path) -> str:
     """Return the hash that the entry holds of a file: a digital certificate's is that of its content."""
     from toolkit.inputs import DCC_FILE
-    from toolkit.trust.seal.xml_proof import content_hash
+    from toolkit.trust.seal.xml import content_hash
 
     return str(content_hash(read_input(file, DCC_FILE))) if file.suffix == ".xml" else sha256_file(file)

@@ -18,12 +18,11 @@ from toolkit.inputs import PDF_FILE, read_regular
 from toolkit.lab.signatures.proofs import ORIGIN, anchor_in, ledgers_of, raw_lines
 from toolkit.publication import check_file
 from toolkit.trust.anchor import Comparison, anchor_of, compare
-from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
+from toolkit.trust.checkpoint import SUFFIX, Checkpoint, countersign, parse_checkpoint, place, remembered
 from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import leaf_hash, root_of
 from toolkit.trust.people import MEANINGS, RECOVERY, Action, Demand, Key, People, Person, Role
 from toolkit.trust.ssh import parse_public
-from toolkit.trust.witness import SUFFIX, countersign, place, remembered
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry

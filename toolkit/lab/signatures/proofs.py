@@ -17,9 +17,8 @@ from toolkit.calibration.records.use import UNSIGNED
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
 from toolkit.trust.anchor import COMPACT, Anchor, compare, parse_anchor, parse_compact
-from toolkit.trust.checkpoint import parse_checkpoint
+from toolkit.trust.checkpoint import SUFFIX, parse_checkpoint
 from toolkit.trust.seal.check import Signature
-from toolkit.trust.witness import SUFFIX
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.ledger import Entry
@@ -49,7 +48,7 @@ def anchor_in(data: bytes, *, where: object = None) -> Anchor | None:
 
         text = carried_by(data).get(PROOF, b"").decode(errors="replace")
     elif data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<":
-        from toolkit.trust.seal.xml_proof import proof_in
+        from toolkit.trust.seal.xml import proof_in
 
         text = proof_in(data)
     else:
@@ -211,8 +210,8 @@ def ledgers_of(registry: Registry) -> tuple[str, ...]:
 def raw_lines(registry: Registry, instrument: str) -> list[str]:
     """Return the lines of a ledger as they stand, whole or damaged: a proof tells where it was changed."""
     from toolkit.calibration.registry.ledger import LEDGER
+    from toolkit.calibration.registry.lock import content
     from toolkit.calibration.registry.people_log import place_of
-    from toolkit.calibration.registry.settled import content
 
     own = instrument in registry.instruments() or instrument not in ledgers_of(registry)
     folder = registry.folder / instrument if own else place_of(registry.folder)

@@ -35,8 +35,7 @@ from toolkit.trust.anchor import COMPACT, Anchor, parse_anchor
 from toolkit.trust.seal.check import SealCheck, Signature
 from toolkit.trust.seal.pdf import carried_by, check_pdf
 from toolkit.trust.seal.x509 import Trust
-from toolkit.trust.seal.xml import check_xml
-from toolkit.trust.seal.xml_proof import content_hash
+from toolkit.trust.seal.xml import check_xml, content_hash
 
 _DCC = "{https://ptb.de/dcc}"
 _BESIDE = ("*.pdf", "manifest.json")

@@ -1,17 +1,27 @@
-"""What is compared: tests and makers' tables read to one kind of entry; the figures and the document."""
+"""What is compared: tests and makers' tables read to one kind of entry; the figures and the document.
+
+So are the results of an interlaboratory comparison (`toolkit compare --laboratories`).
+"""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import ConfigError
+from toolkit.lab.answers import findings_text, one_line, refuse_unwritable, table
 
 if TYPE_CHECKING:
     from datetime import date
     from pathlib import Path
 
+    from toolkit.comparison.laboratories import LaboratoryComparison, Measurand, Score
     from toolkit.comparison.model import Comparison, Entry
     from toolkit.findings import Finding
+    from toolkit.lab.tire_tests.compare_answer import LaboratoryKeys
     from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
     from toolkit.report.word.package import Template
@@ -132,7 +142,7 @@ def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, li
 
 def _write_figures(comparison: Comparison, style: Style, stage: Path, folder: Path) -> dict[str, Path]:
     """Write the figures of a comparison; return their paths in their folder by name."""
-    from toolkit.report.comparison.plots import comparison_plots
+    from toolkit.report.comparison.content import comparison_plots
     from toolkit.report.figures import draw
 
     drawn = {}
@@ -140,3 +150,147 @@ def _write_figures(comparison: Comparison, style: Style, stage: Path, folder: Pa
         (stage / f"{name}.png").write_bytes(draw(plot).png)
         drawn[name] = folder / f"{name}.png"
     return drawn
+
+
+DOCUMENT = "laboratories"
+"""The name of the document's two files."""
+
+
+def laboratories_answer(
+    path: Path,
+    *,
+    reference: str | None,
+    sigma: float | None,
+    figures: Path | None,
+    opened: Template | None = None,
+    out: Path | None = None,
+    issued: date,
+) -> tuple[dict[str, Any], str, list[Finding]]:
+    """Return the comparison of a file's laboratories as JSON and as text, with its findings.
+
+    Figures go to ``figures``, the document by the template ``opened`` to ``out``, where they are given.
+
+    Raises
+    ------
+    ToolkitError
+        the file, the reference, sigma_pt or the template cannot be used; nothing is written
+    """
+    from toolkit.comparison.laboratories import compare_laboratories
+    from toolkit.comparison.laboratory_file import read_laboratories
+    from toolkit.declared import answer
+    from toolkit.lab.tire_tests.compare_answer import written_keys
+
+    started = time.perf_counter()
+    for folder in (figures, out):
+        refuse_unwritable(folder)
+    if sigma is not None and not (math.isfinite(sigma) and sigma > 0):
+        raise ConfigError(
+            "sigma_pt cannot be used", where="--sigma", got=sigma, expected="a finite number above 0",
+            next_step="state it in the unit of the results", rule="laboratories",
+        )  # fmt: skip
+    reported, unit = read_laboratories(path)
+    comparison = compare_laboratories(reported, unit=unit, reference=reference, sigma=sigma)
+    with ExitStack() as together:
+        drawn = {} if figures is None else _figures(comparison, figures, together)
+        document = None
+        if opened is not None and out is not None:
+            document = _document(comparison, path, opened, out, issued, together)
+    keys: LaboratoryKeys = {
+        "mode": "laboratories", "source": str(path), **written_keys(drawn, document, started),
+    }  # fmt: skip
+    lines = [line for measurand in comparison.measurands for line in _lines(measurand)]
+    lines += [f"written: {one_line(file)}" for file in drawn.values()]
+    if document is not None:
+        lines += [f"written: {one_line(file)}" for file in (document.docx, document.pdf)]
+        lines += [f"{document.pages} pages, verified", *(f"  warning {text}" for text in document.warnings)]
+    shown = findings_text(comparison.findings)
+    return (
+        answer(comparison) | keys,
+        "\n".join([*lines, *([shown] if shown else [])]),
+        list(comparison.findings),
+    )
+
+
+def _figures(comparison: LaboratoryComparison, folder: Path, together: ExitStack) -> dict[str, Path]:
+    from toolkit.publication import publication
+    from toolkit.report.figures import draw
+    from toolkit.report.laboratories.content import laboratory_plots
+
+    stage = together.enter_context(publication(folder))
+    plots = laboratory_plots(comparison)
+    for name, plot in plots.items():
+        (stage / f"{name}.png").write_bytes(draw(plot).png)
+    return {name: folder / f"{name}.png" for name in plots}
+
+
+def _document(
+    comparison: LaboratoryComparison,
+    source: Path,
+    opened: Template,
+    out: Path,
+    issued: date,
+    together: ExitStack,
+) -> Delivered:
+    from toolkit.files import sha256_file
+    from toolkit.publication import publication
+    from toolkit.report.deliver import deliver
+    from toolkit.report.laboratories.content import ComparedLaboratories, build_laboratories_content
+    from toolkit.report.style import read_style, style_file
+
+    compared = ComparedLaboratories(
+        comparison=comparison, source=source.name, sha256=sha256_file(source), issued=issued
+    )
+    content = build_laboratories_content(compared, read_style(style_file(opened.path)))
+    stage = together.enter_context(publication(out))
+    return deliver(opened, content, out, name=DOCUMENT, stage=stage)
+
+
+def _lines(measurand: Measurand) -> list[str]:
+    from toolkit.estimate import plus_minus
+
+    unit, sigma = measurand.unit, measurand.sigma_pt
+    told = "" if sigma is None else f" = {sigma:.4g}"
+    return [
+        f"{measurand.name}: {measurand.assigned:.6g} {unit}, u = {measurand.u_assigned:.3g}, "
+        f"{measurand.assigned_by}; sigma_pt{told}, {measurand.sigma_by}",
+        "",
+        table(
+            ["laboratory", "n", f"mean [{unit}]", "z'", "zeta", "E_n", "h", "k", ""],
+            [
+                [score.laboratory, str(score.n),
+                 f"{score.mean:.6g}" if score.U is None else plus_minus(score.mean, score.U),
+                 _ratio(score.z_prime), _ratio(score.zeta), _ratio(score.En), _ratio(score.h),
+                 _ratio(score.k), _signals(score)]
+                for score in measurand.scores
+            ],
+            align="<>>>>>>><",
+        ),
+        "",
+        *_precision_lines(measurand),
+    ]  # fmt: skip
+
+
+def _signals(score: Score) -> str:
+    departures = (("h", score.h_departure), ("k", score.k_departure))
+    shown = [score.signal, "E_n" if score.En_signal else None]
+    return ", ".join(filter(None, [*shown, *(f"{by}: {name}" for by, name in departures if name)]))
+
+
+def _precision_lines(measurand: Measurand) -> list[str]:
+    p = measurand.precision
+    if p is None:
+        return []
+    within = (
+        "no repeats: no repeatability"
+        if p.s_r is None
+        else f"s_r = {p.s_r.value:.4g} ({p.s_r.low:.4g} to {p.s_r.high:.4g}), r = {p.r:.4g}"
+    )
+    return [
+        f"ISO 5725-2, {p.laboratories} laboratories, {p.n} results, mean {p.mean:.6g} {measurand.unit}: "
+        f"{within}, s_R = {p.s_R:.4g}, R = {p.R:.4g}",
+        "",
+    ]
+
+
+def _ratio(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"

@@ -95,16 +95,6 @@ class Condition(TypedDict):
     hub: NotRequired[Annotated[Mapping[str, HubValue], "loads of the hub by symbol, where it has any"]]
 
 
-class Budget(TypedDict):
-    """The sources of a characteristic's uncertainty."""
-
-    load_N: float
-    rotation: Annotated[str | None, "direction; null of what both directions give"]
-    name: Annotated[str, "of the characteristic"]
-    unit: str
-    standard_uncertainty: Annotated[Mapping[str, float], "by source"]
-
-
 class ReducedTest(DraftKeys):
     """A reduced test: conditions, characteristics with their budgets, findings."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -320,46 +320,3 @@ def read_test(
         calibrations=as_path(calibrations),
         home=as_path(home),
     )
-
-
-def write_report(
-    test: ProcessedTest,
-    out: str | Path,
-    *,
-    template: str | Path | None = None,
-    models: Sequence[str] = (),
-    hand_over: bool = False,
-    allow_missing: bool = False,
-    step: Callable[[str], None] = lambda _text: None,
-) -> Report:
-    """Fill a Word template with a test and deliver it with its verified PDF, or deliver nothing.
-
-    Parameters
-    ----------
-    out : the report's folder, new or an earlier report's
-    template : default ``org.docx`` of the laboratory
-    models : tire models that the report compares
-    hand_over : test.xlsx, test.tdx and tire.tir too
-    allow_missing : print n/a for a value that the test has not
-    step : told what is done
-
-    Raises
-    ------
-    ToolkitError
-        the template cannot be used, or the PDF does not show every value and figure
-    """
-    from toolkit.lab.home import home_template
-    from toolkit.lab.tire_tests.fit_models import model_choice
-    from toolkit.lab.tire_tests.reports import Options, make_reports
-    from toolkit.report.word.package import read_template
-
-    options = Options(
-        template=read_template(Path(template) if template else home_template("org.docx")),
-        resolve=lambda _path: test.result,
-        models=model_choice(models) if models else (),
-        xlsx=hand_over, tydex=hand_over, tir=hand_over, allow_missing=allow_missing,
-    )  # fmt: skip
-    (report,) = make_reports([test.path], options, Path(out), step=step)
-    if isinstance(report.outcome, Exception):
-        raise report.outcome
-    return Report(result=report.outcome, made=report)

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from toolkit.errors import CellError, ColumnError, RecordingError, UnitError, UnreadableError
-from toolkit.headers import split_header
 from toolkit.machine import Machine
 from toolkit.recording.columns import assign_columns, header_of
 from toolkit.recording.model import Series
-from toolkit.units import unit
+from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -85,7 +85,7 @@ AUDIT: Document[Summary] = Document(
 
 def build_audit_content(view: AuditView, style: Style | None = None) -> ReportContent:
     """Return what the template of an audit's summary can ask for."""
-    style, summary = style or Style(), _summary(view)
+    style, summary = Style(), _summary(view)
     return AUDIT.content(
         summary,
         style,
@@ -98,12 +98,12 @@ def build_audit_content(view: AuditView, style: Style | None = None) -> ReportCo
     )
 
 
-def audit_plots(audit: ArchiveAudit, style: Style | None = None) -> dict[str, Plot]:
+def audit_plots(audit: ArchiveAudit) -> dict[str, Plot]:
     """Return the figures of an audit by name; none where the files are of one year."""
     from toolkit.report.audit.page import AuditView
 
     view = AuditView(made=audit, rules={}, timelines=(), traces=())
-    return AUDIT.plots(_summary(view), style or Style())
+    return AUDIT.plots(_summary(view), Style())
 
 
 def _conclusion(summary: Summary, _style: Style) -> str:

@@ -82,8 +82,8 @@ _MOST_POINTS = 600
 def timeline(versions: Timeline) -> Markup:
     """Return when each record was in force, and the files that it computed: a lane a record or grade."""
     counts, first, last = versions.counts, versions.first, versions.last
-    others = sorted({computer for computer, _, _ in counts} - {lane.record for lane in versions.stretches})
-    lanes = [*versions.stretches, *(Stretch(record=name, begin=None, end=None) for name in others)]
+    programs = sorted({computer for computer, _, _ in counts} - {lane.record for lane in versions.stretches})
+    lanes = [*versions.stretches, *(Stretch(record=name, begin=None, end=None) for name in programs)]
     margin_left, margin_right, top, height, width = 130, 20, 14, 24, 1040
     days = max((last - first).days, 1)
     right, bottom = width - margin_right, top + height * len(lanes)
@@ -134,7 +134,9 @@ def rows_of(
         low, high = low - 1.0, high + 1.0
     pad = 0.06 * (high - low)
     low, high = low - pad, high + pad
-    shown = np.unique(np.linspace(0, len(old) - 1, min(len(old), _MOST_POINTS)).round().astype(int)).tolist()
+    plotted = np.unique(
+        np.linspace(0, len(old) - 1, min(len(old), _MOST_POINTS)).round().astype(int)
+    ).tolist()
     span = max(len(old) - 1, 1)
 
     def y(value: float) -> float:
@@ -145,7 +147,7 @@ def rows_of(
         drawing.line((left, y(value)), (right, y(value)), "grid")
         drawing.text((left - 6, y(value) + 4), "end", f"{value:g}")
     for values, kind in ((old, "file"), (new, "right")):
-        drawing.polyline(((left + i / span * (right - left), y(float(values[i]))) for i in shown), kind)
+        drawing.polyline(((left + i / span * (right - left), y(float(values[i]))) for i in plotted), kind)
     foot = top + height + 26
     drawing.text((left, foot), "start", f"row 1 to {len(old)}; {load} [{unit}]")
     drawing.text((right, foot), "end", ("file", "file"), " \u2003", ("record in force", "right"))

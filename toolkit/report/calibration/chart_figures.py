@@ -35,8 +35,10 @@ _RC: Any = {
 
 def panels(chart: Chart) -> tuple[Series, ...]:
     """Return the series that are drawn: those that break a rule, then the nearest to a limit, 12 at most."""
-    ranked = sorted(enumerate(chart.series), key=lambda one: (-len(one[1].breaks), -_reach(one[1]), one[0]))
-    return tuple(one for _, one in sorted(ranked[:MOST_PANELS]))
+    ranked = sorted(
+        enumerate(chart.series), key=lambda entry: (-len(entry[1].breaks), -_reach(entry[1]), entry[0])
+    )
+    return tuple(entry for _, entry in sorted(ranked[:MOST_PANELS]))
 
 
 def draw_chart(chart: Chart, kind: str) -> bytes:
@@ -56,14 +58,15 @@ def draw_chart(chart: Chart, kind: str) -> bytes:
             rows, columns, left=0.85 / figure.get_figwidth(), right=1 - 0.55 / figure.get_figwidth(),
             top=1 - 1.1 / height, bottom=0.62 / height, hspace=0.42, wspace=0.42,
         )  # fmt: skip
-        for at, one in enumerate(drawn):
+        for at, series in enumerate(drawn):
             inner = outer[at // columns, at % columns].subgridspec(2, 1, height_ratios=(2.6, 1), hspace=0.12)
             upper = figure.add_subplot(inner[0])
-            _individuals(upper, one)
-            _ranges(figure.add_subplot(inner[1], sharex=upper), one)
-        shown = "" if len(drawn) == len(chart.series) else f", {len(drawn)} of {len(chart.series)} charts"
+            _individuals(upper, series)
+            _ranges(figure.add_subplot(inner[1], sharex=upper), series)
+        portion = "" if len(drawn) == len(chart.series) else f", {len(drawn)} of {len(chart.series)} charts"
         figure.text(
-            0.5, 1 - 0.22 / height, f"{chart.instrument}: error of check loads by the record in force{shown}",
+            0.5, 1 - 0.22 / height,
+            f"{chart.instrument}: error of check loads by the record in force{portion}",
             ha="center", va="center", fontsize=13, fontweight="bold",
         )  # fmt: skip
         figure.text(

@@ -28,11 +28,11 @@ _NAMED = 5  # rows named in the influence figure
 
 def report_figures(report: FitReport, *, title: str) -> dict[str, bytes]:
     """Return the figures of a load by file name, PNG and SVG of each; ``title`` names record or session."""
-    made = {}
-    for name, (draw, what) in _drawings(report).items():
-        for kind, data in _drawn(draw, f"{title}, {report.load}: {what}").items():
-            made[f"{report.load}_{name}.{kind}"] = data
-    return made
+    files = {}
+    for name, (draw, caption) in _drawings(report).items():
+        for kind, data in _drawn(draw, f"{title}, {report.load}: {caption}").items():
+            files[f"{report.load}_{name}.{kind}"] = data
+    return files
 
 
 def open_figures(report: FitReport, *, title: str) -> dict[str, Callable[[], Figure]]:
@@ -59,7 +59,7 @@ def _drawings(report: FitReport) -> dict[str, tuple[Callable[[Axes], None], str]
     ]  # fmt: skip
     if report.check_percent_fs is not None:
         drawings.append(("check", lambda axes: _check(axes, report), "check loads"))
-    return {name: (draw, what) for name, draw, what in drawings}
+    return {name: (draw, caption) for name, draw, caption in drawings}
 
 
 def _drawn(draw: Callable[[Axes], None], title: str) -> dict[str, bytes]:
@@ -68,13 +68,13 @@ def _drawn(draw: Callable[[Axes], None], title: str) -> dict[str, bytes]:
     # A fixed salt and no date: the same data give the same file.
     with mpl.rc_context(_RC | {"svg.hashsalt": "toolkit", "svg.fonttype": "path"}):
         figure = _figure(draw, title)
-        made = {}
+        figures = {}
         for kind in ("png", "svg"):
             stream = io.BytesIO()
             metadata: dict[str, Any] = {"Date": None} if kind == "svg" else {"Software": None}
             figure.savefig(stream, format=kind, metadata=metadata)
-            made[kind] = stream.getvalue()
-    return made
+            figures[kind] = stream.getvalue()
+    return figures
 
 
 def _figure(draw: Callable[[Axes], None], title: str) -> Figure:
@@ -98,7 +98,7 @@ def _marks(report: FitReport) -> list[tuple[str | None, np.ndarray, str, str]]:
     rows = np.arange(report.n)
     if report.direction is None:
         return [(None, rows, _UP, "o")]
-    up = np.array([one == "up" for one in report.direction])
+    up = np.array([direction == "up" for direction in report.direction])
     kinds = (("loading", rows[up], _UP, "^"), ("unloading", rows[~up], _DOWN, "v"))
     return [kind for kind in kinds if len(kind[1])]
 
@@ -143,11 +143,11 @@ def _residuals(axes: Axes, report: FitReport) -> None:
     ):
         # A limit far outside would flatten the residuals to a line: it is told in the legend alone.
         far = value > 8 * float(np.abs(y).max())
-        shown = f"{label} (beyond the axis)" if far else label
+        legend = f"{label} (beyond the axis)" if far else label
         if far:
-            axes.plot([], [], color=_LIMIT, linestyle=style, linewidth=1.0, label=shown)
+            axes.plot([], [], color=_LIMIT, linestyle=style, linewidth=1.0, label=legend)
         else:
-            axes.axhline(value, color=_LIMIT, linestyle=style, linewidth=1.0, label=shown, zorder=2)
+            axes.axhline(value, color=_LIMIT, linestyle=style, linewidth=1.0, label=legend, zorder=2)
             axes.axhline(-value, color=_LIMIT, linestyle=style, linewidth=1.0, zorder=2)
     _points(axes, report, report.reference, y)
     _labels(axes, f"reference {report.load} [{_unit(report)}]", "reference - fitted [% of full scale]")

@@ -20,7 +20,7 @@ _MOST_ROWS = 12
 def report_dict(report: FitReport, *, rows: bool) -> dict[str, Any]:
     """Return a load's report as a dict; ``rows`` adds what is told row by row."""
     lack = report.lack_of_fit
-    found: dict[str, Any] = {
+    content: dict[str, Any] = {
         "full_scale": report.full_scale,
         "n": report.n,
         "r_squared": report.r_squared,
@@ -62,7 +62,7 @@ def report_dict(report: FitReport, *, rows: bool) -> dict[str, Any]:
     }  # fmt: skip
     if rows:
         weight = report.robust_weight
-        found["rows"] = {
+        content["rows"] = {
             "reference": report.reference.tolist(),
             "fitted": report.fitted.tolist(),
             "residual": report.residuals.tolist(),
@@ -73,7 +73,7 @@ def report_dict(report: FitReport, *, rows: bool) -> dict[str, Any]:
             "robust_weight": None if weight is None else weight.tolist(),
             "direction": None if report.direction is None else list(report.direction),
         }
-    return found
+    return content
 
 
 def balance_dict(report: BalanceReport) -> dict[str, Any]:
@@ -246,8 +246,8 @@ def _rows(report: FitReport) -> str:
         ],
         align=">>>>>>>><",
     )  # fmt: skip
-    more = len(interest) - len(order)
-    return text + (f"\n  and {more} more of smaller Cook's distance" if more else "")
+    omitted = len(interest) - len(order)
+    return text + (f"\n  and {omitted} more of smaller Cook's distance" if omitted else "")
 
 
 def _checks(report: FitReport) -> str:
@@ -282,8 +282,8 @@ def _reversals(report: FitReport) -> str:
             for r in worst
         ],
     )  # fmt: skip
-    more = len(report.reversals) - len(worst)
-    return text + (f"\n  and {more} more, smaller" if more else "")
+    omitted = len(report.reversals) - len(worst)
+    return text + (f"\n  and {omitted} more, smaller" if omitted else "")
 
 
 def _sure(value: float) -> str:

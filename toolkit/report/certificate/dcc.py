@@ -158,7 +158,9 @@ def _statements(c: Certificate) -> list[Node]:
         if words_
     ]
     outside = dict.fromkeys(
-        one for one in [*(o.unit for o in c.loads), *(o.unit for o in c.cells)] if _not_si(one)
+        unit_text
+        for unit_text in [*(o.unit for o in c.loads), *(o.unit for o in c.cells)]
+        if _not_si(unit_text)
     )
     nodes += [
         node(

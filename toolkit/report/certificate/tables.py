@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
+from toolkit.files import reads_as_number
 from toolkit.report.certificate.content import CERTIFICATE, GAP, shown, signed
 from toolkit.report.certificate.model import MOST_FIGURES, VERDICTS, Certificate, LoadResult
 from toolkit.report.content import Cell, Curve, Plot
@@ -38,17 +39,9 @@ def _table(name: str, description: str, columns: str) -> Callable[[Build], Decla
 
 def _localised(row: Sequence[str], names: Sequence[str], style: Style) -> tuple[Cell, ...]:
     return tuple(
-        signed(cell, style) if name not in _NAMES and _is_number(cell) else cell
+        signed(cell, style) if name not in _NAMES and reads_as_number(cell) else cell
         for name, cell in zip(names, row, strict=True)
     )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _dof(dof: float) -> str:

@@ -26,8 +26,8 @@ def shown_unit(name: str, style: Style) -> tuple[str, float]:
 
 def with_U(estimate: Estimate, factor: float, style: Style) -> str:
     """Return ``45.0 ± 0.6``: two digits of U, and the value to the same place."""
-    shown = estimate.scaled(factor, "")
-    return plus_minus(shown.value, shown.expanded()[0], decimal_comma=style.decimal_comma)
+    scaled = estimate.scaled(factor, "")
+    return plus_minus(scaled.value, scaled.expanded()[0], decimal_comma=style.decimal_comma)
 
 
 def p_text(p: float | None, style: Style) -> str:
@@ -60,8 +60,8 @@ def shown_rows(comparison: Comparison, part: Section) -> tuple[tuple[Difference,
     certain = tuple(difference for difference in mine if difference.significant)
     if part == "characteristics" and len(mine) <= MOST_ROWS:
         return mine, f"all {len(mine)} rows"
-    which = f"the {len(certain)} significant" if certain else "none is significant"
-    return certain, f"{which} of {len(mine)} rows; the JSON answer holds all"
+    extent = f"the {len(certain)} significant" if certain else "none is significant"
+    return certain, f"{extent} of {len(mine)} rows; the JSON answer holds all"
 
 
 def factor_text(spread: FactorSpread, factor: float, style: Style) -> str:
@@ -84,9 +84,9 @@ def conclusion(comparison: Comparison) -> str:
         if not mine:
             continue
         counts: dict[str, list[int]] = {}
-        for one in mine:
-            count = counts.setdefault(by_name()[one.name].title, [0, 0])
-            count[0] += one.significant
+        for entry in mine:
+            count = counts.setdefault(by_name()[entry.name].title, [0, 0])
+            count[0] += entry.significant
             count[1] += 1
         certain = sum(n for n, _ in counts.values())
         listed = "; ".join(f"{name}: {n} of {of}" for name, (n, of) in counts.items() if n)

@@ -1,4 +1,7 @@
-"""Figures of a diagnosis: error before and after, where the mismatch is, one run in time, runs by output."""
+"""Figures of a diagnosis: error before and after, where the mismatch is, one run in time, runs by output.
+
+Maps show how large the residual is over slip angle, load, condition, revolution and time.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.diagnosis.answer.locate import time_unit
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -194,7 +198,7 @@ def law_curve(law: FoundLaw) -> bytes | None:
 def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     """Return root mean square residuals over the noise of the first chart, by run and output."""
     problem = search.problem
-    floors = {one.channel: one.noise_floor for one in diagnosis.held_out}
+    floors = {score.channel: score.noise_floor for score in diagnosis.held_out}
     names = [name for name in problem.names if name in floors]
     fits = [("refitted", search.refitted)] + ([("with the effect", search.augmented)] if after else [])
 
@@ -203,21 +207,21 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
         for i, name in enumerate(names):
             noise = max(floors[name], 1e-300)
             for j, run in enumerate(problem.slices):
-                kept = problem.kept[name][run]
-                values = fit.residual[name][run][kept]
+                counting = problem.kept[name][run]
+                values = fit.residual[name][run][counting]
                 share[i, j] = np.sqrt(np.mean(values**2)) / noise if len(values) else np.nan
         return share
 
     def draw(figure: Figure) -> None:
         shares = [table(fit) for _, fit in fits]
-        most = max(2.0, float(np.nanmax(np.stack(shares))))
+        largest = max(2.0, float(np.nanmax(np.stack(shares))))
         panels = figure.subplots(len(fits), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (label, _), values in zip(panels, fits, shares, strict=True):
-            axes.imshow(values, aspect="auto", cmap="YlOrBr", vmin=0, vmax=most)
+            axes.imshow(values, aspect="auto", cmap="YlOrBr", vmin=0, vmax=largest)
             axes.set_yticks(range(len(names)), names)
             axes.set_title(label, loc="left", fontsize=10)
             axes.grid(visible=False)
-            _write_cells(axes, values, most)
+            _write_cells(axes, values, largest)
         panels[-1].set_xticks(
             range(len(problem.runs)), [_short(run.name) for run in problem.runs],
             rotation=0 if len(problem.runs) < 9 else 90,
@@ -226,13 +230,13 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     return draw_svg((8.6, 0.9 + len(fits) * (0.5 + 0.42 * len(names))), draw)
 
 
-def _write_cells(axes: Axes, values: NDArray[np.float64], most: float) -> None:
+def _write_cells(axes: Axes, values: NDArray[np.float64], largest: float) -> None:
     if values.shape[1] > 16:
         return
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             if np.isfinite(values[i, j]):
-                colour = "white" if values[i, j] > 0.6 * most else "#333333"
+                colour = "white" if values[i, j] > 0.6 * largest else "#333333"
                 axes.text(j, i, f"{values[i, j]:.2g}", ha="center", va="center", color=colour, fontsize=9)
 
 
@@ -281,3 +285,119 @@ def draw_svg(size: tuple[float, float], draw: Callable[[Figure], None]) -> bytes
         stream = io.BytesIO()
         figure.savefig(stream, format="svg", metadata={"Date": None})
     return stream.getvalue()
+
+
+_FIRST = ("SA", "SA_CMD", "FZ", "FZ_CMD")
+_TURNS = ("TIRE_ANGLE", "DRUM_ANGLE")
+_PANELS, _ACROSS = 9, 3
+_LEVELS = 6  # of a condition, beyond which it is the runs' own name
+_MAP_BINS = 12
+
+# Label, the values of all rows, and what they are called where they are levels of a condition.
+Variable = tuple[str, "NDArray[np.float64]", tuple[str, ...]]
+
+
+def variables(search: Search) -> list[Variable]:
+    """Return what a residual is mapped over: slip angle, load, conditions, revolutions, time, the rest."""
+    problem = search.problem
+    drivers = {
+        driver.name: driver.unit
+        for driver in problem.case.drivers
+        if all(driver.name in run.columns for run in problem.runs)
+    }
+    order = [name for name in _FIRST if name in drivers]
+    other_drivers = [name for name in drivers if name not in (*_FIRST, *_TURNS)]
+    listed = [_channel(search, name, drivers[name]) for name in order]
+    listed += _conditions(search)
+    listed += [_revolution(search, name, drivers[name]) for name in _TURNS if name in drivers]
+    if problem.case.has_time:
+        text, seconds = time_unit(problem.case)
+        listed.append((f"time [{text}]", np.concatenate([run.t for run in problem.runs]) / seconds, ()))
+    listed += [_channel(search, name, drivers[name]) for name in other_drivers]
+    return [
+        variable
+        for variable in listed
+        if np.isfinite(variable[1]).any() and np.nanmax(variable[1]) > np.nanmin(variable[1])
+    ]
+
+
+def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool) -> bytes | None:
+    """Return an output's root mean square residual over its noise, a panel for each variable."""
+    noise = max(
+        next((score.noise_floor for score in diagnosis.held_out if score.channel == channel), 0.0), 1e-300
+    )
+    shown_variables = variables(search)[:_PANELS]
+    mask = search.problem.kept[channel]
+    if not shown_variables or not mask.any():
+        return None
+    fits = [("refitted", ORANGE, search.refitted)]
+    if after:
+        fits.append(("with the effect", BLUE, search.augmented))
+    across = 4 if len(shown_variables) == 4 else min(_ACROSS, len(shown_variables))
+    down = -(-len(shown_variables) // across)
+
+    def draw(figure: Figure) -> None:
+        panels = figure.subplots(down, across, sharey=True, squeeze=False)
+        for i, axes in enumerate(panels.flat):
+            if i >= len(shown_variables):
+                axes.axis("off")
+                continue
+            label, values, levels = shown_variables[i]
+            for j, (name, colour, fit) in enumerate(fits):
+                _panel(
+                    axes, values[mask], fit.residual[channel][mask] / noise, levels,
+                    label=name, colour=colour, at=(j - (len(fits) - 1) / 2, 0.8 / len(fits)),
+                )  # fmt: skip
+            axes.axhline(1.0, color=GREEN, linewidth=1.2, label="noise")
+            axes.set_xlabel(label)
+        for axes in panels[:, 0]:
+            axes.set_ylabel(f"{channel} over noise")
+        # After the last panel, which may hold the largest of them all.
+        panels[0, 0].set_ylim(bottom=0)
+        figure.legend(
+            *panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False
+        )
+
+    return draw_svg((8.6, 0.5 + 1.9 * down), draw)
+
+
+def _panel(
+    axes: Axes,
+    x: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    levels: tuple[str, ...],
+    *,
+    label: str,
+    colour: str,
+    at: tuple[float, float],
+) -> None:
+    if not levels:
+        centre, mean = binned(x, residual**2, bins=_MAP_BINS)
+        axes.plot(centre, np.sqrt(mean), ".-", color=colour, linewidth=1.4, markersize=4, label=label)
+        return
+    sizes = [residual[x == i] for i in range(len(levels))]
+    heights = [float(np.sqrt(np.mean(size**2))) if len(size) else 0.0 for size in sizes]
+    axes.bar(np.arange(len(levels)) + at[0] * at[1], heights, width=at[1], color=colour, label=label)
+    axes.set_xticks(range(len(levels)), levels)
+    axes.grid(visible=False, axis="x")
+
+
+def _channel(search: Search, name: str, measure: str) -> Variable:
+    return (f"{name} [{measure}]", np.concatenate([run.columns[name] for run in search.problem.runs]), ())
+
+
+def _revolution(search: Search, name: str, measure: str) -> Variable:
+    """Return where in its turn the tire or the drum stands [deg]: what is locked to it stands still there."""
+    _, angle, _ = _channel(search, name, measure)
+    return f"{name} in one turn [deg]", np.rad2deg(angle * unit(measure).factor) % 360.0, ()
+
+
+def _conditions(search: Search) -> list[Variable]:
+    runs = search.problem.runs
+    variables: list[Variable] = []
+    for key in dict.fromkeys(key for run in runs for key in run.conditions):
+        levels = tuple(dict.fromkeys(run.conditions.get(key, "-") for run in runs))
+        if 1 < len(levels) <= _LEVELS:
+            at = [np.full(run.rows, float(levels.index(run.conditions.get(key, "-")))) for run in runs]
+            variables.append((key, np.concatenate(at), levels))
+    return variables

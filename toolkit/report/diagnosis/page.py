@@ -11,7 +11,7 @@ from toolkit.diagnosis.search.screen import best_of
 from toolkit.effects.catalogue import effects
 from toolkit.report.content import signature_text
 from toolkit.report.diagnosis import figures
-from toolkit.report.diagnosis.maps import size_maps
+from toolkit.report.diagnosis.figures import size_maps
 from toolkit.report.diagnosis.numbers import chance, few, over, rounded
 from toolkit.report.pages.kit import Figure, Table, number, page_parts, table
 

@@ -121,9 +121,9 @@ def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
     t = run.t[stride] / seconds
 
     def curve(label: str, group: int, y: NDArray[np.float64], *, points: bool = False) -> Curve:
-        chosen = good if points else np.ones(len(t), dtype=bool)
+        rows = good if points else np.ones(len(t), dtype=bool)
         return Curve(
-            label=label, x=tuple(t[chosen].tolist()), y=tuple(y[chosen].tolist()), group=group,
+            label=label, x=tuple(t[rows].tolist()), y=tuple(y[rows].tolist()), group=group,
             style="points" if points else "line", open=points,
         )  # fmt: skip
 

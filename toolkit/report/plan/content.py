@@ -172,7 +172,7 @@ def steps(sheet: PlanSheet, style: Style) -> Rows:
 )
 def pairs(sheet: PlanSheet, style: Style) -> Rows:
     """Return the pairs of members."""
-    return ((true, other, *(_in(style, text) for text in gains)) for true, other, *gains in sheet.pairs)
+    return ((true, false, *(_in(style, text) for text in gains)) for true, false, *gains in sheet.pairs)
 
 
 @PLAN.table(

@@ -65,9 +65,9 @@ def wide_rows(result: TestResult, table: WideTable) -> list[Cells]:
         if row.SA_rad is not None:
             cells["SA"] = row.SA_rad / (math.pi / 180)
         cells = lines.setdefault((row.load_N, row.rotation, row.SA_rad), cells)
-        one = declared[row.name]
-        put(cells, one.column_name, row.estimate, one.factor)
-    names = [one.column_name for one in declared.values()]
+        declaration = declared[row.name]
+        put(cells, declaration.column_name, row.estimate, declaration.factor)
+    names = [declaration.column_name for declaration in declared.values()]
     return [
         cells
         for cells in lines.values()
@@ -91,16 +91,16 @@ def wide_rows(result: TestResult, table: WideTable) -> list[Cells]:
 def long_rows(report: ReportedTest, style: Style) -> Rows:
     """Return every characteristic that has a value, one row each, but for those at slip angles."""
     result, lines = report.result, list[Cells]()
-    for one in (column for table in tables() if table.scope != "angle" for column in columns(table)):
-        unit, factor = style.unit(one.printed_unit)
-        scale = factor * one.factor
-        for row in result.characteristics.of(one.name):
+    for table_column in (column for table in tables() if table.scope != "angle" for column in columns(table)):
+        unit, factor = style.unit(table_column.printed_unit)
+        scale = factor * table_column.factor
+        for row in result.characteristics.of(table_column.name):
             if row.estimate is None:
                 continue
             U, k = row.estimate.expanded()
             lines.append(
                 {
-                    "quantity": one.title,
+                    "quantity": table_column.title,
                     "rotation": row.rotation,
                     "load": row.load_N,
                     "value": row.estimate.value * scale,

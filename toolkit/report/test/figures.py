@@ -153,18 +153,18 @@ class _Plots:
                     curves.append(
                         _curve(label, grid, drawn * factor, index, "line", open_=rotation == "reverse")
                     )
-        what = _SYMBOLS[channel]
+        symbol = _SYMBOLS[channel]
         how = f"reversed by {TURNED}" if self.result.reduced.info.reversal == "tire" else "reversed"
         turned = f"; filled: forward, open and dashed: {how}" if len(self._rotations()) > 1 else ""
         curves_text = ", fitted curves as lines" if lines else ""
         return self._plot(
             f"{channel.lower()}_vs_slip",
             "slip angle SA [deg]",
-            f"{what} [{unit}]",
+            f"{symbol} [{unit}]",
             curves,
-            f"{_upper(what)} against slip angle at {len(self.groups)} loads, measured means as symbols"
+            f"{_upper(symbol)} against slip angle at {len(self.groups)} loads, measured means as symbols"
             f"{curves_text}{turned}. {_AXES_NOTE}",
-            f"{_upper(what)} [{unit}] against slip angle [deg] at {len(self.groups)} loads. "
+            f"{_upper(symbol)} [{unit}] against slip angle [deg] at {len(self.groups)} loads. "
             f"{'; '.join(sentences)}.",
             legend="load FZ",
             zero_x=True,
@@ -206,16 +206,16 @@ class _Plots:
                 x, y, U = zip(*points, strict=True)
                 curves.append(_curve(f"±{size} deg", x, y, index, "both", open_=angle < 0, error=U))
                 sentences.append(f"{angle:+d} deg: {self._number(y[0])} to {self._number(y[-1])} {unit}")
-        what = _SYMBOLS[channel]
+        symbol = _SYMBOLS[channel]
         return self._plot(
             f"{channel.lower()}_vs_load",
             f"load FZ [{load_unit}]",
-            f"{what} [{unit}]",
+            f"{symbol} [{unit}]",
             curves,
-            f"{_upper(what)} against load at constant slip angles, from the curves fitted to the means; "
+            f"{_upper(symbol)} against load at constant slip angles, from the curves fitted to the means; "
             "filled: positive, open and dashed: negative slip angle; bars: expanded uncertainty (95 %). "
             f"{_AXES_NOTE}",
-            f"{_upper(what)} [{unit}] against load [{load_unit}] at constant slip angles of plus and minus "
+            f"{_upper(symbol)} [{unit}] against load [{load_unit}] at constant slip angles of plus and minus "
             f"{', '.join(str(a) for a in ANGLES_DEG)} deg. {'; '.join(sentences)}.",
             legend="slip angle",
         )

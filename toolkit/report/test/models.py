@@ -61,15 +61,15 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
 
     plots = []
     for name in dict.fromkeys(curve.model for curve in curves):
-        shown, _, _ = binned(rows_of_model(data, name))
+        points, _, _ = binned(rows_of_model(data, name))
         for channel in ("FY", "MZ"):
             curves_of_model = [curve for curve in curves if curve.model == name and curve.channel == channel]
             if curves_of_model and channel in data.channels:
-                plots += _pair(shown, name, channel, _of_loads(curves_of_model))
+                plots += _pair(points, name, channel, _of_loads(curves_of_model))
     for fit in models:
         model = find(fit.model)
         assert isinstance(model, GlobalModel)  # noqa: S101  only such a model has a ModelFit
-        shown, _, _ = binned(data.take(fit.selection.rows))
+        points, _, _ = binned(data.take(fit.selection.rows))
         for channel_fit in fit.fits:
             if channel_fit.channel == "FX":
                 continue
@@ -81,7 +81,7 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
                 assert isinstance(model, GlobalModel)  # noqa: S101
                 return model_curve(model, fit, data, channel, SA=SA, load_N=load)
 
-            plots += _pair(shown, fit.model, channel_fit.channel, evaluate)
+            plots += _pair(points, fit.model, channel_fit.channel, evaluate)
     return tuple(plots)
 
 

@@ -138,18 +138,18 @@ class Mould:
     def cast(self, texts: Iterable[Text]) -> Iterator[tuple[bytes, tuple[str, ...]]]:
         """Yield each row as bytes, with the texts of its cells."""
         for text in texts:
-            said = [text(tag) for tag in self.tags]
-            if not all(map(_plain, said)):
-                yield self._filled(said)
+            contents = [text(tag) for tag in self.tags]
+            if not all(map(_plain, contents)):
+                yield self._filled(contents)
                 continue
-            packed = [escape(part).encode() for part in said]
+            packed = [escape(part).encode() for part in contents]
             pieces = list(self.pieces)
             for i in range(1, len(pieces), 2):
                 pieces[i] = self._fresh(pieces[i]) or packed[int(pieces[i])]
             yield (
                 b"".join(pieces),
                 tuple(
-                    "".join(said[int(part)] if i % 2 else part for i, part in enumerate(cell))
+                    "".join(contents[int(part)] if i % 2 else part for i, part in enumerate(cell))
                     for cell in self.cells
                 ),
             )
@@ -169,10 +169,10 @@ class Mould:
 
     def _xml(self, row: Element) -> bytes:
         xml: bytes = etree.tostring(row, encoding="UTF-8", xml_declaration=False)
-        head, end, rest = xml.partition(b">")
+        head, end, tail = xml.partition(b">")
         for declaration in self.known:
             head = head.replace(declaration, b"")
-        return head + end + rest
+        return head + end + tail
 
 
 def fresh_ids(row: Element, ids: Ids) -> None:

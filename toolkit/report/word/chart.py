@@ -1,15 +1,20 @@
 """A figure as a chart of Word's own: DrawingML with its numbers in a workbook, so that Word can edit it.
 
 Source of the elements and their order: ECMA-376, part 1, 21.2 (charts) and 11.3.4 (embedded package).
+
+LibreOffice leaves the alternative texts of charts out of a PDF, and they are put in. A chart is an element
+*Figure* of the PDF's tree of structure, with elements of its own for the texts in it (ISO 32000-1, 14.7 and
+14.9.3). It is known by its size on the page, and by its order.
 """
 
 from __future__ import annotations
 
+import codecs
 import io
 import math
 import re
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -19,6 +24,7 @@ from toolkit.report.content import Curve, Plot
 from toolkit.report.figures import COLOURS
 from toolkit.report.word.package import undated
 from toolkit.report.word.xml import NS, clean
+from toolkit.trust.seal.pdf import pdf_writer
 
 CHART_TYPE = "application/vnd.openxmlformats-officedocument.drawingml.chart+xml"
 BOOK_TYPE = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
@@ -26,7 +32,7 @@ BOOK_RELATION = "rId1"
 
 # LibreOffice draws no outline around a marker: an empty one would be white on white, a cross is not.
 _MARKERS, _OPEN = ("circle", "square", "triangle", "diamond"), "x"
-_GREY, _GRID, _AXIS, _TEXT = "8A8A8A", "D9D9D9", "606060", "303030"
+_GREY, _GRID, _AXIS = "8A8A8A", "D9D9D9", "606060"
 _POINT = 12700  # EMU
 _SMALLEST = 300  # hundredths of a point
 _STEPS = 8  # of the upright axis, at most
@@ -93,10 +99,10 @@ def chart_book(plot: Plot) -> bytes:
     stream = io.BytesIO()
     book.save(stream)
     still = io.BytesIO()
-    with zipfile.ZipFile(stream) as made, zipfile.ZipFile(still, "w", zipfile.ZIP_DEFLATED) as kept:
-        for member in made.namelist():
-            data = made.read(member)
-            kept.writestr(member, _MODIFIED.sub(b"", data) if member == "docProps/core.xml" else data)
+    with zipfile.ZipFile(stream) as source, zipfile.ZipFile(still, "w", zipfile.ZIP_DEFLATED) as target:
+        for member in source.namelist():
+            data = source.read(member)
+            target.writestr(member, _MODIFIED.sub(b"", data) if member == "docProps/core.xml" else data)
     return undated(still.getvalue())
 
 
@@ -118,11 +124,11 @@ def _named(plot: Plot) -> list[tuple[Curve, str]]:
 
 
 def _series(plot: Plot, scale: float) -> str:
-    made = []
+    elements = []
     for (curve, name), column in zip(_named(plot), count(1, 3), strict=False):
         number = (column - 1) // 3
         bars = curve.error is not None and any(curve.error)
-        made.append(
+        elements.append(
             f'<c:ser><c:idx val="{number}"/><c:order val="{number}"/>'
             f'<c:tx><c:strRef><c:f>{_cells(plot, column + 1, 1, 1)}</c:f><c:strCache><c:ptCount val="1"/>'
             f'<c:pt idx="0"><c:v>{_text(name)}</c:v></c:pt></c:strCache></c:strRef></c:tx>'
@@ -131,7 +137,7 @@ def _series(plot: Plot, scale: float) -> str:
             + f"<c:xVal>{_numbers(plot, curve.x, column)}</c:xVal>"
             f'<c:yVal>{_numbers(plot, curve.y, column + 1)}</c:yVal><c:smooth val="0"/></c:ser>'
         )
-    return "".join(made)
+    return "".join(elements)
 
 
 def _colour(curve: Curve) -> str:
@@ -160,16 +166,16 @@ def _note_of(curve: Curve, scale: float) -> str:
     """Return the label at the end of a line: the series' own name."""
     if not curve.note:
         return ""
-    shown = "".join(
-        f'<c:show{what} val="{int(what == "SerName")}"/>'
-        for what in ("LegendKey", "Val", "CatName", "SerName", "Percent", "BubbleSize")
+    flags = "".join(
+        f'<c:show{flag} val="{int(flag == "SerName")}"/>'
+        for flag in ("LegendKey", "Val", "CatName", "SerName", "Percent", "BubbleSize")
     )
-    none = shown.replace('"1"', '"0"')
+    none = flags.replace('"1"', '"0"')
     look = f"<a:pPr><a:defRPr {_size(7.5 * scale)}/></a:pPr>"
     text = f"<c:txPr><a:bodyPr/><a:lstStyle/><a:p>{look}{_END}</a:p></c:txPr>"
     return (
         f'<c:dLbls><c:dLbl><c:idx val="{len(curve.x) - 1}"/><c:spPr><a:noFill/></c:spPr>{text}'
-        f'<c:dLblPos val="{"t" if curve.y[-1] >= 0 else "b"}"/>{shown}</c:dLbl>{none}</c:dLbls>'
+        f'<c:dLblPos val="{"t" if curve.y[-1] >= 0 else "b"}"/>{flags}</c:dLbl>{none}</c:dLbls>'
     )
 
 
@@ -226,31 +232,31 @@ def _scale(plot: Plot) -> tuple[float, float, float]:
 
 
 def _axis(
-    plot: Plot, own: int, other: int, label: str, ends: str, crosses: str, step: str, scale: float
+    plot: Plot, axis_id: int, crossing_id: int, label: str, ends: str, crosses: str, step: str, scale: float
 ) -> str:
-    title = _title(label, 10 * scale, colour="000000", upright=own == 2) if label else ""
+    title = _title(label, 10 * scale, colour="000000", upright=axis_id == 2) if label else ""
     # LibreOffice takes the decimal sign from the language of the format, Word from the system's region.
     sign = "407" if plot.decimal_comma else "409"
     return (
-        f'<c:valAx><c:axId val="{own}"/><c:scaling><c:orientation val="minMax"/>{ends}</c:scaling>'
-        f'<c:delete val="0"/><c:axPos val="{"b" if own == 1 else "l"}"/>'
+        f'<c:valAx><c:axId val="{axis_id}"/><c:scaling><c:orientation val="minMax"/>{ends}</c:scaling>'
+        f'<c:delete val="0"/><c:axPos val="{"b" if axis_id == 1 else "l"}"/>'
         f"<c:majorGridlines><c:spPr>{_stroke(_GRID, 0.6)}</c:spPr></c:majorGridlines>{title}"
         f'<c:numFmt formatCode="[$-{sign}]General" sourceLinked="0"/><c:majorTickMark val="out"/>'
         f'<c:minorTickMark val="none"/><c:tickLblPos val="low"/><c:spPr>{_stroke(_AXIS, 0.8)}</c:spPr>'
-        f'<c:crossAx val="{other}"/><c:crosses val="{crosses}"/><c:crossBetween val="midCat"/>{step}'
+        f'<c:crossAx val="{crossing_id}"/><c:crosses val="{crosses}"/><c:crossBetween val="midCat"/>{step}'
         "</c:valAx>"
     )
 
 
 def _legend(plot: Plot) -> str:
     """Return the legend: a measured point and its curve share an entry, lines that have a note have none."""
-    seen: set[tuple[str, int]] = set()
+    styles: set[tuple[str, int]] = set()
     hidden = []
     for at, curve in enumerate(plot.curves):
         key = (curve.label, curve.group)
-        if not curve.label or key in seen:
+        if not curve.label or key in styles:
             hidden.append(f'<c:legendEntry><c:idx val="{at}"/><c:delete val="1"/></c:legendEntry>')
-        seen.add(key)
+        styles.add(key)
     return f'<c:legend><c:legendPos val="r"/>{"".join(hidden)}<c:overlay val="0"/></c:legend>'
 
 
@@ -293,3 +299,53 @@ def _cells(plot: Plot, column: int, first: int, last: int) -> str:
 
 def _text(text: str) -> str:
     return escape(clean(text).replace("\n", " "))
+
+
+_EMU_POINT = 12700
+_NEAR = 1.0  # points: LibreOffice rounds to a hundredth of a millimetre
+
+
+def with_alternatives(pdf: bytes, charts: Sequence[Chart]) -> bytes:
+    """Return a PDF whose charts have their alternative texts; one that is not found stays without."""
+    from pyhanko.pdf_utils import generic
+
+    writer = pdf_writer(pdf)
+    mute = [figure for figure in _figures(writer.root["/StructTreeRoot"]) if "/Alt" not in figure]
+    for chart in charts:
+        figure = next((figure for figure in mute if _is_of(figure, chart)), None)
+        if figure is None:
+            continue
+        mute.remove(figure)
+        text = codecs.BOM_UTF16_BE + clean(chart.alt).replace("\n", " ").encode("utf-16-be")
+        figure["/Alt"] = generic.ByteStringObject(text)
+        writer.mark_update(figure.container_ref)
+    stream = io.BytesIO()
+    writer.write(stream)
+    return stream.getvalue()
+
+
+def _figures(element: Any) -> Iterator[Any]:
+    """Yield the figures of a tree of structure in the order of reading."""
+    for child in _elements(element):
+        if child["/S"] == "/Figure":
+            yield child
+        yield from _figures(child)
+
+
+def _is_of(figure: Any, chart: Chart) -> bool:
+    """Tell whether a figure has the chart's size, and texts within as no picture has."""
+    box = figure["/A"].get("/BBox") if "/A" in figure else None
+    if box is None or next(_elements(figure), None) is None:
+        return False
+    left, low, right, high = (float(edge) for edge in box)
+    off = (right - left - chart.width_emu / _EMU_POINT, high - low - chart.height_emu / _EMU_POINT)
+    return max(map(abs, off)) < _NEAR
+
+
+def _elements(element: Any) -> Iterator[Any]:
+    """Yield the elements right below one; what else stands there is content of a page."""
+    below = element.get("/K", [])
+    for reference in below if isinstance(below, list) else (below,):
+        child = reference.get_object()
+        if hasattr(child, "get") and "/S" in child:
+            yield child

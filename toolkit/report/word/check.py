@@ -2,6 +2,8 @@
 
 Errors keep a report from being made; warnings do not. What makes a file unsafe to open is refused
 earlier, by `toolkit.report.word.package`.
+
+It advises, too: on tables over several pages, and on texts that nobody filled in.
 """
 
 from __future__ import annotations
@@ -12,8 +14,7 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
-from toolkit.report.word.advice import advice, placeholders
-from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
+from toolkit.report.word.lint import RULES, LintFinding, at_element, missing_fonts, surroundings
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import (
     LITERAL,
@@ -21,9 +22,9 @@ from toolkit.report.word.scan import (
     broken_literals,
     control_tag,
     filled_by,
+    fixed_texts,
     misspelt,
     own_rows,
-    place_of,
     row_in,
     scan,
     table_of,
@@ -31,8 +32,10 @@ from toolkit.report.word.scan import (
 )
 from toolkit.report.word.xml import (
     SDT_CONTENT,
+    SDT_PR,
     W_P,
     W_SDT,
+    W_T,
     W_TC,
     W_TR,
     Element,
@@ -100,13 +103,13 @@ def vocabulary_of(sites: list[Site], vocabularies: Mapping[str, Vocabulary]) -> 
     The first kind may have the tags of another one too, a report those of a diagnosis: it is meant where the
     template also has a value that the other kind does not know.
     """
-    first, *others = vocabularies
-    for name in others:
+    first, *further = vocabularies
+    for name in further:
         beginning = f"{name}."
         if any(site.tag.path.startswith(beginning) for site in sites):
-            default, other = vocabularies[first], vocabularies[name]
+            default, further_words = vocabularies[first], vocabularies[name]
             shared = any(entry.path.startswith(beginning) for entry in default.values)
-            return default if shared and _beyond(sites, default, other) else other
+            return default if shared and _beyond(sites, default, further_words) else further_words
     return vocabularies[first]
 
 
@@ -152,7 +155,7 @@ def _tags(sites: list[Site], style: Style, words: Vocabulary) -> Iterator[LintFi
 
 def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
     tag, family = site.tag, site.tag.family
-    known: dict[str, Mapping[str, object]] = {
+    families: dict[str, Mapping[str, object]] = {
         "figure": words.figures,
         "chart": dict.fromkeys(words.charts),
         "table": words.tables,
@@ -168,11 +171,11 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
             f"alone: write tk:figure.{tag.name}",
         )
         return
-    asked = family == "if" and not words.knows_condition(tag.name)
+    unknown_condition = family == "if" and not words.knows_condition(tag.name)
     if (
-        asked
+        unknown_condition
         or (family == "value" and not words.knows(tag.path))
-        or (tag.name not in known.get(family, {tag.name: ""}))
+        or (tag.name not in families.get(family, {tag.name: ""}))
     ):
         yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path, words)}")
         return
@@ -216,9 +219,9 @@ def _swallowed(site: Site) -> Iterator[LintFinding]:
     for paragraph in {id(p): p for p in [*site.element.iter(W_P), *site.element.iterancestors(W_P)]}.values():
         inside = [t for t in own_texts(paragraph) if filled_by(t) is site.element]
         for match in LITERAL.finditer("".join(t.text or "" for t in inside)):
-            other = parse_tag(match[1])
-            if other is not None and other.path != site.tag.path:
-                yield _at(site, "overlapping-tags", f"{other} stands inside {site.tag}, which replaces it")
+            tag = parse_tag(match[1])
+            if tag is not None and tag.path != site.tag.path:
+                yield _at(site, "overlapping-tags", f"{tag} stands inside {site.tag}, which replaces it")
 
 
 def _near(path: str, words: Vocabulary) -> str:
@@ -249,10 +252,10 @@ def _in_heading(site: Site) -> bool:
     names = {identity.lower()}
     styles = getattr(site.story.part, "_styles_part", None)
     if styles is not None:
-        for one in styles.element.iter(q("w:style")):
-            if one.get(q("w:styleId")) == identity:
-                names.add((one.find(q("w:name")).get(q("w:val")) or "").lower())
-                if one.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
+        for style_element in styles.element.iter(q("w:style")):
+            if style_element.get(q("w:styleId")) == identity:
+                names.add((style_element.find(q("w:name")).get(q("w:val")) or "").lower())
+                if style_element.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
                     return True
     return any(name.startswith("heading") for name in names)
 
@@ -329,30 +332,85 @@ def _untagged(site: Site, table: Element, columns: list[str]) -> Iterator[LintFi
 def _broken(parts: list[Story], words: Vocabulary) -> Iterator[LintFinding]:
     for story in parts:
         for paragraph in broken_literals(story):
-            yield LintFinding(
-                rule="malformed-tag",
-                level="error",
-                part=story.name,
-                place=place_of(paragraph, story),
-                message="a literal {{tk: is not closed by }} in the same paragraph",
-            )
+            message = "a literal {{tk: is not closed by }} in the same paragraph"
+            yield at_element("malformed-tag", story, paragraph, message, "error")
         for element, text in misspelt(story):
-            yield LintFinding(
-                rule="malformed-tag",
-                level="error",
-                part=story.name,
-                place=place_of(element, story),
-                message=f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters",
-            )
+            message = f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters"
+            yield at_element("malformed-tag", story, element, message, "error")
         for element, path in unbraced(story):
             if words.entry(path) is not None:
-                yield LintFinding(
-                    rule="malformed-tag",
-                    level="error",
-                    part=story.name,
-                    place=place_of(element, story),
-                    message=f"tk:{path} would be printed as it stands: write {{{{tk:{path}}}}}",
-                )
+                message = f"tk:{path} would be printed as it stands: write {{{{tk:{path}}}}}"
+                yield at_element("malformed-tag", story, element, message, "error")
 
 
 __all__ = ["RULES", "LintFinding", "check_stories", "check_template"]
+
+
+# A text that stands for another one: marks of work undone, the filler of printers, the towns and people of
+# specimen forms, a name in brackets, and the domains that RFC 2606 keeps for examples.
+_PLACEHOLDER = re.compile(
+    r"\b(?:TODO|TBD|FIXME|X{3,}|lorem ipsum|Muster(?:stadt|straße|mann|frau|firma)|Anytown"
+    r"|(?:\w+\.)?example\.(?:com|org|net)|Ville-Exemple)\b"
+    r"|[\[<](?!\s)[^\W\d_]+ [^\[\]<>{}]+[\]>]",
+    re.IGNORECASE,
+)
+
+
+def placeholders(parts: list[Story], style: Style) -> Iterator[LintFinding]:
+    """Yield texts of a template and its style file that stand for what somebody was to write there."""
+    for element in fixed_texts(parts):
+        match = _PLACEHOLDER.search(element.text or "")
+        if match:
+            story = next(story for story in parts if element in story.root.iter(W_T))
+            yield at_element(
+                "placeholder", story, element, f"{match[0]!r} stands for a text of yours: write it"
+            )
+    for story in parts:
+        for control in story.root.iter(W_SDT):
+            prompt = control.find(f"{SDT_PR}/{q('w:showingPlcHdr')}")
+            if prompt is not None and control_tag(control) is None:
+                message = "a control that is not the toolkit's shows its prompt, which would be printed"
+                yield at_element("placeholder", story, control, message)
+    for text in sorted(style.texts):
+        match = _PLACEHOLDER.search(text)
+        if match:
+            yield LintFinding(
+                rule="placeholder", level="warning", part="style file", place=text,
+                message=f"{match[0]!r} stands for a text of yours: write it",
+            )  # fmt: skip
+
+
+def advice(sites: list[Site]) -> Iterator[LintFinding]:
+    """Yield notes on tables that will not read well over several pages, and words that will vanish."""
+    for site in sites:
+        if site.tag.family != "table" or (table := table_of(site)) is None:
+            continue
+        rows = own_rows(table)
+        if len(rows) > 1 and rows[0].find(f"{q('w:trPr')}/{q('w:tblHeader')}") is None:
+            yield _note(
+                site, rows[0], "header-row",
+                f"{site.tag}: no header row is repeated on the next page: Table Layout, Repeat Header Rows",
+            )  # fmt: skip
+        patterns = {id(row): row for neighbour in sites if (row := _prototype(table, neighbour)) is not None}
+        for row in patterns.values() if patterns else rows[-1:]:
+            if row.find(f"{q('w:trPr')}/{q('w:cantSplit')}") is None:
+                yield _note(
+                    site, row, "split-row",
+                    f"{site.tag}: a row may break across pages: Table Properties, Row, clear 'Allow row to "
+                    "break across pages'",
+                )  # fmt: skip
+        if site.form == "literal" and site.element.tag == W_P:
+            remainder = LITERAL.sub("", "".join(text.text or "" for text in site.element.iter(W_T))).strip()
+            if remainder:
+                yield _note(
+                    site, site.element, "table-paragraph",
+                    f"{site.tag} shares its paragraph with {remainder[:40]!r}: let the tag stand alone in it",
+                )  # fmt: skip
+
+
+def _prototype(table: Element, site: Site) -> Element | None:
+    return row_in(table, site.element) if site.tag.family == "row" else None
+
+
+def _note(site: Site, element: Element, rule: str, message: str) -> LintFinding:
+    return at_element(rule, site.story, element, message, "note")

@@ -62,25 +62,25 @@ def place_of_symbol(pdf: Path, page: int, content: ReportContent) -> Place:
     at = next((at for at in reversed(range(len(texts))) if texts[at : at + len(caption)] == caption), None)
     if at is None or size is None:
         raise _without("its words are not on the last page")
-    shown = boxes[at : at + len(caption)]
-    left, top = min(box[0] for box in shown), max(box[3] for box in shown) + _GAP
-    right, bottom = left + SIZE, top + SIZE
+    caption_boxes = boxes[at : at + len(caption)]
+    x, top = min(box[0] for box in caption_boxes), max(box[3] for box in caption_boxes) + _GAP
+    right, bottom = x + SIZE, top + SIZE
     inside = [
         text
         for text, (x0, y0, x1, y1) in zip(texts, boxes, strict=True)
-        if x0 < right and x1 > left and y0 < bottom and y1 > top
+        if x0 < right and x1 > x and y0 < bottom and y1 > top
     ]
     if inside or bottom > float(size[2]) or right > float(size[1]):
         raise _without(f"{' '.join(inside[:5])!r} stands there" if inside else "the page ends there")
-    return Place(page=page - 1, left=left, top=top, size=SIZE)
+    return Place(page=page - 1, left=x, top=top, size=SIZE)
 
 
 def _end(body: Element, identity: str) -> int:
     """Return where the end of a body begins: its last words that name the document, or its last section."""
     at = len(body) - (len(body) > 0 and body[-1].tag == q("w:sectPr"))
-    shown = next((place for place in reversed(range(at)) if _words(body[place])), None)
-    if shown is not None and body[shown].tag in (W_P, W_SDT) and identity and identity in _words(body[shown]):
-        return shown
+    last = next((place for place in reversed(range(at)) if _words(body[place])), None)
+    if last is not None and body[last].tag in (W_P, W_SDT) and identity and identity in _words(body[last]):
+        return last
     return at
 
 

@@ -109,17 +109,17 @@ def run_properties(sdt: Element) -> Element | None:
     properties = sdt.find(SDT_PR)
     showing = properties.find(q("w:showingPlcHdr")) is not None
     first = next(sdt.find(SDT_CONTENT).iter(W_R), None)
-    found = None if first is None else first.find(R_PR)
-    own = properties.find(R_PR)
-    if showing and own is not None:
-        return own
-    if found is None:
-        return own
-    found = deepcopy(found)
-    style = found.find(q("w:rStyle"))
+    copied = None if first is None else first.find(R_PR)
+    of_the_control = properties.find(R_PR)
+    if showing and of_the_control is not None:
+        return of_the_control
+    if copied is None:
+        return of_the_control
+    copied = deepcopy(copied)
+    style = copied.find(q("w:rStyle"))
     if style is not None and (showing or style.get(q("w:val")) == "PlaceholderText"):
-        found.remove(style)
-    return found
+        copied.remove(style)
+    return copied
 
 
 def fill_literals(paragraph: Element, resolve: Callable[[Tag], str]) -> None:
@@ -150,12 +150,8 @@ def fill_literals(paragraph: Element, resolve: Callable[[Tag], str]) -> None:
         else:
             for middle in texts[first + 1 : last]:
                 middle.text = ""
-            _keep(texts[last], after)
+            set_text(texts[last], after)
             set_text(texts[first], before + text)
-
-
-def _keep(t: Element, text: str) -> None:
-    set_text(t, text)
 
 
 def set_cell(cell: Element, text: str) -> None:
@@ -220,9 +216,9 @@ def from_the_right(package: Any, parts: list[Story]) -> bool:
     styles = getattr(package.main_document_part, "_styles_part", None)
     roots = [story.root for story in parts] + ([] if styles is None else [styles.element])
     return any(
-        (one.get(q("w:val")) or "1").lower() not in _OFF
+        (mark.get(q("w:val")) or "1").lower() not in _OFF
         for root in roots
-        for one in root.iter(q("w:bidi"), q("w:bidiVisual"))
+        for mark in root.iter(q("w:bidi"), q("w:bidiVisual"))
     )
 
 

@@ -88,7 +88,7 @@ def fill(
     package: Any = open_package(template)
     parts = stories(package)
     lint = check_stories(package, parts, content.style, content.vocabulary, fonts=fonts)
-    errors = [one for one in lint if one.level == "error"]
+    errors = [finding for finding in lint if finding.level == "error"]
     if errors:
         raise _lint_error(template, errors)
     return _Filler(package, parts, template, content, pictures, allow_missing).run(lint)
@@ -96,9 +96,9 @@ def fill(
 
 def _lint_error(template: Template, errors: list[LintFinding]) -> TemplateError:
     first = errors[0]
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    further = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     return TemplateError(
-        f"the template has errors: {first.message}{more}",
+        f"the template has errors: {first.message}{further}",
         where=f"{template.path}: {first.part}, {first.place}",
         got="; ".join(f"{error.rule}: {error.message}" for error in errors[:10]),
         expected="a template that 'toolkit template check' finds no error in",
@@ -138,7 +138,7 @@ class _Filler:
         self.printed = kept_whole if from_the_right(package, parts) else str
 
     def run(self, lint: tuple[LintFinding, ...]) -> Filled:
-        used = {site.tag.path for site in scan(self.parts)}
+        paths = {site.tag.path for site in scan(self.parts)}
         body = self.parts[0].root
         self._conditions()
         drop_notes(self.parts)
@@ -169,8 +169,8 @@ class _Filler:
         for site in outside:
             if site.form == "control" and site.tag.family in DRAWN:
                 self._figure_control(site)
-        added = self._marks(used)
-        for name, text in close(body.find(q("w:body")), self.content, signed=SIGNATURE in used):
+        added = self._marks(paths)
+        for name, text in close(body.find(q("w:body")), self.content, signed=SIGNATURE in paths):
             self.log.manifest.append(Entry(tag=f"closing:{name}", text=text, part=self.parts[0].name))
         page_mark = self.content.page_mark
         if page_mark is not None:
@@ -266,7 +266,7 @@ class _Filler:
                     Entry(tag=f"tk:{site.tag.path}.{column}", text=text, part=site.story.name)
                 )
 
-        made = fill_table(
+        filled_table = fill_table(
             element,
             table,
             lambda tag: self._value(tag, None, site.story.name),
@@ -280,16 +280,18 @@ class _Filler:
             passing = {f"tk:{site.tag.path}.{column.name}" for column in table.columns if column.of_the_run}
             if passing:
                 self.log.of_the_run |= passing
-                self.log.rows_of_the_run |= set(range(len(self.log.rows), len(self.log.rows) + len(made)))
-            self.log.rows += made
+                self.log.rows_of_the_run |= set(
+                    range(len(self.log.rows), len(self.log.rows) + len(filled_table))
+                )
+            self.log.rows += filled_table
 
     def _literals(self, sites: list[Site]) -> None:
-        seen: set[int] = set()
+        paragraphs: set[int] = set()
         naming = {id(site.element) for site in sites if site.tag.family == "table"}
         for site in sites:
-            if id(site.element) in seen:
+            if id(site.element) in paragraphs:
                 continue
-            seen.add(id(site.element))
+            paragraphs.add(id(site.element))
             free_height(site.element)
             release(site.element)
             figures: list[Tag] = []
@@ -354,13 +356,13 @@ class _Filler:
             self.log.pictures.append(f"{tag.name} {sha256_bytes(drawn)}")
         return run
 
-    def _marks(self, used: set[str]) -> tuple[str, ...]:
+    def _marks(self, paths: set[str]) -> tuple[str, ...]:
         """Say what must be said (simulated, unverified, draft) where the template has no place for it."""
         places = self.content.vocabulary.marks
         body = self.parts[0].root.find(q("w:body"))
         added = []
         for name, text in reversed(self.content.marks):
-            if used & places[name]:
+            if paths & places[name]:
                 continue
             bold = etree.Element(q("w:rPr"))
             etree.SubElement(bold, q("w:b"))

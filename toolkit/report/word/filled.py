@@ -76,9 +76,9 @@ def text_elements(docx: bytes, main_part: str) -> Iterator[Element]:
 
 
 def _elements(part: object) -> Iterator[Element]:
-    wanted = (W_P, W_SDT, q("wp:docPr"), W_TR)
+    tags = (W_P, W_SDT, q("wp:docPr"), W_TR)
     events = etree.iterparse(
-        part, events=("end",), tag=wanted, resolve_entities=False, no_network=True, load_dtd=False
+        part, events=("end",), tag=tags, resolve_entities=False, no_network=True, load_dtd=False
     )
     for _, element in events:
         if element.tag != W_TR:
@@ -91,13 +91,13 @@ def _parts(archive: zipfile.ZipFile, main: str) -> list[str]:
     """Return the main part, and the headers, footers and notes that it refers to."""
     folder, name = posixpath.split(main)
     relations = posixpath.join(folder, "_rels", f"{name}.rels")
-    found = [main]
+    paths = [main]
     if relations not in archive.namelist():
-        return found
-    for one in etree.fromstring(archive.read(relations)).iter(_RELATIONS):
-        kind = (one.get("Type") or "").rpartition("/")[2]
-        if kind in STORIES and one.get("TargetMode") != "External":
+        return paths
+    for relation in etree.fromstring(archive.read(relations)).iter(_RELATIONS):
+        kind = (relation.get("Type") or "").rpartition("/")[2]
+        if kind in STORIES and relation.get("TargetMode") != "External":
             # An absolute target begins at the root of the package.
-            path = posixpath.normpath(posixpath.join("/", folder, one.get("Target") or "")).lstrip("/")
-            found += [path] if path not in found else []
-    return found
+            path = posixpath.normpath(posixpath.join("/", folder, relation.get("Target") or "")).lstrip("/")
+            paths += [path] if path not in paths else []
+    return paths

@@ -45,12 +45,15 @@ RULES = {
 }
 
 
+Level = Literal["error", "warning", "note"]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LintFinding:
     """One finding: rule, level, the part of the package, the place in it, and a sentence."""
 
     rule: str
-    level: Literal["error", "warning", "note"]
+    level: Level
     part: str
     place: str
     message: str
@@ -69,6 +72,15 @@ class LintFinding:
 # The lint around the tags: tracked changes, comments, fields, styles, and tags where nothing is filled.
 
 
+def at_element(
+    rule: str, story: Story, element: Element, message: str, level: Level = "warning"
+) -> LintFinding:
+    """Return what the lint says of an element of a story."""
+    return LintFinding(
+        rule=rule, level=level, part=story.name, place=place_of(element, story), message=message
+    )
+
+
 _INDEXES = ("TOC", "INDEX", "TOA", "BIBLIOGRAPHY")
 _TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "rPrChange", "pPrChange"))
 
@@ -76,40 +88,34 @@ _TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "
 def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[LintFinding]:
     """Yield what around the tags asks for a look, and tags that stand where nothing is filled."""
 
-    def warn(rule: str, story: Story, element: Element, message: str) -> LintFinding:
-        return LintFinding(
-            rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message
-        )
-
     # Their elements are held, so that an identity stays that of one element.
     written = [field.begin for field in contents_fields(parts[0].root) if can_update(field)]
-    known = {id(one) for one in written}
+    placed = {id(one) for one in written}
     for story in parts:
         for element in story.root.iter(*_TRACKED):
-            yield warn("tracked-changes", story, element, "tracked changes: accept or reject them before use")
+            yield at_element(
+                "tracked-changes", story, element, "tracked changes: accept or reject them before use"
+            )
             break
         for element in story.root.iter(q("w:del"), q("w:moveFrom")):
             if _TAG.search("".join(one.text or "" for one in element.iter(q("w:delText"), q("w:t")))):
-                yield LintFinding(
-                    rule="tracked-changes",
-                    level="error",
-                    part=story.name,
-                    place=place_of(element, story),
-                    message="a tag stands in a tracked deletion and would be printed: accept the deletion",
-                )
+                message = "a tag stands in a tracked deletion and would be printed: accept the deletion"
+                yield at_element("tracked-changes", story, element, message, "error")
         for element in story.root.iter(q("w:commentReference")):
-            yield warn("comments", story, element, "a comment will stand in the report")
+            yield at_element("comments", story, element, "a comment will stand in the report")
             break
         for element, code in walk_fields(story.root):
             word = code.split()[0].upper() if code.split() else ""
             if word in ("DATE", "TIME"):
-                yield warn(
+                yield at_element(
                     "date-field", story, element, f"{word} becomes the day of printing; use tk:report.date"
                 )
             elif word == "IF":
-                yield warn("if-field", story, element, "an IF field is not evaluated; use a tk:if control")
-            elif word in _INDEXES and id(element) not in known:
-                yield warn(
+                yield at_element(
+                    "if-field", story, element, "an IF field is not evaluated; use a tk:if control"
+                )
+            elif word in _INDEXES and id(element) not in placed:
+                yield at_element(
                     "contents",
                     story,
                     element,
@@ -134,9 +140,9 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
 def _style_names(package: object) -> set[str]:
     main = package.main_document_part  # type: ignore[attr-defined]
     return {
-        (one.find(q("w:name")).get(q("w:val")) or "").lower()
-        for one in main._styles_part.element.iter(q("w:style"))
-        if one.find(q("w:name")) is not None
+        (style.find(q("w:name")).get(q("w:val")) or "").lower()
+        for style in main._styles_part.element.iter(q("w:style"))
+        if style.find(q("w:name")) is not None
     }
 
 
@@ -172,28 +178,23 @@ def _unreached(package: Any, parts: list[Story]) -> Iterator[LintFinding]:
 
 def _aside(story: Story) -> Iterator[LintFinding]:
     """Find literal tags beside the text: in alternative texts, drawn words, codes of fields, links."""
-    found = [
+    findings = [
         (element, "an alternative text, a drawn word or another property")
         for element in story.root.iter(etree.Element)
         if element.tag != q("w:alias") and any(_TAG.search(str(value)) for value in element.attrib.values())
     ]
-    found += [
+    findings += [
         (element, "the code of a field") for element, code in walk_fields(story.root) if _TAG.search(code)
     ]
     targets = {rel.rId for rel in story.part.rels.values() if _TAG.search(unquote(rel.target_ref))}
-    found += [
+    findings += [
         (element, "the address of a link")
         for element in story.root.iter(q("w:hyperlink"))
         if element.get(q("r:id")) in targets
     ]
-    for element, where in {id(element): (element, where) for element, where in found}.values():
-        yield LintFinding(
-            rule="wrong-place",
-            level="error",
-            part=story.name,
-            place=place_of(element, story),
-            message=f"a literal tag stands in {where}, where nothing is filled",
-        )
+    for element, where in {id(element): (element, where) for element, where in findings}.values():
+        message = f"a literal tag stands in {where}, where nothing is filled"
+        yield at_element("wrong-place", story, element, message, "error")
 
 
 # Which fonts a template asks for, and which of them this machine cannot show as they are.
@@ -216,10 +217,10 @@ _SYMBOLS = ("symbol", "wingdings", "wingdings 2", "wingdings 3", "webdings")
 def installed_fonts() -> frozenset[str]:
     """Return the families that fontconfig knows, in lower case; empty where it is not installed."""
     try:
-        done = subprocess.run(["fc-list", ":", "family"], capture_output=True, timeout=20, check=False)
+        process = subprocess.run(["fc-list", ":", "family"], capture_output=True, timeout=20, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return frozenset()
-    text = done.stdout.decode("utf-8", "replace").replace("\n", ",")
+    text = process.stdout.decode("utf-8", "replace").replace("\n", ",")
     return frozenset(name.strip().lower() for name in text.split(",") if name.strip())
 
 
@@ -228,10 +229,10 @@ def missing_fonts(package: object, parts: list[Story]) -> list[str]:
     have = installed_fonts()
     if not have:
         return []
-    wanted = {name for name in _wanted(package, parts) if name}
+    named_fonts = {name for name in _wanted(package, parts) if name}
     return sorted(
         name
-        for name in wanted
+        for name in named_fonts
         if name.lower() not in have and _EQUAL.get(name.lower()) not in have and name.lower() not in _SYMBOLS
     )
 
@@ -239,7 +240,7 @@ def missing_fonts(package: object, parts: list[Story]) -> list[str]:
 def _wanted(package: object, parts: list[Story]) -> Iterator[str]:
     main = package.main_document_part  # type: ignore[attr-defined]
     theme = _theme(main)
-    used = {
+    styles = {
         e.get(q("w:val"))
         for story in parts
         for tag in ("pStyle", "rStyle", "tblStyle")
@@ -251,15 +252,15 @@ def _wanted(package: object, parts: list[Story]) -> Iterator[str]:
     root = main._styles_part.element
     for style in root.iter(q("w:style"), q("w:rPrDefault")):
         default = style.tag == q("w:rPrDefault") or style.get(q("w:default")) == "1"
-        if default or style.get(q("w:styleId")) in used:
+        if default or style.get(q("w:styleId")) in styles:
             for fonts in style.iter(q("w:rFonts")):
                 yield from _names(fonts, theme)
 
 
 def _names(fonts: Element, theme: dict[str, str]) -> Iterator[str]:
     for side in ("ascii", "hAnsi"):
-        named = fonts.get(q(f"w:{side}Theme"))
-        yield theme.get(named[:5], "") if named else fonts.get(q(f"w:{side}")) or ""
+        theme_name = fonts.get(q(f"w:{side}Theme"))
+        yield theme.get(theme_name[:5], "") if theme_name else fonts.get(q(f"w:{side}")) or ""
 
 
 def _theme(main: object) -> dict[str, str]:

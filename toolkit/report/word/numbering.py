@@ -135,17 +135,20 @@ class StyleSheet:
     def of(cls, package: object) -> StyleSheet:
         """Read the styles part of an opened package; what a style lacks comes from the one it is based on."""
         root = package.main_document_part._styles_part.element  # type: ignore[attr-defined]
-        styles = {one.get(q("w:styleId")) or "": one for one in root.iter(q("w:style"))}
+        styles = {
+            style_element.get(q("w:styleId")) or "": style_element
+            for style_element in root.iter(q("w:style"))
+        }
         names = {identity: _value(style, "w:name").lower() for identity, style in styles.items()}
         levels, numbered, tabbed = {}, set(), set()
         for identity in styles:
             level: int | None = None
-            for one in _chain(identity, styles):
+            for style_element in _chain(identity, styles):
                 if level is None:
-                    level = _own_level(one, names[one.get(q("w:styleId")) or ""])
-                if one.find(f"{_P_PR}/{q('w:numPr')}") is not None:
+                    level = _own_level(style_element, names[style_element.get(q("w:styleId")) or ""])
+                if style_element.find(f"{_P_PR}/{q('w:numPr')}") is not None:
                     numbered.add(identity)
-                if one.find(f"{_P_PR}/{q('w:tabs')}") is not None:
+                if style_element.find(f"{_P_PR}/{q('w:tabs')}") is not None:
                     tabbed.add(identity)
             levels[identity] = _BODY if level is None else level
         return cls(levels=levels, numbered=numbered, tabbed=tabbed, names=names)

@@ -126,7 +126,11 @@ _RED = "B00000"
 def mark_pages(package: Any, text: str) -> None:
     """Put a line of text on every page: first, even and odd ones, of every section."""
     main = package.main_document_part
-    sections = [one for one in main.element.iter(q("w:sectPr")) if one.getparent().tag != q("w:sectPrChange")]
+    sections = [
+        properties
+        for properties in main.element.iter(q("w:sectPr"))
+        if properties.getparent().tag != q("w:sectPrChange")
+    ]
     if not sections:
         sections = [etree.SubElement(main.element.find(q("w:body")), q("w:sectPr"))]
     headers = {id(element): element for element in _headers(main, sections)}
@@ -184,10 +188,10 @@ def _frame(text: str, width: int) -> Element:
     properties = etree.SubElement(paragraph, q("w:pPr"))
 
     def add(parent: Element, name: str, **values: str | int) -> Element:
-        made = etree.SubElement(parent, q(name))
+        element = etree.SubElement(parent, q(name))
         for key, value in values.items():
-            made.set(q(f"w:{key}"), str(value))
-        return made
+            element.set(q(f"w:{key}"), str(value))
+        return element
 
     add(
         properties, "w:framePr", w=width, hSpace=0, wrap="around", vAnchor="page", hAnchor="page",
@@ -218,7 +222,7 @@ def _insert(header: Element, frame: Element) -> None:
     """Put a copy of the frame before a paragraph, on which it hangs."""
     from copy import deepcopy
 
-    anchor = next((one for one in header if one.tag == W_P), None)
+    anchor = next((paragraph for paragraph in header if paragraph.tag == W_P), None)
     if anchor is None:
         anchor = etree.SubElement(header, W_P)
     anchor.addprevious(deepcopy(frame))
@@ -254,6 +258,9 @@ def _one_core(package: Any) -> None:
     """
     from docx.opc.constants import RELATIONSHIP_TYPE
 
-    for identity, one in list(package.rels.items()):
-        if one.reltype.endswith("/core-properties") and one.reltype != RELATIONSHIP_TYPE.CORE_PROPERTIES:
+    for identity, relation in list(package.rels.items()):
+        if (
+            relation.reltype.endswith("/core-properties")
+            and relation.reltype != RELATIONSHIP_TYPE.CORE_PROPERTIES
+        ):
             del package.rels[identity]

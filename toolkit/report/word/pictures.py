@@ -83,8 +83,8 @@ def picture_run(
     image = package.get_or_add_image_part(io.BytesIO(picture.png))
     rel = story.part.relate_to(image, RELATIONSHIP_TYPE.IMAGE)
     cx, cy = _size(at, story, width, picture.height_px / picture.width_px)
-    named = _named(ids.next_drawing(), name, alt)
-    return _drawing_run(at, _inline(cx, cy, named, _picture_graphic(rel, cx, cy, named)))
+    properties = _named(ids.next_drawing(), name, alt)
+    return _drawing_run(at, _inline(cx, cy, properties, _picture_graphic(rel, cx, cy, properties)))
 
 
 def chart_run(
@@ -137,19 +137,19 @@ def _drawing_run(at: Element, inline: Element) -> Element:
     return run
 
 
-def _inline(cx: int, cy: int, named: str, graphic: str) -> Element:
+def _inline(cx: int, cy: int, properties: str, graphic: str) -> Element:
     spaces = " ".join(f'xmlns:{p}="{NS[p]}"' for p in ("wp", "a", "pic", "r"))
     return etree.fromstring(
         f'<wp:inline {spaces} distT="0" distB="0" distL="0" distR="0"><wp:extent cx="{cx}" cy="{cy}"/>'
-        f"<wp:docPr {named}/>"
+        f"<wp:docPr {properties}/>"
         '<wp:cNvGraphicFramePr><a:graphicFrameLocks noChangeAspect="1"/></wp:cNvGraphicFramePr>'
         f"<a:graphic>{graphic}</a:graphic></wp:inline>"
     )
 
 
-def _picture_graphic(rel: str, cx: int, cy: int, named: str) -> str:
+def _picture_graphic(rel: str, cx: int, cy: int, properties: str) -> str:
     return (
-        f'<a:graphicData uri="{NS["pic"]}"><pic:pic><pic:nvPicPr><pic:cNvPr {named}/><pic:cNvPicPr/>'
+        f'<a:graphicData uri="{NS["pic"]}"><pic:pic><pic:nvPicPr><pic:cNvPr {properties}/><pic:cNvPicPr/>'
         f'</pic:nvPicPr><pic:blipFill><a:blip r:embed="{rel}"/><a:stretch><a:fillRect/></a:stretch>'
         f'</pic:blipFill><pic:spPr><a:xfrm><a:off x="0" y="0"/><a:ext cx="{cx}" cy="{cy}"/></a:xfrm>'
         '<a:prstGeom prst="rect"><a:avLst/></a:prstGeom></pic:spPr></pic:pic></a:graphicData>'
@@ -168,16 +168,16 @@ def insert_at_mark(paragraph: Element, mark: str, run: Element) -> None:
         if not mark_text:
             continue
         owner = ancestor(t, W_R)
-        rest = deepcopy(owner)
+        remainder = deepcopy(owner)
         index = list(owner.iter()).index(t)
-        twin = list(rest.iter())[index]
+        twin = list(remainder.iter())[index]
         t.text, twin.text = before, after
         for element in list(t.itersiblings()):
             owner.remove(element)
         for element in list(twin.itersiblings(preceding=True)):
             if element.tag != q("w:rPr"):
-                rest.remove(element)
-        owner.addnext(rest)
+                remainder.remove(element)
+        owner.addnext(remainder)
         owner.addnext(run)
         return
 
@@ -247,7 +247,7 @@ def _cell_width(cell: Element, room: int) -> int | None:
     grid = grid if any(grid) else [room // max(len(grid), 1)] * len(grid)
     at = 0
     for cell_before in (cell_ for cell_ in row.iter(W_TC) if ancestor(cell_, W_TR) is row):
-        span = _number_of(cell_before, "w:tcPr/w:gridSpan")
+        span = _columns_of(cell_before)
         if cell_before is cell:
             inside = sum(grid[at : at + span])
             return inside - _CELL_MARGIN if inside > _CELL_MARGIN else None
@@ -255,8 +255,8 @@ def _cell_width(cell: Element, room: int) -> int | None:
     return None
 
 
-def _number_of(cell: Element, path: str) -> int:
-    element = cell.find("/".join(q(step) for step in path.split("/")))
+def _columns_of(cell: Element) -> int:
+    element = cell.find(f"{q('w:tcPr')}/{q('w:gridSpan')}")
     text = "" if element is None else element.get(q("w:val")) or ""
     return max(int(text), 1) if text.isdigit() else 1
 
@@ -276,9 +276,9 @@ def _of_body(at: Element, story: Story) -> Element | None:
         return next(iter(story.sections), None)
     # A section's properties stand in its last paragraph, or at the end of the body.
     for paragraph in at.iterancestors(W_P):
-        own = paragraph.find(f"{q('w:pPr')}/{q('w:sectPr')}")
-        if own is not None:
-            return own
+        last_section = paragraph.find(f"{q('w:pPr')}/{q('w:sectPr')}")
+        if last_section is not None:
+            return last_section
     inside = next(at.iter(q("w:sectPr")), None)
     if inside is not None:
         return inside
@@ -306,7 +306,7 @@ def _of_part(story: Story) -> Element | None:
 
 def section_room(section: Element) -> tuple[int, int]:
     """Return width of one column and height of the text area [twips] of a section."""
-    size, margin, columns = (section.find(q(f"w:{one}")) for one in ("pgSz", "pgMar", "cols"))
+    size, margin, columns = (section.find(q(f"w:{part}")) for part in ("pgSz", "pgMar", "cols"))
 
     def number(element: Element | None, name: str, default: int) -> int:
         text = None if element is None else element.get(q(f"w:{name}"))

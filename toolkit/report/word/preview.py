@@ -43,9 +43,9 @@ def pages_of(pdf: Path, mark: str) -> tuple[SeenPage, ...]:
     RenderError
         poppler is not installed, or does not end
     """
-    wanted = mark.split()
+    mark_words = mark.split()
     return tuple(
-        SeenPage(width=width, height=height, holes=tuple(_places(words, wanted)))
+        SeenPage(width=width, height=height, holes=tuple(_places(words, mark_words)))
         for width, height, words in words_of(pdf)
     )
 
@@ -72,11 +72,11 @@ def words_of(pdf: Path) -> list[tuple[float, float, list[Word]]]:
     ]
 
 
-def _places(words: list[Word], wanted: list[str]) -> list[tuple[float, float, float, float]]:
+def _places(words: list[Word], mark_words: list[str]) -> list[tuple[float, float, float, float]]:
     places = []
     for at in range(len(words)):
-        group = words[at : at + len(wanted)]
-        if wanted and [word[0] for word in group] == wanted:
+        group = words[at : at + len(mark_words)]
+        if mark_words and [word[0] for word in group] == mark_words:
             left, top = min(word[1] for word in group), min(word[2] for word in group)
             right, bottom = max(word[3] for word in group), max(word[4] for word in group)
             places.append((left, top, right - left, bottom - top))
@@ -93,12 +93,12 @@ def page_picture(pdf: Path, page: int) -> bytes:
     """
     words = ["pdftoppm", "-png", "-r", str(_DPI), "-f", str(page), "-l", str(page), "-singlefile", str(pdf)]
     try:
-        done = subprocess.run(words, capture_output=True, timeout=120, check=False)
+        process = subprocess.run(words, capture_output=True, timeout=120, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise _not_drawn(pdf, page, str(error)) from error
-    if done.returncode or not done.stdout:
-        raise _not_drawn(pdf, page, done.stderr.decode(errors="replace")[:500] or "nothing")
-    return done.stdout
+    if process.returncode or not process.stdout:
+        raise _not_drawn(pdf, page, process.stderr.decode(errors="replace")[:500] or "nothing")
+    return process.stdout
 
 
 def _not_drawn(pdf: Path, page: int, got: str) -> RenderError:

@@ -88,13 +88,13 @@ def fill_table(
             for cell, column in zip(cells, table.columns, strict=True):
                 set_cell(cell, text(Tag(path=f"row.{column.name}")))
 
-    made: list[Element | tuple[str, ...]] = []
+    elements: list[Element | tuple[str, ...]] = []
     if bulk is not None and len(table.rows) > MANY and bulk.takes(element, pattern):
         mould = Mould(pattern, put, ids, element.getroottree().getroot())
         rows = []
         for xml, cells in mould.cast(map(texts, table.rows)):
             rows.append(xml)
-            made.append(cells)
+            elements.append(cells)
         bulk.add(prototype, rows)
     else:
         last = prototype
@@ -104,9 +104,9 @@ def fill_table(
             last = row
             put(row, texts(values))
             fresh_ids(row, ids)
-            made.append(row)
+            elements.append(row)
     prototype.getparent().remove(prototype)
-    return made
+    return elements
 
 
 def _prototype(table: Element) -> Element:
@@ -130,9 +130,9 @@ def _tags(root: Element) -> Iterator[tuple[Element, Tag]]:
                 yield element, tag
             continue
         for match in LITERAL.finditer(paragraph_text(element)):
-            found = parse_tag(match[1])
-            if found is not None:
-                yield element, found
+            parsed = parse_tag(match[1])
+            if parsed is not None:
+                yield element, parsed
 
 
 def _places(pattern: Element) -> tuple[list[int], list[tuple[int, Tag]]]:

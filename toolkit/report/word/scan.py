@@ -1,13 +1,18 @@
-"""Find the tags of a template: content controls and literal ``{{tk:...}}``, in every part."""
+"""Find the tags of a template: content controls and literal ``{{tk:...}}``, in every part.
+
+What stands beside the tags of a template in another language follows the catalogue of phrases.
+"""
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from toolkit.report.tags import DRAWN, Tag, parse_tag
+from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.xml import (
     SDT_CONTENT,
     SDT_PR,
@@ -21,7 +26,11 @@ from toolkit.report.word.xml import (
     in_fallback,
     own_texts,
     q,
+    set_text,
+    stories,
+    write_back,
 )
+from toolkit.words.phrasebook import locale_of, phrasebook
 
 LITERAL = re.compile(r"\{\{\s*(tk:[^{}]*?)\s*\}\}")
 BROKEN = re.compile(r"\{\{\s*tk:(?![^{}]*\}\})")
@@ -103,8 +112,8 @@ def misspelt(story: Story) -> Iterator[tuple[Element, str]]:
                 yield element, text
         else:
             text = "".join(t.text or "" for t in visible_texts(element))
-            if found := MISSPELT_LITERAL.search(text):
-                yield element, text[found.start() : found.start() + 40]
+            if match := MISSPELT_LITERAL.search(text):
+                yield element, text[match.start() : match.start() + 40]
 
 
 def unbraced(story: Story) -> Iterator[tuple[Element, str]]:
@@ -159,3 +168,50 @@ def place_of(element: Element, story: Story) -> str:
     if paragraph is None:
         return "part"
     return f"paragraph {list(story.root.iter(W_P)).index(paragraph) + 1}"
+
+
+_NUMBERED = re.compile(r"(\d+(?:\.\d+)*\s{2,})?(.*)", re.DOTALL)
+_WORDS = re.compile(r"[^\W\d_]{2,}")
+_TAGS = re.compile(r"\{\{.*?\}\}")
+
+
+def fixed_texts(parts: Sequence[Story]) -> Iterator[Element]:
+    """Yield the texts of a template that a report prints as they stand."""
+    for story in parts:
+        for paragraph in story.root.iter(W_P):
+            yield from (text for text in visible_texts(paragraph) if _is_word(text.text or ""))
+
+
+def phrase_of(text: str) -> str:
+    """Return the phrase that a fixed text is: without the number of a heading and outer space.
+
+    >>> phrase_of("3  Lateral force "), phrase_of(" of ")
+    ('Lateral force', 'of')
+    """
+    match = _NUMBERED.fullmatch(text.strip())
+    return match[2] if match else text.strip()
+
+
+def in_language(template: Template, language: str) -> bytes:
+    """Return a template as a Word file with its fixed texts, and its language, in another one."""
+    package = open_package(template)
+    parts = stories(package)
+    book = phrasebook(language)
+    for element in fixed_texts(parts):
+        text = element.text or ""
+        phrase = phrase_of(text)
+        set_text(element, text.replace(phrase, book.say(phrase)))
+    for story in parts:
+        write_back(story)
+    styles = getattr(package.main_document_part, "_styles_part", None)
+    if styles is not None:
+        for mark in styles.element.iter(q("w:lang")):
+            mark.set(q("w:val"), locale_of(language))
+    package.core_properties.language = locale_of(language)
+    stream = io.BytesIO()
+    package.save(stream)
+    return stream.getvalue()
+
+
+def _is_word(text: str) -> bool:
+    return _WORDS.search(_TAGS.sub("", text)) is not None

@@ -52,8 +52,8 @@ def tag_sheet(
     document.add_paragraph(_HOW)
 
     def example(entry: Entry) -> str:
-        known = values.get(f"tk:{entry.path}")
-        return _sample(entry, style) if known is None else str(known)
+        value = values.get(f"tk:{entry.path}")
+        return _sample(entry, style) if value is None else str(value)
 
     groups: dict[str, list[Entry]] = {}
     for entry in vocabulary.values:
@@ -85,8 +85,8 @@ def tag_sheet(
         ]
         _table(document, ("tag of the prototype row", "column", "example"), columns)
     document.add_heading("conditions", level=1)
-    kept = [(f"tk:if.{name}", f"kept when {text}", "") for name, text in vocabulary.conditions.items()]
-    _table(document, ("tag of a control around what it keeps", "when", ""), kept)
+    conditions = [(f"tk:if.{name}", f"kept when {text}", "") for name, text in vocabulary.conditions.items()]
+    _table(document, ("tag of a control around what it keeps", "when", ""), conditions)
     stream = io.BytesIO()
     document.save(stream)
     return stream.getvalue()

@@ -160,14 +160,18 @@ class _Bookmarks:
         return name
 
     def _found(self, paragraph: Element) -> str | None:
-        for one in paragraph.iter(q("w:bookmarkStart")):
-            name = one.get(q("w:name")) or ""
+        for bookmark in paragraph.iter(q("w:bookmarkStart")):
+            name = bookmark.get(q("w:name")) or ""
             if name.startswith("_Toc"):
                 return name
         return None
 
     def _made(self, paragraph: Element) -> str:
-        name = next(one for one in (f"_Toc{number}" for number in self.fresh) if one not in self.names)
+        name = next(
+            candidate
+            for candidate in (f"_Toc{number}" for number in self.fresh)
+            if candidate not in self.names
+        )
         identity = str(next(self.ids))
         start, end = etree.Element(q("w:bookmarkStart")), etree.Element(q("w:bookmarkEnd"))
         start.set(q("w:id"), identity)
@@ -342,7 +346,7 @@ def _right_tab(properties: Element, width: int) -> None:
     stop = etree.SubElement(tabs, q("w:tab"))
     for name, value in (("val", "right"), ("leader", "dot"), ("pos", str(width))):
         stop.set(q(f"w:{name}"), value)
-    before = {q(f"w:{one}") for one in _BEFORE_TABS.split()}
+    before = {q(f"w:{element_name}") for element_name in _BEFORE_TABS.split()}
     properties.insert(sum(1 for child in properties if child.tag in before), tabs)
 
 

@@ -106,10 +106,10 @@ def with_pages(docx: bytes, part: str, pages: Mapping[str, str]) -> bytes:
         for field in contents_fields(root):
             for paragraph in field.paragraphs or ():
                 for code in paragraph.iter(q("w:instrText")):
-                    found = re.match(r"\s*PAGEREF\s+(\S+)", code.text or "")
-                    if found and found[1] in pages:
+                    reference = re.match(r"\s*PAGEREF\s+(\S+)", code.text or "")
+                    if reference and reference[1] in pages:
                         following = (t for t in code.getparent().itersiblings(W_R) if t.find(W_T) is not None)
-                        next(following).find(W_T).text = pages[found[1]]
+                        next(following).find(W_T).text = pages[reference[1]]
 
     return _edited(docx, {part: put})
 
@@ -122,9 +122,9 @@ def with_numbers(docx: bytes, part: str, titles: Mapping[str, str]) -> bytes:
             for paragraph in field.paragraphs or ():
                 bookmark = next(
                     (
-                        found[1]
+                        reference[1]
                         for code in paragraph.iter(q("w:instrText"))
-                        if (found := re.match(r"\s*PAGEREF\s+(\S+)", code.text or ""))
+                        if (reference := re.match(r"\s*PAGEREF\s+(\S+)", code.text or ""))
                     ),
                     "",
                 )
@@ -163,7 +163,7 @@ def poppler(command: list[str]) -> str:
         ``no-poppler``: it is not installed; ``render-timeout``: it does not end
     """
     try:
-        done = subprocess.run(command, capture_output=True, timeout=120, check=False)
+        process = subprocess.run(command, capture_output=True, timeout=120, check=False)
     except FileNotFoundError as error:
         raise RenderError(
             "the PDF cannot be verified",
@@ -182,19 +182,19 @@ def poppler(command: list[str]) -> str:
             next_step="open the PDF; try again with --keep",
             rule="render-timeout",
         ) from error
-    return done.stdout.decode("utf-8", "replace")
+    return process.stdout.decode("utf-8", "replace")
 
 
 def pdf_outline(pdf: Path) -> list[tuple[str, int]]:
     """Return the PDF's own outline: (title, page), in the order of the document."""
-    done = subprocess.run(
+    process = subprocess.run(
         ["pdftohtml", "-xml", "-i", "-stdout", "-f", "1", "-l", "1", str(pdf)],
         capture_output=True,
         timeout=120,
         check=False,
     )
-    found = re.findall(rb'<item page="(\d+)">(.*?)</item>', done.stdout, re.DOTALL)
-    return [(_unescaped(title), int(page)) for page, title in found]
+    items = re.findall(rb'<item page="(\d+)">(.*?)</item>', process.stdout, re.DOTALL)
+    return [(_unescaped(title), int(page)) for page, title in items]
 
 
 def titles_of(
@@ -205,21 +205,21 @@ def titles_of(
     The PDF's title begins with the number that Word gives a heading by itself. A heading that the outline
     has not is left out.
     """
-    found = []
+    titles = []
     at = 0
     for bookmark, text in headings:
-        wanted = squeeze(text)
+        squeezed = squeeze(text)
         for i in range(at, len(outline)):
-            if squeeze(outline[i][0]).endswith(wanted):
-                found.append((bookmark, text, *outline[i]))
+            if squeeze(outline[i][0]).endswith(squeezed):
+                titles.append((bookmark, text, *outline[i]))
                 at = i + 1
                 break
-    return found
+    return titles
 
 
 def printed_pages(text: str, entries: Sequence[ContentsEntry]) -> dict[str, str]:
     """Return the page that each line of the tables of contents shows in the PDF's text, by bookmark."""
-    found: dict[str, str] = {}
+    pages: dict[str, str] = {}
     at = 0
     for entry in entries:
         if not entry.paged:
@@ -227,9 +227,9 @@ def printed_pages(text: str, entries: Sequence[ContentsEntry]) -> dict[str, str]
         words = r"\s*".join(re.escape(word) for word in entry.text.split())
         match = re.compile(words + _LABEL).search(text, at)
         if match:
-            found[entry.bookmark] = match[1]
+            pages[entry.bookmark] = match[1]
             at = match.end()
-    return found
+    return pages
 
 
 def _span(root: Element, begin: Element, separate: Element | None) -> list[Element]:
@@ -285,23 +285,25 @@ def print_copies(filled: Sequence[Filled], office: Office, work: Path) -> list[P
     A document whose headings Word numbers by itself is converted twice: the numbers of its contents are
     those of the first PDF.
     """
-    every = range(len(filled))
-    made = _converted(filled, dict(zip(every, (one.docx for one in filled), strict=True)), office, work)
+    positions = range(len(filled))
+    pdfs = _converted(
+        filled, dict(zip(positions, (report.docx for report in filled), strict=True)), office, work
+    )
     again = [
         i
-        for i, (one, pdf) in enumerate(zip(filled, made, strict=True))
-        if isinstance(pdf, Path) and any(entry.numbered for entry in one.contents.entries)
+        for i, (report, pdf) in enumerate(zip(filled, pdfs, strict=True))
+        if isinstance(pdf, Path) and any(entry.numbered for entry in report.contents.entries)
     ]
-    documents = [one.docx for one in filled]
+    documents = [report.docx for report in filled]
     if again:
         for i in again:
-            documents[i] = _numbered(filled[i], made[i])
+            documents[i] = _numbered(filled[i], pdfs[i])
         second = _converted(filled, {i: documents[i] for i in again}, office, work)
         for i, pdf in zip(again, second, strict=True):
-            made[i] = pdf
+            pdfs[i] = pdf
     return [
-        one if isinstance(one, RenderError) else Printed(docx=_paged(own, data, one), pdf=one)
-        for own, data, one in zip(filled, documents, made, strict=True)
+        report if isinstance(report, RenderError) else Printed(docx=_paged(own, data, report), pdf=report)
+        for own, data, report in zip(filled, documents, pdfs, strict=True)
     ]
 
 
@@ -311,9 +313,9 @@ def _converted(
     """Convert documents by their place in ``filled``: no PDF ever takes the name of another document's."""
     sources = []
     for index, data in documents.items():
-        one = filled[index]
+        report = filled[index]
         source = work / f"{index:04d}.docx"
-        source.write_bytes(for_printing(data, one.main_part, contents=bool(one.contents.entries)))
+        source.write_bytes(for_printing(data, report.main_part, contents=bool(report.contents.entries)))
         sources.append(source)
     return office.convert_each(sources, work) if sources else []
 
@@ -321,9 +323,9 @@ def _converted(
 def _numbered(filled: Filled, pdf: Path | RenderError) -> bytes:
     if isinstance(pdf, RenderError):
         return filled.docx
-    found = titles_of(filled.contents.headings, pdf_outline(pdf))
+    in_outline = titles_of(filled.contents.headings, pdf_outline(pdf))
     numbered = {entry.bookmark for entry in filled.contents.entries if entry.numbered}
-    titles = {bookmark: title for bookmark, _, title, _ in found if bookmark in numbered}
+    titles = {bookmark: title for bookmark, _, title, _ in in_outline if bookmark in numbered}
     return with_numbers(filled.docx, filled.main_part, titles)
 
 

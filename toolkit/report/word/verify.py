@@ -138,13 +138,13 @@ def _in_pieces(value: str, page: str, original: str, sheets: Sequence[str]) -> b
     if len(value) < _UNBROKEN:
         return False
     # One long word, such as a hash in a narrow column: its beginning on a page, its end on the next.
-    for here, there in pairwise(sheets):
+    for sheet, following in pairwise(sheets):
         cut = 8
-        if value[:cut] not in here:
+        if value[:cut] not in sheet:
             continue
-        while cut < len(value) and value[: cut + 1] in here:
+        while cut < len(value) and value[: cut + 1] in sheet:
             cut += 1
-        if value[cut:] in there:
+        if value[cut:] in following:
             return True
     return False
 
@@ -298,7 +298,7 @@ def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
 
 def _pdf_strings(text: str) -> tuple[bytes, bytes]:
     # Alternative texts stand as UTF-16 in hexadecimal in objects that are not packed: in capital letters by
-    # LibreOffice, in small ones where `toolkit.report.word.spoken` wrote them.
+    # LibreOffice, in small ones where `toolkit.report.word.chart` wrote them.
     written = b"<" + (codecs.BOM_UTF16_BE + clean(text).replace("\n", " ").encode("utf-16-be")).hex().encode()
     return written.upper() + b">", written + b">"
 
@@ -342,11 +342,13 @@ def contents_problems(pdf: Path, text: str, filled: Filled) -> list[str]:
     for entry in contents.entries:
         if not entry.paged or not entry.text.isascii():
             continue
-        shown = printed.get(entry.bookmark)
-        if shown is None:
+        printed_page = printed.get(entry.bookmark)
+        if printed_page is None:
             problems.append(f"{entry.text!r} is not in the contents")
-        elif entry.heading and plain and shown != str(pages.get(entry.bookmark, shown)):
-            problems.append(f"{entry.text!r} is on page {pages[entry.bookmark]}, the contents say {shown}")
+        elif entry.heading and plain and printed_page != str(pages.get(entry.bookmark, printed_page)):
+            problems.append(
+                f"{entry.text!r} is on page {pages[entry.bookmark]}, the contents say {printed_page}"
+            )
     return problems
 
 

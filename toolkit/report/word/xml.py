@@ -71,20 +71,20 @@ STORIES = ("header", "footer", "footnotes", "endnotes")
 def stories(package: Any) -> list[Story]:
     """Return the parts with text of an opened package, the body first."""
     main = package.main_document_part
-    found = [Story(name=_name(main), root=main.element, part=main, blob=False)]
-    seen = {_name(main)}
+    collected = [Story(name=_name(main), root=main.element, part=main, blob=False)]
+    names = {_name(main)}
     for rel in sorted(main.rels.values(), key=lambda rel: rel.rId):
         kind = rel.reltype.rpartition("/")[2]
-        if rel.is_external or kind not in STORIES or _name(rel.target_part) in seen:
+        if rel.is_external or kind not in STORIES or _name(rel.target_part) in names:
             continue
         part = rel.target_part
-        seen.add(_name(part))
+        names.add(_name(part))
         if hasattr(part, "element"):
-            found.append(Story(name=_name(part), root=part.element, part=part, blob=False))
+            collected.append(Story(name=_name(part), root=part.element, part=part, blob=False))
         else:
             root = etree.fromstring(part.blob, parser())
-            found.append(Story(name=_name(part), root=root, part=part, blob=True))
-    return found
+            collected.append(Story(name=_name(part), root=root, part=part, blob=True))
+    return collected
 
 
 def write_back(story: Story) -> None:

@@ -50,14 +50,7 @@ class SealKey:
         return subject(self.certificate)
 
 
-def open_key(
-    path: Path,
-    *,
-    ask: Ask,
-    chain: Path | None = None,
-    home: Path | None = None,
-    now: dt.datetime | None = None,
-) -> SealKey:
+def open_key(path: Path, *, ask: Ask, chain: Path | None = None, home: Path | None = None) -> SealKey:
     """Read a key file and the certificate that belongs to it.
 
     Parameters
@@ -111,7 +104,7 @@ def open_key(
             "the key is of a kind that cannot seal both PDF and XML", path, type(private).__name__,
             "an RSA key, or one of an elliptic curve", "ask for a certificate of such a key", "seal-key",
         )  # fmt: skip
-    _check(certificate, path, now or dt.datetime.now(dt.UTC))
+    _check(certificate, path, dt.datetime.now(dt.UTC))
     others = tuple(c for c in certificates if c != certificate)
     return SealKey(private=private, certificate=certificate, others=others)
 

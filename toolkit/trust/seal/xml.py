@@ -7,11 +7,16 @@ signed properties. A document that hides the signed content elsewhere (signature
 Canonical XML drops comments, quotes and spaces inside tags, so that their bytes are nobody's. A document
 that the toolkit seals therefore says among its signed properties that its file is its canonical form: every
 byte of such a file counts.
+
+The ledger's proof stands in a digital calibration certificate as a comment, put in before the certificate is
+sealed. What the entry holds is the hash of the certificate's content: its canonical form (C14N 1.0, without
+comments) before the proof and the seal were put into it.
 """
 
 from __future__ import annotations
 
 import datetime as dt
+import hashlib
 import re
 from base64 import b64decode, b64encode
 from typing import Any
@@ -289,3 +294,52 @@ def _algorithm(key: SealKey) -> str:
     from cryptography.hazmat.primitives.asymmetric import ec
 
     return "ecdsa-sha256" if isinstance(key.private, ec.EllipticCurvePrivateKey) else "rsa-sha256"
+
+
+_DCC = "{https://ptb.de/dcc}"
+_SEAL = "{http://www.w3.org/2000/09/xmldsig#}Signature"
+ELEMENT = "toolkit-proof"
+
+
+def with_proof(data: bytes, proof: str) -> bytes:
+    """Return a certificate whose comment holds a proof."""
+    root = _parsed_proof(data)
+    comment = etree.Element(f"{_DCC}comment")
+    etree.SubElement(comment, ELEMENT).text = proof
+    root.insert(list(root).index(root.find(f"{_DCC}measurementResults")) + 1, comment)
+    xml: bytes = etree.tostring(root.getroottree(), xml_declaration=True, encoding="UTF-8")
+    return xml + b"\n"
+
+
+def proof_in(data: bytes) -> str | None:
+    """Return the proof that a certificate holds; None where there is none."""
+    text: str | None = _parsed_proof(data).findtext(f"{_DCC}comment/{ELEMENT}")
+    return text
+
+
+def content_hash(data: bytes) -> str | None:
+    """Return the SHA-256 of a certificate's content, without its proof and its seal.
+
+    None where the document is another than its content with the proof put into it: what is left out of the
+    hash is what `with_proof` writes, and nothing beside it.
+    """
+    root = _parsed_proof(data)
+    for seal in root.findall(_SEAL):
+        root.remove(seal)
+    whole = _canonical(root)
+    own = [comment for comment in root.findall(f"{_DCC}comment") if comment.find(ELEMENT) is not None]
+    for comment in own:
+        root.remove(comment)
+    content = _canonical(root)
+    if own and whole != _canonical(_parsed_proof(with_proof(content, own[0].findtext(ELEMENT) or ""))):
+        return None
+    return hashlib.sha256(content).hexdigest()
+
+
+def _canonical(root: Any) -> bytes:
+    return bytes(etree.tostring(root, method="c14n", with_comments=False))
+
+
+def _parsed_proof(data: bytes) -> Any:
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
+    return etree.fromstring(data, parser)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.law.among_runs import tells_runs_apart_alone
+from toolkit.diagnosis.law.trial import tells_runs_apart_alone
 
 TWO_NUMBERS = SimpleNamespace(cost=2, looked=1)
 

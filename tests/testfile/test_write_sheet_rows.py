@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolkit.recording.sheet_rows import filled, sheet_row
+from toolkit.testfile.write import filled, sheet_row
 
 TEXTS = st.text(
     st.characters(min_codepoint=32, max_codepoint=0xFFFD, exclude_categories=("Cs",)), max_size=20

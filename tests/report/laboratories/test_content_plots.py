@@ -7,7 +7,7 @@ import pytest
 from tests.report.laboratories.laboratories_factory import CONICITY, comparison
 from toolkit.comparison.laboratories import compare_laboratories
 from toolkit.report.figures import draw
-from toolkit.report.laboratories.plots import laboratory_plots
+from toolkit.report.laboratories.content import laboratory_plots
 
 
 def test_means_stand_in_order_with_their_U_about_the_assigned_value() -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom
 
 from tests.coverage.sound_rows import names_a_row, plane
-from toolkit.calibration.fit.forward_search import RISK, contradicting
+from toolkit.calibration.fit.robust import RISK, contradicting
 
 
 def test_a_masked_pair_at_the_end_of_a_line() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from toolkit.diagnosis.fit.folds import UnseenRun, _scores, scattered_scores
 from toolkit.diagnosis.fit.noise import Autoregression, autocovariance, layout, log_likelihood
-from toolkit.diagnosis.fit.run_scatter import UnseenRun, _scores, scattered_scores
 
 ROWS = 40
 
