@@ -8,8 +8,8 @@ A tire follows a small change of its slip angle over a distance (Pacejka, Tire a
 Whatever delays the channel of FY by tau against that of the slip angle adds to the length: at one speed
 nothing parts ``sigma + V tau``, the *apparent length* that a sweep gives. It may be negative, where the slip
 angle is the later channel. Turn slip while the wheel is steered goes with the distance as the relaxation
-does, and is part of it: of a stretched string of relaxation length sigma and half contact length a, the length is
-sigma + a. What is meant is the mean distance of the answer, whose form may be another one than the
+does, and is part of it: of a stretched string of relaxation length sigma and half contact length a, the
+length is sigma + a. What is meant is the mean distance of the answer, whose form may be another one than the
 equation's: a term of second order in the rate, which has no such distance, is fitted beside it, and what the
 fit says without it, and with a length that falls with the slope of FY (a carcass as a spring, 7.2), is in the
 uncertainty.
@@ -22,6 +22,7 @@ at which the length acts, by the residuals' own spectrum, each ordinate counted 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_STARTS_M = (0.0, 0.1, 0.3, 0.8)
+STARTS_M = (0.0, 0.1, 0.3, 0.8)
 _LONGEST_M = 5.0
 _TURNS = 40
 _FORMS = 4  # passes over the curve's slope, after which the length at zero slip changes no more
@@ -116,32 +117,48 @@ def fit_sweep(sweep: Sweep, sweeping: Sweeping | None) -> SweepFit | None:
     """
     if float(np.ptp(sweep.SA)) < LEAST_RAD:
         return None
-    constant, falling, plain = (
-        _nearest(sweep, falling=falls, sharp=sharp)
-        for falls, sharp in ((False, True), (True, True), (False, False))
-    )
-    if constant is None or falling is None or plain is None:
+    fits = forms_of(sweep)
+    if fits is None:
         return None
-    u, dof = constant.noise
+    lag, form = fits
+    u, dof = lag.noise
     if not (u <= _UNSURE_M and dof >= 1):
         return None
     delay = None if sweeping is None else sweeping.delay
-    # A rectangle as wide as the other form is away, on either side (GUM 4.3.7).
-    others = [(form.length_m - constant.length_m) / math.sqrt(3.0) for form in (falling, plain)]
     return SweepFit(
         file=sweep.file, file_sha256=sweep.file_sha256, rotation=sweep.rotation,
         first_row=sweep.first_row, last_row=sweep.last_row,
         load_N=float(np.mean(sweep.FZ)), speed_m_s=float(np.mean(sweep.V)),
         steer_rate_rad_s=sweep.steer_rate_rad_s, rows=len(sweep.t),
-        length_m=constant.length_m, u_m=u, dof=dof, form_m=math.hypot(*others),
-        stiffness_N_rad=-constant.slope, offset_N=constant.level, speed_u=sweep.speed_u,
+        length_m=lag.length_m, u_m=u, dof=dof, form_m=form,
+        stiffness_N_rad=-lag.slope, offset_N=lag.level, speed_u=sweep.speed_u,
         delay_s=None if delay is None else delay.value_s, delay_u_s=None if delay is None else delay.u_s,
     )  # fmt: skip
 
 
-def _nearest(sweep: Sweep, *, falling: bool, sharp: bool) -> Lag | None:
+def forms_of(sweep: Sweep, starts_m: Sequence[float] = STARTS_M) -> tuple[Lag, float] | None:
+    """Return the fit of a sweep and the length's standard uncertainty by its form [m]; None without one.
+
+    Other forms of the answer say another length: a rectangle as wide as each is away, on either side (GUM
+    4.3.7). Noise alone parts the fit from the one of fewer terms by the difference of their variances
+    (Hausman, Econometrica 46 (1978) 1251), which is in the length's own uncertainty already.
+    """
+    fits = [
+        _nearest(sweep, starts_m, falling=falling, sharp=sharp)
+        for falling, sharp in ((False, True), (True, True), (False, False))
+    ]
+    lag, falls, plain = fits
+    if lag is None or falls is None or plain is None:
+        return None
+    by_noise = max(lag.noise[0] ** 2 - plain.noise[0] ** 2, 0.0)
+    away = (falls.length_m - lag.length_m) ** 2
+    away += max((plain.length_m - lag.length_m) ** 2 - by_noise, 0.0)
+    return lag, math.sqrt(away / 3)
+
+
+def _nearest(sweep: Sweep, starts_m: Sequence[float], *, falling: bool, sharp: bool) -> Lag | None:
     """Return the fit of the smallest residuals from several starts; None where none ends inside."""
-    fits = (fit_lag(sweep, falling=falling, sharp=sharp, start_m=start) for start in _STARTS_M)
+    fits = (fit_lag(sweep, falling=falling, sharp=sharp, start_m=start) for start in starts_m)
     inside = [fit for fit in fits if fit is not None]
     return min(inside, key=lambda fit: float(fit.residual @ fit.residual), default=None)
 

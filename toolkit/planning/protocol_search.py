@@ -158,7 +158,8 @@ class Question:
 class Judged:
     """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth.
 
-    ``openness`` of the curves between its slip angles, over what is allowed (`screen`).
+    ``openness`` of the curves between its slip angles, over what is allowed (`screen`); ``demanded``
+    is whether anything was asked of it.
     """
 
     design: Design
@@ -166,11 +167,12 @@ class Judged:
     minutes: float
     excess: float = 0.0
     openness: float = 0.0
+    demanded: bool = True
 
     @property
     def worst(self) -> float:
         """The largest of U over what was demanded; at most 1 where all demands are met."""
-        return max((reach.ratio for reach in self.reaches), default=math.inf)
+        return max((reach.ratio for reach in self.reaches), default=math.inf if self.demanded else 0.0)
 
     @property
     def feasible(self) -> bool:
@@ -220,6 +222,7 @@ class ProtocolSearch:
             design=design, reaches=self.question.reaches(design), minutes=self.tread.minutes(design),
             excess=self.exposure.excess(points),
             openness=openness(self._screens, points) if self._screens else 0.0,
+            demanded=bool(self.question.demands),
         )  # fmt: skip
 
     def best(self, size: int) -> Judged:

@@ -11,6 +11,7 @@ from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import DeliveredDocument, Timed
 from toolkit.lab.home import PLAN
 from toolkit.planning.printed_units import title_of
+from toolkit.planning.sweep_plan import sweep_lines
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step
 
@@ -134,6 +135,10 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
     loads = f"{', '.join(f'{size:.0f}' for size in sizes)} {force}"
     record = "" if plan.calibration is None else f", {plan.calibration}"
 
+    recordings = 0 if plan.sweeps is None else len(plan.sweeps.recordings)
+    swept = f" and {recordings} sweeps" if recordings else ""
+    minutes = design.minutes + (0.0 if plan.sweeps is None else plan.sweeps.minutes)
+
     def wait(pause: float) -> str:
         return f"pause of {pause:.0f} s, " if pause > max(own.pauses_s) else ""
 
@@ -141,8 +146,8 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
         kind="test",
         subject=plan.machine,
         basis=f"{plan.like}{record}",
-        size=f"{design.rows} rows in {design.minutes:.1f} minutes",
-        summary=f"{design.rows} rows in place of {own.rows} of the machine's protocol, {design.minutes:.1f} "
+        size=f"{design.rows} rows{swept} in {minutes:.1f} minutes",
+        summary=f"{design.rows} rows{swept} in place of {own.rows} of the machine's protocol, {minutes:.1f} "
         f"minutes in place of {own.minutes:.1f}.",
         issued=issued,
         uncertainties=tuple(
@@ -152,9 +157,24 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
             Step(run=rotation, action=f"{wait(pause)}slip angle {angle:g} deg", applied=loads)
             for rotation in design.rotations
             for angle, pause in zip(design.slip_angles_deg, design.pauses_s, strict=True)
-        ),
+        )
+        + _sweep_steps(plan, units),
         assumptions=plan.assumptions,
         gives_up=plan.gives_up,
+    )  # fmt: skip
+
+
+def _sweep_steps(plan: ProtocolPlan, units: PrintedUnits) -> tuple[Step, ...]:
+    """Return a step for each recording in time."""
+    if plan.sweeps is None:
+        return ()
+    return tuple(
+        Step(
+            run=sweep.rotation, action=f"sweep in time: {line}",
+            applied=", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in sweep.loads_N) + " "
+            + _dotted(units.force),
+        )
+        for sweep, line in zip(plan.sweeps.recordings, sweep_lines(plan.sweeps), strict=True)
     )  # fmt: skip
 
 

@@ -347,6 +347,7 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
             next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
         )  # fmt: skip
     angles = ", ".join(f"{angle:g}" for angle in sorted(plan.plan.slip_angles_deg))
+    swept = "" if plan.sweeps is None else f" and {len(plan.sweeps.recordings)} sweeps"
     return ConfigError(
         f"no test{limit} reaches what is demanded", where="--u",
         got="; ".join(
@@ -356,7 +357,7 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
         expected=f"at least: {'; '.join(nearest)}",
         next_step=f"demand what is feasible{', or allow more time' * (limit != '')}; the nearest plan has "
         f"slip angles {angles} deg at {len(plan.plan.loads_N)} loads: {plan.plan.rows} rows in "
-        f"{plan.plan.minutes:.1f} min",
+        f"{plan.plan.minutes:.1f} min{swept}",
         rule="plan-infeasible",
     )  # fmt: skip
 
@@ -380,6 +381,19 @@ def _files(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> di
     }
 
 
+def _sweeps(plan: ProtocolPlan, units: PrintedUnits) -> list[str]:
+    from toolkit.planning.sweep_plan import sweep_lines
+
+    if plan.sweeps is None:
+        return []
+    loads = ", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in plan.sweeps.recordings[0].loads_N)
+    return [
+        f"and {len(plan.sweeps.recordings)} recordings in time in {plan.sweeps.minutes:.1f} min, each at "
+        f"{loads} {units.force}:",
+        *(f"  sweep        {line}" for line in sweep_lines(plan.sweeps)),
+    ]
+
+
 def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) -> str:
     """Return a plan for people: what to measure, what it reaches, what it rests on and gives up."""
     from toolkit.estimate import plus_minus, round_uncertainty
@@ -401,6 +415,9 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
             U(value.same_time_U),
         ]  # fmt: skip
 
+    swept = plan.sweeps
+    slides = design.sliding_kJ + (0.0 if swept is None else swept.sliding_kJ)
+    warms = max(design.rise_K, 0.0 if swept is None else swept.rise_K)
     rows = [row(value) for value in plan.values]
     head = [
         "",
@@ -422,6 +439,7 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
         f"  slip angles  {', '.join(f'{angle:g}' for angle in design.slip_angles_deg)} deg, in this order",
         f"  loads        {', '.join(f'{load:.0f}' for load in loads)} {units.force}",
         *pauses,
+        *_sweeps(plan, units),
         f"  like         {plan.like}"
         + (f", record {plan.calibration}" if plan.calibration is not None else ""),
         *(f"  tire {place}       {name}" for place, name in enumerate(plan.tires, start=1) if several),
@@ -429,10 +447,13 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
         table(head, rows, align="<" + ">" * (len(head) - 1)),
         "",
         f"protocol of {plan.machine}: {own.rows} rows in {own.minutes:.1f} min",
-        f"tread: {design.sliding_kJ:.0f} kJ slide away, by the protocol {own.sliding_kJ:.0f} kJ; a recording "
-        f"warms it by {design.rise_K:.1f} K at most",
+        f"tread: {slides:.0f} kJ slide away, by the protocol {own.sliding_kJ:.0f} kJ; a recording "
+        f"warms it by {warms:.1f} K at most",
     ]
-    if plan.alike is not None:
+    settled = any(value.protocol_U is not None for value in plan.values)
+    if not settled:
+        lines.append("it gives none of what is demanded")
+    elif plan.alike is not None:
         lines.append(
             f"its uncertainties, within 5 %, in {plan.alike.rows} rows and {plan.alike.minutes:.1f} min "
             f"({100 * plan.alike.rows / own.rows:.0f} % of the rows)"
