@@ -30,6 +30,7 @@ from tests.campaigns.promised_tests import drawn_tire
 from tests.coverage.rows import exact_interval
 from toolkit.characteristics.sweep_fit import SweepFit, fit_sweep
 from toolkit.characteristics.sweep_length import relaxation_length
+from toolkit.declared import answer as declared_answer
 from toolkit.lab.plans.protocol_plan import ProtocolOrder, plan_test
 from toolkit.machine import load_machine
 from toolkit.reduction.sweep import Sweep
@@ -153,7 +154,7 @@ def outcomes(number: int, times: int, seed: int, noise: float) -> Iterator[Outco
             like=(drawn_tire(Path(place), rng),), demands=(f"relaxation_length={U:g} mm",),
             loads=(f"{load:.1f} N",),
         )  # fmt: skip
-        plan, _ = plan_test(order)
+        plan = declared_answer(plan_test(order)[0])
     (value,) = plan["values"]
     sys.stderr.write(f"{number}: {U:g} mm at {load:.0f} N: {plan['sweeps']['recordings']}\n")
     for time in range(times):

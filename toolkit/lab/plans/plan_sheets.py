@@ -5,10 +5,11 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NotRequired
+from typing import TYPE_CHECKING, Annotated
 
+from toolkit.declared import Entry
 from toolkit.estimate import round_uncertainty
-from toolkit.lab.answers import DeliveredDocument, Timed
+from toolkit.lab.answers import DeliveredDocument, Timing
 from toolkit.lab.home import PLAN
 from toolkit.planning.printed_units import title_of
 from toolkit.planning.sweep_plan import sweep_lines
@@ -28,13 +29,20 @@ if TYPE_CHECKING:
     from toolkit.report.word.package import Template
 
 
-class _Sheet(Timed):
-    document: NotRequired[DeliveredDocument]
+SheetKey = Annotated[
+    DeliveredDocument | None, Entry("the plan's sheet, where a template was named", sparse=True)
+]
+TimingKey = Annotated[Timing, Entry("of the command")]
+
+
+def untimed() -> Timing:
+    """Return the time of an answer that is still on its way."""
+    return {"seconds": 0.0}
 
 
 DOCUMENT = "plan"
 """The name of the sheet's two files."""
-_WHERE = ("out", "files")  # of an answer: what was written, not what was planned
+_WHERE = ("out", "files", "timing")  # of an answer: what was written and how fast, not what was planned
 
 
 def write_plan(
@@ -42,33 +50,33 @@ def write_plan(
     out: Path,
     sheet: PlanSheet,
     template: Template | None,
-    answer: Mapping[str, Any],
-) -> dict[str, Any]:
+    planned: object,
+) -> DeliveredDocument | None:
     """Write a plan's files, its answer and, by a template, its sheet, all or none.
 
-    Returns what the answer says of the sheet. ``answer`` is written as ``plan.json``, with the kind of plan.
+    Returns what the answer says of the sheet. ``planned``, a declared answer, is written as ``plan.json``,
+    with the kind of plan.
     """
-    from toolkit.declared import json_value
+    from toolkit.declared import answer
     from toolkit.lab.answers import delivered_keys
     from toolkit.publication import publication
     from toolkit.report.deliver import deliver
     from toolkit.report.plan.content import build_plan_content
     from toolkit.report.style import read_style, style_file
 
-    stated = {key: json_value(value) for key, value in answer.items() if key not in _WHERE}
+    stated = {key: value for key, value in answer(planned).items() if key not in _WHERE}
     kept = json.dumps(stated | {"kind": sheet.kind}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
     with publication(out) as stage:
         for name, data in {**files, PLAN: kept}.items():
             (stage / name).write_bytes(data if isinstance(data, bytes) else data.encode())
         if template is None:
-            return {}
+            return None
         content = build_plan_content(sheet, read_style(style_file(template.path)))
-        return {"document": delivered_keys(deliver(template, content, out, name=DOCUMENT, stage=stage))}
+        return delivered_keys(deliver(template, content, out, name=DOCUMENT, stage=stage))
 
 
-def sheet_text(payload: Mapping[str, Any]) -> str:
+def sheet_text(document: DeliveredDocument | None) -> str:
     """Return what people are told of a delivered sheet; nothing where there is none."""
-    document = payload.get("document")
     if document is None:
         return ""
     lines = ["", f"written: {document['docx']}", f"written: {document['pdf']}"]

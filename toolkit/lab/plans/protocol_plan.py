@@ -7,15 +7,16 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from toolkit.declared.answers import merged
+from toolkit.declared import Entry
+from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.findings import FindingEntry
-from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.protocol_plan import ProtocolPlan
 
 if TYPE_CHECKING:
@@ -28,13 +29,15 @@ if TYPE_CHECKING:
     from toolkit.simulation.plan import Plan
 
 
-class _ProtocolFiles(_Sheet):
-    out: Path | None
-    files: Annotated[Mapping[str, Path], "by what they are for"]
-    findings: list[FindingEntry]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanTestAnswer(ProtocolPlan):
+    """The plan of a test, and what was written of it."""
 
-
-PlanTestAnswer = merged(ProtocolPlan, _ProtocolFiles)
+    out: Annotated[Path | None, Entry("folder of the plan's files; null where none was named")]
+    files: Annotated[Mapping[str, str], Entry("by what they are for")]
+    findings: Annotated[tuple[FindingEntry, ...], Entry("what is to be known of it")] = ()
+    document: SheetKey = None
+    timing: TimingKey = field(default_factory=untimed)
 
 
 PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
@@ -71,8 +74,8 @@ def plan_test(
     *,
     template: Template | None = None,
     tell: Callable[[str], None] = lambda _text: None,
-) -> tuple[dict[str, Any], str]:
-    """Return the JSON answer of a plan and its text; write the files of a plan into ``out``, its
+) -> tuple[PlanTestAnswer, str]:
+    """Return the answer of a plan and its text; write the files of a plan into ``out``, its
     sheet by a template too.
 
     Raises
@@ -83,7 +86,6 @@ def plan_test(
     """
     from datetime import date
 
-    from toolkit.declared import answer
     from toolkit.lab.plans.plan_sheets import protocol_sheet, sheet_text, write_plan
     from toolkit.machine import load_machine
     from toolkit.planning.demands import parse_demand
@@ -111,13 +113,14 @@ def plan_test(
     )  # fmt: skip
     if not plan.feasible:
         raise _beyond(plan, order) or _infeasible(plan, order.minutes)
-    payload: dict[str, Any] = answer(plan) | {"out": out, "files": {}, "findings": []}
+    answer = extended(PlanTestAnswer, plan, out=out, files={})
     units = units_of(own.protocol)
     if out is not None:
-        payload["files"] = {"protocol": PROTOCOL, "simulation": SIMULATION}
+        answer = dataclasses.replace(answer, files={"protocol": PROTOCOL, "simulation": SIMULATION})
         sheet = protocol_sheet(plan, date.today(), units)  # noqa: DTZ011
-        payload |= write_plan(_files(plan, own, tire, out), out, sheet, template, payload)
-    return payload, plan_text(plan, payload["files"], units) + sheet_text(payload)
+        written = write_plan(_files(plan, own, tire, out), out, sheet, template, answer)
+        answer = dataclasses.replace(answer, document=written)
+    return answer, plan_text(plan, answer.files, units) + sheet_text(answer.document)
 
 
 def _refuse_doubled(labels: Sequence[str], where: str, what: str) -> None:
@@ -394,7 +397,7 @@ def _sweeps(plan: ProtocolPlan, units: PrintedUnits) -> list[str]:
     ]
 
 
-def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) -> str:
+def plan_text(plan: ProtocolPlan, files: Mapping[str, str], units: PrintedUnits) -> str:
     """Return a plan for people: what to measure, what it reaches, what it rests on and gives up."""
     from toolkit.estimate import plus_minus, round_uncertainty
     from toolkit.lab.answers import table
