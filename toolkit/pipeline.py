@@ -98,12 +98,8 @@ def process(
     reduced = reduce_test(
         info=folder.info, machine=machine, record=record, recordings=settled, tare=tare, use=use
     )
-    # A file with every row has the moves between its rests: sweeps that nobody has to name.
-    in_time = named if machine.protocol.acquisition == "continuous" else [
-        entry for entry in named if entry[1].path in speeds
-    ]  # fmt: skip
     sweeps, findings = sweeps_of(
-        [(*entry, speeds.get(entry[1].path)) for entry in in_time],
+        [(*entry, speeds[entry[1].path]) for entry in named if entry[1].path in speeds],
         machine=machine, record=record, info=folder.info, tare=tare,
     )  # fmt: skip
     reduced = dataclasses.replace(reduced, findings=(*reduced.findings, *findings))

@@ -110,3 +110,15 @@ def test_a_file_that_is_not_there_and_a_test_of_sweeps_alone_are_refused(tmp_pat
         (test / f"FM_run_{number}.xlsx").unlink()
     with pytest.raises(ToolkitError, match="every recording of the test is a sweep"):
         resolved(test)
+
+
+def test_moves_that_roll_too_little_near_zero_say_nothing(tmp_path: Path) -> None:
+    # From one side to the other at 4 deg/s and 4 km/h: 3 deg take 0.75 s, in which 0.8 m are rolled.
+    plan = (PLAN + SWEEP.format(speed=4, rate=4)).replace("[1.4, -1.4, 1.4, -1.4, 0]", "[6, -6, 6, -6, 6]")
+    settled = "".join(f'[[run]]\nslip_angles = {{ value = [{angle}], unit = "deg" }}\n' for angle in STEPS)
+    (tmp_path / "plan.toml").write_text(plan + settled, encoding="utf-8")
+    write_test(simulate(read_plan(tmp_path / "plan.toml")), tmp_path / "test")
+    result = resolved(tmp_path / "test").result
+    (finding,) = (finding for finding in result.findings if finding.rule == "sweep-unused")
+    assert "3 m are rolled" in finding.message
+    assert result.characteristics.sweeps == ()

@@ -48,7 +48,7 @@ _LEAST_SLOPE = 0.05  # of that at zero slip: beyond the peak the slope has no se
 _STEP_M = 1e-3
 _SURE_M = 1e-7
 _ORDINATES = 12  # of the spectrum on either side of one
-_UNSURE_M = 0.5  # a standard uncertainty beyond it says that the steering shows nothing
+_UNSURE_M = 0.25  # a standard uncertainty beyond it says that the steering shows nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +122,7 @@ def fit_sweep(sweep: Sweep, sweeping: Sweeping | None) -> SweepFit | None:
         return None
     lag, form = fits
     u, dof = lag.noise
-    if not (u <= _UNSURE_M and dof >= 1):
+    if not (math.hypot(u, form) <= _UNSURE_M and dof >= 1):
         return None
     delay = None if sweeping is None else sweeping.delay
     return SweepFit(

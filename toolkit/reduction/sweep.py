@@ -1,7 +1,8 @@
 """Sweeps: recordings in which the slip angle is steered in time; their rows near zero slip, at one load.
 
 A sweep gives no condition, because nothing of it has settled. ``[sweeps]`` of ``test.toml`` names its file
-with the speed of the road; of a protocol whose files hold every row the moves between rests are sweeps too.
+with the speed of the road. The moves between the rests of a settled recording are none: within 1.5 deg of
+zero a tire rolls too little in them to tell its length from what it brings along.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 SMALL_RAD = float(np.radians(1.5))
 """Slip angles beyond it are not near zero: the curve is a cubic within, and the length hardly falls."""
 _FEWEST = 20  # rows of a stretch
+_ROLLED_M = 3.0  # within a stretch: a tire of 0.7 m has then forgotten nearly all of what was before
 _TURNED_RAD = float(np.radians(0.2))  # within a stretch; what rests for long has nothing to say
 LEAST_RAD = float(np.radians(0.5))
 """Steering through less shows no length."""
@@ -83,42 +85,44 @@ class Sweep:
 
 
 def sweeps_of(
-    recordings: Sequence[tuple[str, Recording, Rotation, float | None]],
+    recordings: Sequence[tuple[str, Recording, Rotation, float]],
     *,
     machine: Machine,
     record: CalibrationRecord,
     info: TestInfo,
     tare: Tare | None,
 ) -> tuple[tuple[Sweep, ...], tuple[Finding, ...]]:
-    """Return the sweeps of recordings, and a finding for each declared one that shows none.
+    """Return the sweeps of recordings, and a finding for each recording that shows none.
 
     Parameters
     ----------
-    recordings : path inside the test, recording, direction, and the declared speed [m/s]; None of one that
-        is no declared sweep
+    recordings : path inside the test, recording, direction, and the declared speed [m/s]
     tare : of the cells; a constant does not move what a sweep says
     """
     sweeps: list[Sweep] = []
     findings: list[Finding] = []
     offsets = None if tare is None or tare.source == "none" else dict(tare.values)
     for name, recording, rotation, speed in recordings:
-        declared = speed is not None
         t = _times(recording, machine)
         if t is None or not (np.diff(t) > 0).all():
-            if declared:
-                what = "no time" if t is None else "times that do not rise"
-                findings.append(_unused(name, f"it has {what}: name a column 't [s]', or the machine's rate"))
+            what = "no time" if t is None else "times that do not rise"
+            findings.append(_unused(name, f"it has {what}: name a column 't [s]', or the machine's rate"))
             continue
         loaded = with_load(recording, machine=machine, record=record, tare=offsets)
         signals = _signals(loaded, machine, record, rotation, info, offsets)
+        signals["V"], speed_u = _speed(recording, machine, speed)
         mine = [
             sweep
-            for rows, nominal in _at_loads(signals["FZ"], machine)
-            if (sweep := _sweep(name, loaded, rotation, t, signals, rows, nominal, machine, info, speed))
+            for at_load, nominal in _at_loads(signals["FZ"], machine)
+            if (sweep := _sweep(name, loaded, rotation, t, signals, at_load, nominal, speed_u)) is not None
         ]
-        if declared and not mine:
+        if not mine:
             findings.append(
-                _unused(name, "at no load is the slip angle steered by half a degree on either side of zero")
+                _unused(
+                    name,
+                    "at no load is the slip angle steered by a quarter of a degree to either side of "
+                    f"zero, while {_ROLLED_M:g} m are rolled within 1.5 deg",
+                )
             )
         sweeps += mine
     return tuple(sweeps), tuple(findings)
@@ -171,46 +175,43 @@ def _sweep(
     signals: dict[str, Array],
     at_load: NDArray[np.bool_],
     nominal: float,
-    machine: Machine,
-    info: TestInfo,
-    speed: float | None,
+    speed_u: float,
 ) -> Sweep | None:
     """Return what a recording shows at a load; None where the steering does not."""
-    SA = signals["SA"]
+    SA, V = signals["SA"], signals["V"]
     chosen = np.flatnonzero(at_load & (np.abs(SA) <= SMALL_RAD))
-    if not len(chosen):
-        return None
-    pieces = np.split(chosen, np.flatnonzero(np.diff(chosen) > 1) + 1)
-    pieces = [p for p in pieces if len(p) >= _FEWEST and float(np.ptp(SA[p])) >= _TURNED_RAD]
+    pieces = [
+        piece
+        for piece in np.split(chosen, np.flatnonzero(np.diff(chosen) > 1) + 1)
+        if len(piece) >= _FEWEST
+        and float(np.ptp(SA[piece])) >= _TURNED_RAD
+        and float(t[piece[-1]] - t[piece[0]]) * float(np.mean(V[piece])) >= _ROLLED_M
+    ]
     if not pieces:
         return None
     rows = np.concatenate(pieces)
     if not (SA[rows].max() >= LEAST_RAD / 2 and SA[rows].min() <= -LEAST_RAD / 2):
         return None
     ends = np.cumsum([len(piece) for piece in pieces])
-    V, speed_u = _speed(recording, rows, machine, info, speed)
     return Sweep(
         file=name, file_sha256=recording.sha256, rotation=rotation,
         first_row=int(rows[0]) + 1, last_row=int(rows[-1]) + 1,
-        t=t[rows], SA=SA[rows], FY=signals["FY"][rows], FZ=signals["FZ"][rows], V=V,
+        t=t[rows], SA=SA[rows], FY=signals["FY"][rows], FZ=signals["FZ"][rows], V=V[rows],
         stretches=tuple(slice(int(end) - len(p), int(end)) for p, end in zip(pieces, ends, strict=True)),
         explained=_explained(recording, rows, signals, nominal), speed_u=speed_u,
     )  # fmt: skip
 
 
-def _speed(
-    recording: Recording, rows: NDArray[np.intp], machine: Machine, info: TestInfo, stated: float | None
-) -> tuple[Array, float]:
+def _speed(recording: Recording, machine: Machine, stated: float) -> tuple[Array, float]:
     """Return the speed at each row [m/s] and its relative standard uncertainty: recorded, else stated."""
-    known = machine.sweeping.speed_u if machine.sweeping is not None else 0.0
+    drum = machine.drum
+    # Without a statement of its own a speed lies anywhere within the tolerance (GUM 4.3.7).
+    known = drum.speed_tolerance_m_s / drum.speed_m_s / np.sqrt(3.0)
+    if machine.sweeping is not None:
+        known = machine.sweeping.speed_u
     if recording.has("V"):
-        return np.abs(recording["V"].si[rows]), known
-    drum, protocol = machine.drum, machine.protocol
-    usual = info.speed_m_s or protocol.speed_m_s or drum.speed_m_s
-    if machine.sweeping is None and stated is None:
-        # A speed that nobody recorded lies anywhere within the tolerance (GUM 4.3.7).
-        known = drum.speed_tolerance_m_s / drum.speed_m_s / np.sqrt(3.0)
-    return np.full(len(rows), stated or usual), float(known)
+        return np.abs(recording["V"].si), float(known)
+    return np.full(recording.rows, stated), float(known)
 
 
 def _explained(
