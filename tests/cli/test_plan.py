@@ -315,6 +315,7 @@ def test_the_sheet_has_a_step_for_each_sweep(run, in_time, tmp_path):
         (("--u", "relaxation_length"), "plan-demand", "no size"),
         (("--u", "relaxation_length=0.1 mm"), "plan-infeasible", "and 2 sweeps"),
         ((*SWEPT, "--minutes", "1"), "plan-infeasible", "--minutes"),
+        ((*SWEPT, "--minutes", "3"), "plan-infeasible", "got:      3 min"),
         ((*SWEPT, "--sliding", "0.01"), "plan-infeasible", "alone go beyond"),
     ],
 )

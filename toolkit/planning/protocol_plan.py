@@ -139,7 +139,9 @@ def plan_protocol(
     # The protocol itself has no limits, and so no pauses but its own.
     free = dataclasses.replace(tread, energy_J=math.inf, rise_K=math.inf)
     of_protocol = Judged(design=protocol, reaches=question.reaches(protocol), minutes=free.minutes(protocol))
-    plan = least_plan(question, tread, minutes=minutes, tell=tell)
+    plan = least_plan(
+        question, tread, minutes=minutes, beside=0.0 if sweeps is None else sweeps.minutes, tell=tell
+    )
     asked = bool(demands) and plan.feasible
     alike, same_time = (plan, in_time(question, free, protocol)) if asked else (None, None)
     open_demands = tuple(Demand(name=demand.name, SA_rad=demand.SA_rad) for demand in demands)

@@ -276,9 +276,12 @@ def least_plan(
     tread: Tread,
     *,
     minutes: float = math.inf,
+    beside: float = 0.0,
     tell: Callable[[str], None] = lambda _text: None,
 ) -> Judged:
     """Return the shortest design that meets every demand, or the nearest to it that the time allows.
+
+    ``minutes`` are those of settled steps; ``beside`` what else the test takes of its time, for the message.
 
     Further loads beside those that are asked for are tried, nearest first: by its neighbours a block is
     carried to the load that all blocks share. What is returned is not ``feasible`` where no design meets the
@@ -306,9 +309,9 @@ def least_plan(
             missed = nearest if nearer else missed
     if met is None and missed is None:
         raise ConfigError(
-            "no test fits into the time", where="--minutes", got=f"{minutes:g} min",
-            expected=f"{math.ceil(10 * shortest) / 10:g} min at least: {MIN_POINTS} slip angles, the fewest "
-            "of a curve",
+            "no test fits into the time", where="--minutes", got=f"{minutes + beside:g} min",
+            expected=f"{math.ceil(10 * (shortest + beside)) / 10:g} min at least: {MIN_POINTS} slip angles, "
+            f"the fewest of a curve{', and the sweeps' * (beside > 0)}",
             next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
         )  # fmt: skip
     return met or cast("Judged", missed)
