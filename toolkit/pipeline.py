@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Literal
 
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.model import Characteristics
+from toolkit.errors import RecordingError
 from toolkit.findings import Finding
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
 from toolkit.reduction.corrections import tare_of_file
 from toolkit.reduction.model import ReducedTest, Tare
 from toolkit.reduction.reduce import reduce_test
+from toolkit.reduction.sweep import sweeps_of
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -73,24 +75,36 @@ def process(
 
     ``protocol`` goes before the test's own, and that before the machine's. ``use`` says how the record
     stands for the test (`Standing.use`); without it the result is a draft.
+
+    Raises
+    ------
+    RecordingError
+        rule ``no-recordings``: all are sweeps
     """
     machine = machine_of(folder, protocol)
+    speeds = dict(folder.sweeps)
+    named = [
+        (recording.path.relative_to(folder.folder).as_posix(), recording, folder.rotation_of(recording.path))
+        for recording in recordings
+    ]
+    settled = [entry for entry in named if entry[1].path not in speeds]
+    if named and not settled:
+        raise RecordingError(
+            "every recording of the test is a sweep", where=folder.folder, got=f"{len(named)} sweeps",
+            expected="recordings of settled slip angles beside them, which give the loads and the curves",
+            next_step="add them to the folder, or leave their names out of [sweeps]", rule="no-recordings",
+        )  # fmt: skip
+    tare = declared_tare(folder, machine)
     reduced = reduce_test(
-        info=folder.info,
-        machine=machine,
-        record=record,
-        recordings=[
-            (
-                recording.path.relative_to(folder.folder).as_posix(),
-                recording,
-                folder.rotation_of(recording.path),
-            )
-            for recording in recordings
-        ],
-        tare=declared_tare(folder, machine),
-        use=use,
+        info=folder.info, machine=machine, record=record, recordings=settled, tare=tare, use=use
     )
-    return TestResult(reduced=reduced, characteristics=characterise(reduced, machine=machine, record=record))
+    sweeps, findings = sweeps_of(
+        [(*entry, speeds[entry[1].path]) for entry in named if entry[1].path in speeds],
+        machine=machine, record=record, info=folder.info, tare=tare,
+    )  # fmt: skip
+    reduced = dataclasses.replace(reduced, findings=(*reduced.findings, *findings))
+    characteristics = characterise(reduced, machine=machine, record=record, sweeps=sweeps)
+    return TestResult(reduced=reduced, characteristics=characteristics)
 
 
 def declared_tare(folder: TestFolder, machine: Machine) -> Tare | None:

@@ -153,6 +153,8 @@ _EXACT = {
     "m": (1.0, 0.0, "m", "length"),
     "mm": (1e-3, 0.0, "m", "length"),
     "s": (1.0, 0.0, "s", "time"),
+    "ms": (1e-3, 0.0, "s", "time"),
+    "deg/s": (math.pi / 180, 0.0, "Hz", "frequency"),
     "m/s": (1.0, 0.0, "m/s", "speed"),
     "km/h": (1 / 3.6, 0.0, "m/s", "speed"),
     "Pa": (1.0, 0.0, "Pa", "pressure"),

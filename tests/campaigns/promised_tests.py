@@ -26,6 +26,7 @@ from tests.campaigns.physics_gate import EXAMPLES
 from tests.coverage.characteristics import drawn_test, session_record
 from tests.coverage.rows import exact_interval
 from toolkit.characteristics.characterise import characterise
+from toolkit.declared import answer as declared_answer
 from toolkit.lab.plans.protocol_plan import ProtocolOrder, plan_test
 from toolkit.machine import load_machine
 from toolkit.simulation.plan import Plan, read_plan
@@ -93,7 +94,7 @@ def outcomes(number: int, times: int, seed: int) -> Iterator[Outcome]:
         order = ProtocolOrder(
             like=(tire,), demands=tuple(names), loads=tuple(f"{loads[i]:.1f} N" for i in chosen)
         )
-        answer, _ = plan_test(order)
+        answer = declared_answer(plan_test(order)[0])
         sys.stderr.write(f"{number}: {names} at {len(chosen)} loads: {answer['plan']['rows']} rows\n")
         for time in range(times):
             draws = np.random.default_rng([seed, number, time])

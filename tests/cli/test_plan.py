@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -250,3 +252,80 @@ def test_a_tire_file_of_other_loads_than_the_machines_is_refused(run, tmp_path):
 def test_a_tire_that_is_named_twice_is_refused(run, quick):
     failed = run("plan", "test", "--like", "a.tir", "--like", "a.tir")
     assert failed.exception.rule == "plan-like"
+
+
+SWEPT = ("--u", "relaxation_length=40 mm", "--load", "833 lbf")
+
+
+@pytest.fixture
+def in_time(monkeypatch):
+    """The earlier test of the virtual machine, which states what it can sweep."""
+    from tests.planning.test_sweep_search import VIRTUAL
+
+    known = dataclasses.replace(earlier(), machine=VIRTUAL)
+    monkeypatch.setattr(protocol_plan, "_virtual", lambda _order, _like: known)
+
+
+def test_sweeps_of_a_relaxation_length_are_simulated_and_processed(run, in_time, tmp_path):
+    planned = run("plan", "test", *SWEPT, "--u", "slope_cornering=4 %", "--out", "p", "--json")
+    assert planned.return_value == 0, planned
+    answer = json.loads(planned.stdout)
+    sweeps = answer["sweeps"]
+    assert len({sweep["speed_m_s"] for sweep in sweeps["recordings"]}) == 2
+    (value,) = (value for value in answer["values"] if value["name"] == "relaxation_length")
+    assert value["planned_U"] <= value["demanded_U"] == pytest.approx(0.04)
+    assert (value["unit"], value["protocol_U"]) == ("m", None)
+    made = run(
+        "simulate", "p/plan.toml", "--out", "t", "--effect", "relaxation=0.5m", "--calibrations", CALIBRATIONS
+    )
+    assert made.return_value == 0, made
+    done = run("process", "t", "--protocol", "p/protocol.toml", "--calibrations", CALIBRATIONS, "--json")
+    test = json.loads(done.stdout)
+    assert test["findings"] == []
+    lengths = [entry["relaxation_length"] for entry in test["characteristics"]["transient"]]
+    (length,) = [entry for entry in lengths if entry is not None]
+    # 0.5 m at the tire's nominal load of 4000 N.
+    assert length["value"] == pytest.approx(0.5, abs=0.04)
+    assert length["expanded_uncertainty"] < value["planned_U"]
+    assert len(test["sweeps"]) == 2
+
+
+def test_a_relaxation_length_alone_has_the_fewest_settled_steps_beside_it(run, in_time):
+    shown = run("plan", "test", *SWEPT)
+    assert shown.return_value == 0, shown
+    for part in ("7 slip angles", "recordings in time", "sweep  ", "km/h", "part it from the length",
+                 "it gives none of what is demanded"):  # fmt: skip
+        assert part in shown.stdout
+
+
+@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
+def test_the_sheet_has_a_step_for_each_sweep(run, in_time, tmp_path):
+    template = ROOT / "report_templates" / "plan.docx"
+    done = run("plan", "test", *SWEPT, "--out", "p", "--template", template, "--json")
+    assert done.return_value == 0, done
+    with zipfile.ZipFile(tmp_path / "p" / "plan.docx") as sheet:
+        text = re.sub("<[^>]*>", "", sheet.read("word/document.xml").decode())
+    assert text.count("sweep in time: ") == 2
+    assert " km/h" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "rule", "part"),
+    [
+        (("--u", "relaxation_length"), "plan-demand", "no size"),
+        (("--u", "relaxation_length=0.1 mm"), "plan-infeasible", "and 2 sweeps"),
+        ((*SWEPT, "--minutes", "1"), "plan-infeasible", "--minutes"),
+        ((*SWEPT, "--minutes", "3"), "plan-infeasible", "got:      3 min"),
+        ((*SWEPT, "--sliding", "0.01"), "plan-infeasible", "alone go beyond"),
+    ],
+)
+def test_a_relaxation_length_that_cannot_be_had_names_the_nearest(run, in_time, arguments, rule, part):
+    with pytest.raises(ConfigError) as caught:
+        raise run("plan", "test", *arguments, "--load", "833 lbf").exception
+    assert caught.value.rule == rule
+    assert part in str(caught.value)
+
+
+def test_a_machine_that_states_no_sweeps_says_what_is_missing(run, quick):
+    with pytest.raises(ConfigError, match=r"\[sweeping\]"):
+        raise run("plan", "test", *SWEPT).exception

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.coverage.rows import CoverageRow, row_of
-from toolkit.calibration.fit.forward_search import contradicting
+from toolkit.calibration.fit.robust import contradicting
 
 SHAPES = ((12, 2), (20, 4), (81, 4), (81, 8), (120, 13))
 """Rows and terms of a session."""

@@ -23,7 +23,7 @@ LBF, FOOT = 4.4482216152605, 0.3048  # N, exact by definition; m
         (LBF, "N/rad", math.pi / 180, "lbf/deg"),
         (LBF * FOOT, "N*m/rad", math.pi / 180, "lbf*ft/deg"),
         (math.pi, "rad", 180.0, "deg"),
-        (0.3, "m", 0.3, "m"),
+        (0.3, "m", 300.0, "mm"),
         (7.0, "1/s", 7.0, "1/s"),
     ],
 )

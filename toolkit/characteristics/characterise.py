@@ -27,6 +27,8 @@ from toolkit.characteristics.model import Characteristics, Point, Row
 from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.scatter import Scatter, scatter_of
 from toolkit.characteristics.shared_errors import SharedErrors, shared_errors_of
+from toolkit.characteristics.sweep_findings import sweep_findings
+from toolkit.characteristics.sweep_fit import fit_sweep
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.findings import Finding
 from toolkit.reduction.common_load import at_one_angle, slopes
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from toolkit.errors import FitError
     from toolkit.machine import Machine
     from toolkit.reduction.model import ReducedTest
+    from toolkit.reduction.sweep import Sweep
 
 
 # Beyond the outermost measured slip angle by more than this, a curve is not read.
@@ -50,20 +53,32 @@ _Key = tuple[Characteristic, float, str, float | None]
 
 
 def characterise(
-    reduced: ReducedTest, *, machine: Machine, record: CalibrationRecord | None
+    reduced: ReducedTest,
+    *,
+    machine: Machine,
+    record: CalibrationRecord | None,
+    sweeps: Sequence[Sweep] = (),
 ) -> Characteristics:
     """Fit every load and direction and derive the characteristics.
 
     ``record`` gives the covariance of its coefficients; None where the reduced test came without it.
+    ``sweeps`` are its recordings in time.
     """
     groups = group(reduced)
     fits, findings = _fit(groups)
-    directions = directions_of(reduced, fits)
+    lags = [fit_sweep(sweep, machine.sweeping) for sweep in sweeps]
+    swept = tuple(fit for fit in lags if fit is not None)
+    directions = directions_of(reduced, fits, swept)
     shared = shared_errors_of(reduced, machine=machine, record=record)
     return Characteristics(
         fits=fits,
         rows=tuple(replace(row, parts=()) for row in rows_of(directions, shared=shared)),
-        findings=(*findings, *_line_findings(directions)),
+        findings=(
+            *findings,
+            *_line_findings(directions),
+            *sweep_findings(sweeps, lags, directions),
+        ),
+        sweeps=swept,
         points=tuple(
             Point(file=file, first_row=row, u_FY=u["FY"], u_MZ=u["MZ"])
             for (file, row), u in point_u(directions, shared=shared).items()
@@ -80,7 +95,7 @@ def characteristic_rows(
 ) -> tuple[Row, ...]:
     """Return the rows that have a value, with the parts of their uncertainty, to compare them."""
     rows = rows_of(
-        directions_of(reduced, characteristics.fits),
+        directions_of(reduced, characteristics.fits, characteristics.sweeps),
         shared=shared_errors_of(reduced, machine=machine, record=record),
     )
     return tuple(row for row in rows if row.estimate is not None)

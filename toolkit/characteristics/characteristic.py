@@ -209,6 +209,13 @@ AT_ANGLES = WideTable(
     place=4,
     answer="at_angles",
 )
+TRANSIENT = WideTable(
+    name="transient",
+    scope="direction",
+    text="how FY follows the slip angle in time, one row a load and direction",
+    place=5,
+    answer="transient",
+)
 
 PRAT_FIGURE = Figure(
     name="prat",
@@ -243,6 +250,10 @@ LOAD = "load"
 PRESSURE = "pressure"
 REPEATABILITY = "repeatability"
 FIT = "fit"
+NOISE = "noise in time"
+FORM = "form of the answer"
+DELAY = "delay"
+SPEED = "speed"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -271,13 +282,14 @@ COLUMNS = (
     BudgetColumn(name="pressure", sources=(PRESSURE,), text="inflation pressure"),
     BudgetColumn(
         name="repeatability",
-        sources=(REPEATABILITY, ANGLE_SCATTER),
-        text="scatter of the rows within each block",
+        sources=(REPEATABILITY, ANGLE_SCATTER, NOISE),
+        text="scatter of the rows within each block, or of a sweep in time",
     ),
     BudgetColumn(
         name="fit",
-        sources=(FIT,),
-        text="scatter of the blocks about the curves beyond that of their rows",
+        sources=(FIT, FORM, DELAY, SPEED),
+        text="scatter of the blocks about the curves beyond that of their rows; of a sweep in time the form "
+        "of the answer, the delay of the channels and the speed",
     ),
 )
 
@@ -296,3 +308,5 @@ CURVE_BUDGET = (
 )
 # Of the measured steps themselves: their slip angles scatter too.
 STEP_BUDGET = (*CURVE_BUDGET, ANGLE_SCATTER)
+# Of sweeps in time alone.
+SWEEP_BUDGET = (NOISE, FORM, DELAY, SPEED, LOAD, PRESSURE)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.channels import ROTATIONS, Rotation
+from toolkit.characteristics.sweep_fit import SweepFit
 from toolkit.reduction.model import Condition, ReducedTest
 
 if TYPE_CHECKING:
@@ -70,19 +71,41 @@ class DirectionFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Direction:
-    """One direction's conditions and curves at one load; a curve is None where it could not be fitted."""
+    """One direction's conditions and curves at one load; a curve is None where it could not be fitted.
+
+    ``sweeps`` are the recordings in time near that load.
+    """
 
     group: Group
     fit: DirectionFit
+    sweeps: tuple[SweepFit, ...] = ()
 
     def curve(self, channel: Channel) -> CurveFit | None:
         """Return the fitted curve of a channel."""
         return self.fit.FY if channel == "FY" else self.fit.MZ
 
 
-def directions_of(reduced: ReducedTest, fits: Sequence[DirectionFit]) -> tuple[Direction, ...]:
+def directions_of(
+    reduced: ReducedTest, fits: Sequence[DirectionFit], sweeps: Sequence[SweepFit] = ()
+) -> tuple[Direction, ...]:
     """Return the directions of a test with their curves, lightest load first, forward before reverse."""
-    return tuple(Direction(group=part, fit=fit) for part, fit in zip(group(reduced), fits, strict=True))
+    groups = group(reduced)
+    return tuple(
+        Direction(group=part, fit=fit, sweeps=sweeps_at(part, groups, sweeps))
+        for part, fit in zip(groups, fits, strict=True)
+    )
+
+
+def sweeps_at(part: Group, groups: Sequence[Group], sweeps: Sequence[SweepFit]) -> tuple[SweepFit, ...]:
+    """Return the sweeps of a group: of its direction, and nearer to its load than to any other."""
+    loads = [other.load_N for other in groups if other.rotation == part.rotation]
+    return tuple(
+        sweep
+        for sweep in sweeps
+        if sweep.rotation == part.rotation
+        and abs(sweep.load_N - part.load_N) <= _SAME_LOAD * part.load_N
+        and min(loads, key=lambda load: abs(load - sweep.load_N)) == part.load_N
+    )
 
 
 def group(reduced: ReducedTest) -> tuple[Group, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.characteristics.catalogue import by_name, summary, tables
 from toolkit.characteristics.characteristic import BOTH, Characteristic
 from toolkit.characteristics.groups import DirectionFit
+from toolkit.characteristics.sweep_fit import SweepFit
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
@@ -107,12 +108,14 @@ class Characteristics:
 
     ``rows`` stand in the catalogue's order: first those of loads, lightest first, then those of each
     direction with its values at slip angles. What the test cannot give is a row too, and says what lacks.
+    ``sweeps`` are the fits of the recordings in time.
     """
 
     fits: tuple[DirectionFit, ...]
     rows: tuple[Row, ...]
     findings: tuple[Finding, ...]
     points: tuple[Point, ...] = ()
+    sweeps: tuple[SweepFit, ...] = ()
 
     @property
     def loads_N(self) -> tuple[float, ...]:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
-from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast
 
 import typer
 
 from toolkit.cli.console import answers, exit_code
 from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_folder
 from toolkit.errors import ConfigError
+
+if TYPE_CHECKING:
+    from toolkit.lab.answers import DeliveredDocument
 
 app = typer.Typer(help="Plans: what to measure next: sessions, tests, runs, intervals.", no_args_is_help=True)
 
@@ -119,15 +122,25 @@ def session(
         minutes=minutes, loads=loads, criterion=criterion, two_levels=two_levels, seed=seed, on=day(on),
         known_at=day(known_at), out=out, template=document_template(template, out),
     )  # fmt: skip
-    payload, text, findings = session_plan_answer(place.registry(), order)
-    payload["timing"] = {"seconds": time.perf_counter() - started}
-    output.answer(payload, text)
-    return max(sheet_code(payload), exit_code(findings))
+    planned, text, findings = session_plan_answer(place.registry(), order)
+    return max(answered(planned, text, started, output), exit_code(findings))
 
 
-def sheet_code(payload: Mapping[str, Any]) -> int:
-    """Return 1 where a delivered sheet has warnings."""
-    return int(bool(payload.get("document", {}).get("warnings")))
+class Planned(Protocol):
+    """An answer of a plan."""
+
+    @property
+    def document(self) -> DeliveredDocument | None:
+        """Its sheet."""
+
+
+def answered(planned: Planned, text: str, started: float, output: Output) -> int:
+    """Print a plan with the time that it took; return 1 where its sheet has warnings."""
+    from toolkit.declared import answer
+
+    timing = {"seconds": time.perf_counter() - started}
+    output.answer(answer(dataclasses.replace(cast("Any", planned), timing=timing)), text)
+    return int(planned.document is not None and bool(planned.document["warnings"]))
 
 
 @app.command("interval")
@@ -167,10 +180,8 @@ def interval(
     from toolkit.lab.plans.plan_interval import interval_plan_answer
 
     started = time.perf_counter()
-    payload, text, findings = interval_plan_answer(
+    planned, text, findings = interval_plan_answer(
         place.registry(), instrument, reliability=reliability, tests_a_year=tests, load=load,
         out=out, template=document_template(template, out, default="plan.docx", home=place.home),
     )  # fmt: skip
-    payload["timing"] = {"seconds": time.perf_counter() - started}
-    output.answer(payload, text)
-    return max(sheet_code(payload), exit_code(findings))
+    return max(answered(planned, text, started, output), exit_code(findings))

@@ -11,7 +11,7 @@ import typer
 
 from toolkit.cli.console import answers
 from toolkit.cli.options import CalibrationId, Draft, Output, RegistryOptions, WorkerOptions, into_folder
-from toolkit.cli.plan import SheetTemplate, app, sheet_code
+from toolkit.cli.plan import SheetTemplate, answered, app
 
 
 @app.command("test")
@@ -99,10 +99,8 @@ def protocol(
     )  # fmt: skip
     opened = document_template(template, out)
     with output.progress("planning") as step:
-        payload, text = plan_test(order, out, template=opened, tell=step)
-    payload["timing"] = {"seconds": time.perf_counter() - started}
-    output.answer(payload, text)
-    return sheet_code(payload)
+        planned, text = plan_test(order, out, template=opened, tell=step)
+    return answered(planned, text, started, output)
 
 
 @app.command("next")
@@ -152,11 +150,9 @@ def following(
     started = time.perf_counter()
     opened = document_template(template, out)
     with output.progress("planning") as step:
-        payload, text = plan_next(
+        planned, text = plan_next(
             source, out, case=case, limits=tuple(limit or ()), budget_s=budget,
             calibrations=place.calibrations, home=place.home, worker=worker.limits(), template=opened,
             tell=step,
         )  # fmt: skip
-    payload["timing"] = {"seconds": time.perf_counter() - started}
-    output.answer(payload, text)
-    return sheet_code(payload)
+    return answered(planned, text, started, output)

@@ -57,7 +57,7 @@ from typing import (
     is_typeddict,
 )
 
-from toolkit.declared.declaration import keys_of
+from toolkit.declared.declaration import keys_of, sparse_keys
 from toolkit.declared.marks import Entry
 
 T = TypeVar("T")
@@ -83,6 +83,12 @@ def merged(*tables: Any, name: str | None = None) -> Any:
     joined = TypedDict(name or tables[0].__name__, entries)  # type: ignore[misc]
     joined.__doc__ = tables[0].__doc__
     return joined
+
+
+def extended(declared: type[T], source: object, /, **more: Any) -> T:
+    """Return an answer that is declared as another one and more: fields of that one, the rest stated."""
+    held = {field.name: getattr(source, field.name) for field in dataclasses.fields(cast("Any", source))}
+    return declared(**(held | more))
 
 
 def entry_of(declared: type[T], source: object, /, **stated: Any) -> T:
@@ -215,7 +221,8 @@ def _entries(cls: Any) -> Iterator[tuple[str, Any, bool]]:
     """Yield key, annotation and whether every answer has it."""
     if not is_typeddict(cls):
         hints = typing.get_type_hints(cls, include_extras=True)
-        yield from ((key, hints[name], True) for name, key in keys_of(cls))
+        sparse = sparse_keys(cls)
+        yield from ((key, hints[name], key not in sparse) for name, key in keys_of(cls))
         return
     for key, annotation in typing.get_type_hints(cls, include_extras=True).items():
         # `__required_keys__` does not know the marks of annotations that are kept as texts.

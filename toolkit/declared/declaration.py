@@ -106,6 +106,14 @@ def keys_of(cls: type) -> tuple[tuple[str, str], ...]:
     return tuple((name, entry.key or name) for name, entry in entries if entry.output)
 
 
+@functools.cache
+def sparse_keys(cls: type) -> frozenset[str]:
+    """Return the keys that an answer leaves out while they hold None."""
+    hints = typing.get_type_hints(cls, include_extras=True)
+    marks = {name: _mark(_bare(hints[name])[1], Entry) or Entry() for name, _ in keys_of(cls)}
+    return frozenset(entry.key or name for name, entry in marks.items() if entry.sparse)
+
+
 def kind_of(annotation: Any, marks: Marks = ()) -> tuple[Kind, bool]:
     """Return the kind of an annotation with its marks, and whether None may be held.
 

@@ -17,7 +17,8 @@ class Entry:
     ``key`` is the entry's name in the file where it differs from the field's; ``example`` a value for the
     starter file, as a file holds it; ``expected`` replaces the sentence that a fault and the reference page
     make of the type and its bounds; ``rule`` the rule id of a fault in it; ``old`` are former spellings of
-    the key, read but not written; ``output`` is False for a field that no file and no answer has.
+    the key, read but not written; ``output`` is False for a field that no file and no answer has; of a
+    ``sparse`` one an answer has no key while it is None.
     """
 
     help: str = ""
@@ -27,6 +28,7 @@ class Entry:
     rule: str | None = None
     old: tuple[str, ...] = ()
     output: bool = True
+    sparse: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,17 @@ from toolkit.machine.correction import Correction
 from toolkit.machine.definition import Column, Drum, Machine, TypeB, load_machine, machine_names
 from toolkit.machine.hub import Hub
 from toolkit.machine.protocol import Protocol, read_protocol
+from toolkit.machine.sweeping import Delay, Sweeping
 
 __all__ = [
     "Column",
     "Correction",
+    "Delay",
     "Drum",
     "Hub",
     "Machine",
     "Protocol",
+    "Sweeping",
     "TypeB",
     "load_machine",
     "machine_names",

@@ -40,6 +40,7 @@ from toolkit.machine.correction import Correction
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.machine.hub import Hub, Loading
 from toolkit.machine.protocol import Protocol
+from toolkit.machine.sweeping import Sweeping
 from toolkit.units import unit
 
 Road = Literal["convex", "concave", "flat"]
@@ -290,6 +291,9 @@ class Machine:
     ] = ()  # fmt: skip
     loading: Annotated[
         Loading | None, Entry("fixtures that calibrate its cells: what `toolkit plan session` may load")
+    ] = None
+    sweeping: Annotated[
+        Sweeping | None, Entry("what it can record in time: what a relaxation length is planned by")
     ] = None
     protocol: Annotated[Protocol, Entry("the machine's default; a test may name another one")]
     type_b: Annotated[

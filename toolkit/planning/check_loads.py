@@ -6,12 +6,13 @@ They are what an approval asks for (`registry.gates.unverifiable`): with fewer a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from toolkit.calibration.registry.gates import VERIFIED
 from toolkit.calibration.terms import INTERCEPT
+from toolkit.declared import Entry
 from toolkit.planning.exchange import Points, grown, shrunk
 
 if TYPE_CHECKING:
@@ -28,10 +29,10 @@ _INDEPENDENT = 1e-6
 class Verification:
     """Whether check loads show a term: ``movement`` is how many tolerances a load moves by it."""
 
-    load: str
-    term: str
-    movement: float
-    verified: bool
+    load: Annotated[str, Entry("symbol of the load")]
+    term: Annotated[str, Entry("of its equation")]
+    movement: Annotated[float, Entry("tolerances by which a check load moves the load by the term")]
+    verified: Annotated[bool, Entry("whether that is five or more")]
 
 
 def choose_check_loads(

@@ -28,6 +28,7 @@ from toolkit.planning.demands import PEAK, Demand
 from toolkit.planning.design import Design
 from toolkit.reduction.common_load import slopes
 from toolkit.reduction.model import Condition
+from toolkit.simulation.tire import TireTruth, revolution_time_s
 from toolkit.tires.evaluate import estimate_at, slope_estimate_at, value_at
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
     from toolkit.tires.model import CurveFit
 
     Array = NDArray[np.float64]
+
+_NEAR_ZERO_RAD = float(np.radians(2.5))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,7 +61,8 @@ class EarlierTest:
     ``variances`` (4,) and ``variances_u`` (4,) are those of the sources of scatter with their standard
     uncertainties, ``load_spread`` how far blocks stood off their common load, as a share; ``offset_rad`` by
     how much the wheel stood beyond its step on average, which is the steering's zero; ``mirrored`` names
-    directions that it lacks, whose curves are those of the other one; ``tire`` names its tire in a class.
+    directions that it lacks, whose curves are those of the other one; ``tire`` names its tire in a class;
+    ``lengths_m`` are the relaxation lengths that it measured, by nominal load.
     """
 
     machine: Machine
@@ -71,6 +75,7 @@ class EarlierTest:
     offset_rad: float = 0.0
     mirrored: tuple[Rotation, ...] = ()
     tire: str = ""
+    lengths_m: dict[float, float] = dataclasses.field(default_factory=dict)
 
     @property
     def loads_N(self) -> tuple[float, ...]:
@@ -88,6 +93,16 @@ class EarlierTest:
     def force(self, SA: ArrayLike, load_N: float, rotation: Rotation) -> Array:
         """Return FY [N] of the curve of a nominal load at slip angles [rad]."""
         return _values(self.curves[load_N, rotation].fit, "FY", SA)
+
+    def rows_density(self, load_N: float, rotation: Rotation) -> float:
+        """Return the density of the noise of FY's rows at small slip [N^2 s], by the means of its conditions.
+
+        The mean of a stretch of noise of the density S has the variance S over the stretch's time.
+        """
+        curve, protocol = self.curves[load_N, rotation], self.machine.protocol
+        turn_s = revolution_time_s(TireTruth(), protocol.speed_m_s or self.machine.drum.speed_m_s)
+        near = np.abs(curve.SA) <= max(_NEAR_ZERO_RAD, float(np.abs(curve.SA).min()))
+        return float(np.mean(curve.squares["FY"][near])) * protocol.average_revolutions * turn_s
 
     def similar(self, *, stiffness: float, friction: float, tire: str) -> EarlierTest:
         """Return this test on a similar tire: stiffness and friction times these.
@@ -256,6 +271,13 @@ def earlier_test(result: TestResult, *, machine: Machine, record: CalibrationRec
         ),
         load_spread=float(np.sqrt(np.mean([(c.FZ_common / c.FZ - 1) ** 2 for c in reduced.used()]))),
         mirrored=mirrored,
+        lengths_m={
+            step: row.estimate.value
+            for row in result.characteristics.of("relaxation_length")
+            if row.estimate is not None
+            for step in {d.group.conditions[0].step_FZ for d in directions if d.group.load_N == row.load_N}
+            if step is not None
+        },
     )
 
 

@@ -23,10 +23,11 @@ import datetime as dt
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.declared import Entry
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -102,10 +103,13 @@ class IntervalRisk:
     tests a year would be recalled for it, all since the session before; None where nobody states them.
     """
 
-    days: int
-    beyond: float
-    sessions_a_year: float
-    recalled_a_year: float | None
+    days: Annotated[int, Entry("of the interval")]
+    beyond: Annotated[float, Entry("chance that the error is beyond the tolerance at its end")]
+    sessions_a_year: Annotated[float, Entry("that it takes")]
+    recalled_a_year: Annotated[
+        float | None,
+        Entry("tests that would be recalled for it; null where nobody states how many there are"),
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,17 +119,17 @@ class IntervalPlan:
     ``limiting`` names load and check load that drift most; ``seen_days`` is the longest gap between sessions.
     """
 
-    days: int
-    reliability: float
-    limiting: str
-    readings: int
-    paths: int
-    trend_per_year: float
-    walk_per_root_year: float
-    seen_days: int
-    capped: bool
-    risks: tuple[IntervalRisk, ...]
-    chosen: IntervalRisk
+    days: Annotated[int, Entry("of the recommended interval; 0 where not even the shortest serves")]
+    reliability: Annotated[float, Entry("asked for at its end")]
+    limiting: Annotated[str, Entry("load and check load that drift most")]
+    readings: Annotated[int, Entry("of that check load")]
+    paths: Annotated[int, Entry("of check loads that were judged")]
+    trend_per_year: Annotated[float, Entry("of the drift, in tolerances")]
+    walk_per_root_year: Annotated[float, Entry("of the random walk, in tolerances")]
+    seen_days: Annotated[int, Entry("longest gap between sessions")]
+    capped: Annotated[bool, Entry("whether it is kept near the gaps that were seen")]
+    risks: Annotated[tuple[IntervalRisk, ...], Entry("of other intervals")]
+    chosen: Annotated[IntervalRisk, Entry("of the recommended one")]
 
 
 def paths_of(chart: Chart, dates: Mapping[str, dt.date]) -> tuple[Path, ...]:

@@ -20,7 +20,7 @@ _DEGREE = math.radians(1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedUnits:
-    """Units of forces and moments; angles are in degrees.
+    """Units of forces and moments; angles are in degrees, lengths in millimetres.
 
     >>> units = PrintedUnits(force="lbf", moment="lbf*ft")
     >>> units.shown(4448.2216, "N/rad")
@@ -32,6 +32,8 @@ class PrintedUnits:
 
     def shown(self, value: float, unit: str) -> tuple[float, str]:
         """Return an SI value as it is printed, with its unit."""
+        if unit == "m":
+            return 1e3 * value, "mm"
         quantity, _, angle = unit.partition("/")
         names = {"N": self.force, "N*m": self.moment, "rad": "deg"}
         if quantity not in names or angle not in ("", "rad"):

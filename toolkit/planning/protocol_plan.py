@@ -16,6 +16,14 @@ from toolkit.planning.design import Design, ordered, standard
 from toolkit.planning.printed_units import PrintedUnits, units_of
 from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan, shared_loads
 from toolkit.planning.reach import Reach
+from toolkit.planning.sweep_plan import (
+    TO_LOAD_S,
+    PlannedSweeps,
+    planned_sweeps,
+    refuse_beyond,
+    sweep_assumptions,
+)
+from toolkit.planning.sweep_search import RELAXATION, least_sweeps
 from toolkit.planning.tread import Tread, tread_statement
 from toolkit.tires.fit import MIN_POINTS
 
@@ -79,6 +87,7 @@ class ProtocolPlan:
     protocol: Annotated[PlannedDesign, Entry("the machine's own protocol")]
     alike: Annotated[PlannedDesign | None, Entry("the shortest test with the protocol's uncertainties")]
     same_time: Annotated[PlannedDesign | None, Entry("the best test of the protocol's time")]
+    sweeps: Annotated[PlannedSweeps | None, Entry("recordings in time; null where no demand takes them")]
     values: Annotated[tuple[PlannedValue, ...], Entry("what is demanded, and what it will be")]
     assumptions: Annotated[tuple[str, ...], Entry("what the plan rests on")]
     gives_up: Annotated[tuple[str, ...], Entry("what the protocol would have given and the plan will not")]
@@ -112,13 +121,29 @@ def plan_protocol(
     """
     units = units_of(machine.protocol)
     protocol = protocol_design(tires, machine)
+    # What is read off sweeps in time asks nothing of the settled steps.
+    in_time_demands = [demand for demand in demands if demand.name == RELAXATION]
+    demands = tuple(demand for demand in demands if demand.name != RELAXATION)
+    choice, sweeps, whole = None, None, tread
+    if in_time_demands:
+        choice = least_sweeps(
+            tires, in_time_demands[0], loads_N, machine=machine,
+            between_files_s=tread.pace.between_files_s, to_load_s=TO_LOAD_S, tell=tell,
+        )  # fmt: skip
+        sweeps = planned_sweeps(choice, tires, tread)
+        refuse_beyond(sweeps, tread, minutes)
+        minutes -= sweeps.minutes
+        tread = dataclasses.replace(tread, energy_J=tread.energy_J - 1e3 * sweeps.sliding_kJ)
     question = Question.beside(protocol, tires=tires, demands=demands, loads_N=loads_N)
     tell("the protocol")
     # The protocol itself has no limits, and so no pauses but its own.
     free = dataclasses.replace(tread, energy_J=math.inf, rise_K=math.inf)
     of_protocol = Judged(design=protocol, reaches=question.reaches(protocol), minutes=free.minutes(protocol))
-    plan = least_plan(question, tread, minutes=minutes, tell=tell)
-    alike, same_time = (plan, in_time(question, free, protocol)) if plan.feasible else (None, None)
+    plan = least_plan(
+        question, tread, minutes=minutes, beside=0.0 if sweeps is None else sweeps.minutes, tell=tell
+    )
+    asked = bool(demands) and plan.feasible
+    alike, same_time = (plan, in_time(question, free, protocol)) if asked else (None, None)
     open_demands = tuple(Demand(name=demand.name, SA_rad=demand.SA_rad) for demand in demands)
     limited = not all(map(math.isinf, (minutes, tread.energy_J, tread.rise_K)))
     if alike is not None and (open_demands != demands or limited):
@@ -127,7 +152,7 @@ def plan_protocol(
         alike = least_plan(as_protocol, free, tell=tell)
     (earlier, *others) = tires
     return ProtocolPlan(
-        feasible=plan.feasible,
+        feasible=plan.feasible and (choice is None or choice.feasible),
         machine=machine.name,
         like=like,
         tires=tuple(tire.tire for tire in tires),
@@ -136,8 +161,12 @@ def plan_protocol(
         protocol=_shown(protocol, free, in_order=True),
         alike=None if alike is None or not alike.feasible else _shown(alike.design, free),
         same_time=None if same_time is None else _shown(same_time.design, free),
-        values=_values(question, plan, of_protocol, same_time),
-        assumptions=_assumptions(earlier, others, tread, units),
+        sweeps=sweeps,
+        values=_values(question, plan, of_protocol, same_time, () if choice is None else choice.reaches),
+        assumptions=(
+            *_assumptions(earlier, others, whole, units),
+            *(sweep_assumptions(sweeps, machine.sweeping, tires) if sweeps and machine.sweeping else ()),
+        ),
         gives_up=_gives_up(plan.design, protocol, units),
     )
 
@@ -172,7 +201,11 @@ def _shown(design: Design, tread: Tread, *, in_order: bool = False) -> PlannedDe
 
 
 def _values(
-    question: Question, plan: Judged, protocol: Judged, same_time: Judged | None
+    question: Question,
+    plan: Judged,
+    protocol: Judged,
+    same_time: Judged | None,
+    of_sweeps: Sequence[Reach],
 ) -> tuple[PlannedValue, ...]:
     low = {_key(reach): reach.U for reach in question.reaches(plan.design, shift=-1.0)}
     high = {_key(reach): reach.U for reach in question.reaches(plan.design, shift=1.0)}
@@ -180,7 +213,7 @@ def _values(
     in_same_time = {} if same_time is None else {_key(reach): reach.U for reach in same_time.reaches}
     names = [earlier.tire for earlier in question.tires]
     nearest: dict[tuple[str, float], Reach] = {}
-    for reach in plan.reaches:
+    for reach in (*plan.reaches, *of_sweeps):
         known = nearest.get((reach.demand.label, reach.load_N), reach)
         nearest[reach.demand.label, reach.load_N] = max(known, reach, key=lambda one: one.ratio)
     return tuple(
@@ -322,6 +355,14 @@ def simulation_text(plan: ProtocolPlan, *, machine: str, on: date, tire: str | N
         "loads": {"value": list(plan.plan.loads_N), "unit": "N"},
         "acquisition": {"negated": []},
     }
+    if plan.sweeps is not None:
+        # Runs that are stated replace those of the protocol: the settled ones have to be stated too.
+        settled = [
+            {"rotation": rotation, "slip_angles": {"value": [angle], "unit": "deg"}}
+            for rotation in plan.plan.rotations
+            for angle in plan.plan.slip_angles_deg
+        ]
+        table["run"] = [*settled, *plan.sweeps.runs()]
     if tire is not None:
         table["tire"] = {"file": tire}
     return toml_text(table)

@@ -158,7 +158,8 @@ class Question:
 class Judged:
     """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth.
 
-    ``openness`` of the curves between its slip angles, over what is allowed (`screen`).
+    ``openness`` of the curves between its slip angles, over what is allowed (`screen`); ``demanded``
+    is whether anything was asked of it.
     """
 
     design: Design
@@ -166,11 +167,12 @@ class Judged:
     minutes: float
     excess: float = 0.0
     openness: float = 0.0
+    demanded: bool = True
 
     @property
     def worst(self) -> float:
         """The largest of U over what was demanded; at most 1 where all demands are met."""
-        return max((reach.ratio for reach in self.reaches), default=math.inf)
+        return max((reach.ratio for reach in self.reaches), default=math.inf if self.demanded else 0.0)
 
     @property
     def feasible(self) -> bool:
@@ -220,6 +222,7 @@ class ProtocolSearch:
             design=design, reaches=self.question.reaches(design), minutes=self.tread.minutes(design),
             excess=self.exposure.excess(points),
             openness=openness(self._screens, points) if self._screens else 0.0,
+            demanded=bool(self.question.demands),
         )  # fmt: skip
 
     def best(self, size: int) -> Judged:
@@ -273,9 +276,12 @@ def least_plan(
     tread: Tread,
     *,
     minutes: float = math.inf,
+    beside: float = 0.0,
     tell: Callable[[str], None] = lambda _text: None,
 ) -> Judged:
     """Return the shortest design that meets every demand, or the nearest to it that the time allows.
+
+    ``minutes`` are those of settled steps; ``beside`` what else the test takes of its time, for the message.
 
     Further loads beside those that are asked for are tried, nearest first: by its neighbours a block is
     carried to the load that all blocks share. What is returned is not ``feasible`` where no design meets the
@@ -303,9 +309,9 @@ def least_plan(
             missed = nearest if nearer else missed
     if met is None and missed is None:
         raise ConfigError(
-            "no test fits into the time", where="--minutes", got=f"{minutes:g} min",
-            expected=f"{math.ceil(10 * shortest) / 10:g} min at least: {MIN_POINTS} slip angles, the fewest "
-            "of a curve",
+            "no test fits into the time", where="--minutes", got=f"{minutes + beside:g} min",
+            expected=f"{math.ceil(10 * (shortest + beside)) / 10:g} min at least: {MIN_POINTS} slip angles, "
+            f"the fewest of a curve{', and the sweeps' * (beside > 0)}",
             next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
         )  # fmt: skip
     return met or cast("Judged", missed)

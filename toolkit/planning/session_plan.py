@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.declared import Entry
 from toolkit.findings import Finding
 from toolkit.planning.check_loads import Verification, choose_check_loads
 from toolkit.planning.criteria import Criterion
@@ -29,11 +30,11 @@ _LARGE = 0.5  # of one repeatability: an answer to drift or creep that a reader 
 class PlannedLoad:
     """A row: its run, mount, what hangs there, the loads in the record's order and units."""
 
-    run: int
-    mount: str
-    label: str
-    direction: str
-    loads: tuple[float, ...]
+    run: Annotated[int, Entry("from 1; check loads stand in the run after the last")]
+    mount: Annotated[str, Entry("what is mounted; empty without fixtures")]
+    label: Annotated[str, Entry("what hangs there")]
+    direction: Annotated[str, Entry("up: reached from below; down: from above")]
+    loads: Annotated[tuple[float, ...], Entry("in the record's order and units")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,44 +49,50 @@ class Outlook:
     what one repeatability of each makes of the load. All in ``unit``.
     """
 
-    load: str
-    unit: str
-    at: float
-    U_today: float
-    U_repeated: float
-    U_asked: float | None
-    U_expected: float
-    U: float
-    U_in_nine_of_ten: float
-    share: float | None
-    floor: float
-    visible_misfit: float | None
-    drift: float
-    creep: float
+    load: Annotated[str, Entry("symbol of the load")]
+    unit: Annotated[str, Entry("of every number of it")]
+    at: Annotated[float, Entry("the largest load")]
+    U_today: Annotated[float, Entry("by the record")]
+    U_repeated: Annotated[float, Entry("expected of the last session's own loads another time")]
+    U_asked: Annotated[float | None, Entry("demanded; null where nothing is")]
+    U_expected: Annotated[
+        float, Entry("by the plan where runs differ as the record says: what sessions have on average")
+    ]
+    U: Annotated[
+        float, Entry("by the plan where they differ by a standard error more: by it the demand is kept")
+    ]
+    U_in_nine_of_ten: Annotated[float, Entry("no more in nine of ten sessions")]
+    share: Annotated[float | None, Entry("of simulated sessions that reach what was asked; null without")]
+    floor: Annotated[float, Entry("of U, which no more rows lower")]
+    visible_misfit: Annotated[
+        float | None, Entry("of the equation that four of five sessions would show; null where none is seen")
+    ]
+    drift: Annotated[float, Entry("of the load by a drift of one repeatability over each run")]
+    creep: Annotated[float, Entry("of the load by a creep of one repeatability after the largest load")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SessionPlan:
     """A planned session: rows in their order, check loads after them, and what it is expected to give."""
 
-    record: str
-    instrument: str
-    source: str
-    criterion: Criterion
-    criterion_value: float
-    runs: int
-    rows: tuple[PlannedLoad, ...]
-    check: tuple[PlannedLoad, ...]
-    outlook: tuple[Outlook, ...]
-    verification: tuple[Verification, ...]
-    minutes: float | None
-    rows_today: int
-    check_today: int
-    replicates: int
-    simulated: int
-    assumptions: tuple[str, ...]
-    gives_up: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    record: Annotated[str, Entry("id of the record that the plan goes by")]
+    instrument: Annotated[str, Entry("its name")]
+    source: Annotated[str, Entry("what the feasible loads are taken from")]
+    criterion: Annotated[Criterion, Entry("of which the loads are optimal")]
+    criterion_value: Annotated[float, Entry("what it comes to")]
+    runs: Annotated[int, Entry("without the check loads")]
+    rows: Annotated[tuple[PlannedLoad, ...], Entry("in their order")]
+    check: Annotated[tuple[PlannedLoad, ...], Entry("check loads, after the runs")]
+    outlook: Annotated[tuple[Outlook, ...], Entry("what is expected of each load")]
+    verification: Annotated[tuple[Verification, ...], Entry("what the check loads show of each term")]
+    minutes: Annotated[float | None, Entry("time of all; null where nobody states times")]
+    rows_today: Annotated[int, Entry("of the record's session")]
+    check_today: Annotated[int, Entry("check loads of that session")]
+    replicates: Annotated[int, Entry("rows that repeat another of the plan")]
+    simulated: Annotated[int, Entry("sessions behind the shares")]
+    assumptions: Annotated[tuple[str, ...], Entry("what the plan rests on")]
+    gives_up: Annotated[tuple[str, ...], Entry("what the last session had and the plan has not")]
+    findings: Annotated[tuple[Finding, ...], Entry("on the record and the plan")]
 
 
 def plan_session(knowledge: Knowledge, feasible: FeasibleLoads, demand: Demand) -> SessionPlan:

@@ -168,6 +168,11 @@ class StatedTest:
         tuple[tuple[str, Rotation], ...], Keyed(),
         Entry("direction by recording, where it is another one", example={"run 2.xlsx": "reverse"}),
     ] = ()  # fmt: skip
+    sweeps: Annotated[
+        tuple[tuple[str, float], ...], Keyed(), Unit("km/h"), Above(0),
+        Entry("recordings in which the slip angle is steered in time, with the surface speed of each",
+              example={"sweep 1.xlsx": {"value": 4, "unit": "km/h"}}),
+    ] = ()  # fmt: skip
     tare: Annotated[Tare | None, Entry("the unloaded cells")] = None
     report: Annotated[ReportDetails | None, Entry("what the report says beyond the measurement")] = None
 
@@ -177,6 +182,7 @@ class TestFolder:
     """A test as it lies on the disk.
 
     ``files``: the recordings, sorted by their path, without the tare's. ``rotations``: direction by file;
+    ``sweeps``: surface speed [m/s] by file of those in which the slip angle is steered in time;
     ``tare_values``: (indication, value, unit), in the machine's unit; ``protocol`` that of the test's own
     file, None where the machine's applies.
     """
@@ -191,6 +197,7 @@ class TestFolder:
     tare_file: Path | None
     tare_values: tuple[tuple[str, float, str], ...]
     protocol: Protocol | None = None
+    sweeps: tuple[tuple[Path, float], ...] = ()
 
     def rotation_of(self, path: Path) -> Rotation:
         """Return the direction of the drum in a file: its own, else that of the test."""
@@ -278,6 +285,10 @@ def read_test_folder(folder: Path) -> TestFolder:
         tare_file=tare_file,
         tare_values=tare_values,
         protocol=None if plan is None else read_protocol(plan),
+        sweeps=tuple(
+            (_named_file(name, ("sweeps", name), folder, files, source), float(speed))
+            for name, speed in entries.sweeps
+        ),
     )
 
 

@@ -151,7 +151,7 @@ def _file(
     tare: Signals,
 ) -> tuple[VirtualFile, Before]:
     rng = np.random.default_rng([plan.seed, number])
-    if plan.record == "dwell":
+    if plan.record == "dwell" and not run.sweep:
         line = timeline.dwell(plan, run, rng, np.random.default_rng([plan.seed, number, _BETWEEN]))
     else:
         line = timeline.continuous(plan, run, rng)

@@ -74,6 +74,9 @@ class RunSteps:
         float | None, Unit("N/s"), Above(0), Entry("default: the plan's", key="load_rate")
     ] = None
     dwell_s: _Dwell = None
+    sweep: Annotated[
+        bool, Entry("steered in time and recorded with every row, whatever the plan's other recordings hold")
+    ] = False
     times: Annotated[int, AtLeast(1), AtMost(1000), Entry("recordings of this kind, one after another")] = 1
     extra: Annotated[
         tuple[tuple[str, str], ...], Keyed(), Text(empty=True, numbers="int"),

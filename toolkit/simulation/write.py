@@ -31,6 +31,7 @@ from toolkit.simulation.session import (
     reference_sd,
     shunt_step,
 )
+from toolkit.simulation.steps import machine_speed
 from toolkit.simulation.truth import truth_document
 from toolkit.staging import PASSING
 from toolkit.units import from_si, si_scale
@@ -105,7 +106,8 @@ def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
     check_folder(folder, set(names))
     with publication(folder) as stage:
         for file in test.files:
-            columns = file.columns if test.plan.record == "dwell" else file.columns | further(file.signals)
+            settled = test.plan.record == "dwell" and not file.run.sweep
+            columns = file.columns if settled else file.columns | further(file.signals)
             write_labview(stage / file.name, test.plan.machine, columns, simulated=True)
         (stage / TEST).write_text(test_toml(test), encoding="utf-8")
         if not _is_packaged(test.plan.machine):
@@ -126,7 +128,7 @@ def test_names(test: VirtualTest) -> tuple[str, ...]:
 def own_protocol(plan: Plan) -> Protocol | None:
     """Return the protocol of a plan with a slip angle or load that the machine's has not, else None."""
     times: Counter[tuple[str, float, float]] = Counter()
-    for run in plan.recordings:
+    for run in (run for run in plan.recordings if not run.sweep):
         times.update((run.rotation, angle, load) for angle, load in run.steps)
     angles = tuple(
         angle
@@ -203,6 +205,13 @@ def test_toml(test: VirtualTest) -> str:
             "",
             "[rotations]",
             *(f"{_text(name)} = {_text(rotation)}" for name, rotation in turned.items()),
+        ]
+    sweeps = {file.name: machine_speed(file.run, plan.machine) for file in test.files if file.run.sweep}
+    if sweeps:
+        lines += ["", "[sweeps]  # surface speed of the recordings that are steered in time"]
+        lines += [
+            f'{_text(name)} = {{ value = {round(float(from_si(speed, "km/h")), 6)!r}, unit = "km/h" }}'
+            for name, speed in sweeps.items()
         ]
     values = ", ".join(f"{name} = {value!r}" for name, value in test.tare)
     lines += [

@@ -36,6 +36,9 @@ SHEETS = (
     "raw",
 )
 
+SWEEPS = "sweeps"
+"""The sheet that only a test with recordings in time has."""
+
 LATER_SHEETS = ("at_angles", "points", "budgets")
 """What the files of the first builds, before 1.0.0, had not yet."""
 
@@ -112,7 +115,7 @@ def _parameters(fit: dict[str, Any] | None) -> Sequence[dict[str, Any]]:
     return () if fit is None else fit["parameters"]
 
 
-# The lists of the first files stand in their hash even where they are empty; later ones only with entries.
+# The lists of the first files stand in their hash even where they are empty; later ones only with a value.
 _FIRST_LISTS = ("stiffness", "pull", "at_angles")
 
 
@@ -123,6 +126,11 @@ def _characteristics(characteristics: Characteristics) -> dict[str, Any]:
         "fits": [dataclasses.asdict(fit) for fit in characteristics.fits],
         "findings": [dataclasses.asdict(finding) for finding in characteristics.findings],
         "points": [dataclasses.asdict(point) for point in characteristics.points],
+        **(
+            {SWEEPS: [dataclasses.asdict(s) for s in characteristics.sweeps]}
+            if characteristics.sweeps
+            else {}
+        ),
         "budgets": [
             {
                 "load_N": row.load_N,
@@ -140,6 +148,7 @@ def _characteristics(characteristics: Characteristics) -> dict[str, Any]:
                 for entry in entries
             ]
             for name, entries in lists.items()
-            if entries or name in _FIRST_LISTS
+            if name in _FIRST_LISTS
+            or any(isinstance(v, Estimate) for entry in entries for v in entry.values())
         },
     }

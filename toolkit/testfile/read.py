@@ -12,8 +12,9 @@ from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
 from toolkit.channels import Rotation
 from toolkit.characteristics.catalogue import by_name
 from toolkit.characteristics.characterise import lacking_row
-from toolkit.characteristics.groups import Direction, DirectionFit, group
+from toolkit.characteristics.groups import Direction, DirectionFit, group, sweeps_at
 from toolkit.characteristics.model import Characteristics, Point, Row, in_order
+from toolkit.characteristics.sweep_fit import SweepFit
 from toolkit.errors import RecordingError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level
@@ -29,6 +30,7 @@ from toolkit.testfile.layout import (
     LATER_SHEETS,
     SCHEMA,
     SHEETS,
+    SWEEPS,
     content_hash,
     header,
     number,
@@ -49,7 +51,7 @@ def read_test_file(path: Path) -> TestResult:
         (``older-test-file``), or was changed after it was written
     """
     book = _open(path)
-    names = [name for name in SHEETS if name in book.sheet_names and name != "raw"]
+    names = [name for name in (*SHEETS, SWEEPS) if name in book.sheet_names and name != "raw"]
     sheets = {name: _rows(book.get_sheet_by_name(name).to_python(skip_empty_area=False)) for name in names}
     items = {str(row.get("item")): row.get("value") for row in sheets.get("provenance", ())}
     lacking = [name for name in SHEETS if name not in book.sheet_names]
@@ -277,9 +279,15 @@ def _characteristics(sheets: dict[str, list[Cells]], reduced: ReducedTest) -> Ch
         for cells in described
         if cells["name"] == "group"
     )
-    groups = {(entry.load_N, entry.rotation): entry for entry in group(reduced)}
+    listed = group(reduced)
+    groups = {(entry.load_N, entry.rotation): entry for entry in listed}
+    sweeps = tuple(_sweep(cells) for cells in sheets.get(SWEEPS, ()))
     directions = [
-        Direction(group=groups[fit.load_N, fit.rotation], fit=fit)
+        Direction(
+            group=groups[fit.load_N, fit.rotation],
+            fit=fit,
+            sweeps=sweeps_at(groups[fit.load_N, fit.rotation], listed, sweeps),
+        )
         for fit in fitted
         if (fit.load_N, fit.rotation) in groups
     ]
@@ -302,7 +310,14 @@ def _characteristics(sheets: dict[str, list[Cells]], reduced: ReducedTest) -> Ch
             )
             for r in sheets["points"]
         ),
+        sweeps=sweeps,
     )
+
+
+def _sweep(cells: Cells) -> SweepFit:
+    hints = get_type_hints(SweepFit)
+    texts = {name: _as(hints[name], cells[name]) for name in hints}
+    return SweepFit(**(texts | {"file_sha256": str(cells["file_sha256"])}))
 
 
 _Budgets = dict[tuple[float, str, str], list[tuple[str, float]]]

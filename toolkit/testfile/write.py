@@ -22,12 +22,13 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from toolkit.characteristics.characteristic import BOTH
+from toolkit.characteristics.sweep_fit import SweepFit
 from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
 from toolkit.publication import write_result
 from toolkit.recording.cells import reference
 from toolkit.recording.marks import mark_workbook
-from toolkit.testfile.layout import CONDITION_FIELDS, HUB, KIND, SCHEMA, cell, content_hash, header
+from toolkit.testfile.layout import CONDITION_FIELDS, HUB, KIND, SCHEMA, SWEEPS, cell, content_hash, header
 from toolkit.testfile.readable import Sheet, Shown, readable_sheets
 
 if TYPE_CHECKING:
@@ -91,6 +92,7 @@ def _workbook(
         ("points", _points(result)),
         ("budgets", _budgets(result)),
         ("characteristic_findings", _findings(result.characteristics.findings)),
+        *([(SWEEPS, _sweeps(result))] if result.characteristics.sweeps else []),
         *_raw_sheets(recordings),
         ("provenance", _provenance(result, digest)),
     ):
@@ -318,6 +320,13 @@ def _budgets(result: TestResult) -> Rows:
         if row.SA_rad is None and row.estimate is not None:
             for source, u in row.sources or (("", None),):
                 yield (row.load_N, row.rotation, row.name, source, u, row.estimate.unit)
+
+
+def _sweeps(result: TestResult) -> Rows:
+    names = [field.name for field in dataclasses.fields(SweepFit)]
+    yield names
+    for sweep in result.characteristics.sweeps:
+        yield [getattr(sweep, name) for name in names]
 
 
 def _findings(findings: Sequence[Finding]) -> Rows:

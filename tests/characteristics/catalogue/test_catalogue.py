@@ -12,8 +12,10 @@ from typing import Any
 import openpyxl
 import pytest
 
+from tests.characteristics.sweep_factory import swept
 from tests.characteristics.tire_factory import LOAD, M15, reduced_test
 from tests.recipes import file_of
+from toolkit.channels import ROTATIONS
 from toolkit.characteristics.catalogue import (
     by_channel,
     characteristics,
@@ -29,6 +31,7 @@ from toolkit.characteristics.characteristic import (
     COLUMNS,
     CORRECTION,
     PRINTED,
+    TRANSIENT,
     Characteristic,
 )
 from toolkit.characteristics.groups import CHANNELS
@@ -92,7 +95,11 @@ def test_it_is_explained(declared: Characteristic, capsys: pytest.CaptureFixture
 
 @EACH
 def test_its_row_has_no_source_that_its_budget_does_not_name(declared: Characteristic) -> None:
-    found = characterise(reduced_test(u=(8.0, 0.3), pressure_Pa=234e3), machine=M15, record=None)
+    sweeps = [sweep for rotation in ROTATIONS for sweep in swept(0.5, rotation=rotation)]
+    found = characterise(
+        reduced_test(u=(8.0, 0.3), pressure_Pa=234e3), machine=M15, record=None,
+        sweeps=sweeps if declared.table == TRANSIENT else (),
+    )  # fmt: skip
     for row in found.of(declared.name):
         assert row.estimate is not None, row.lacking
         assert row.estimate.unit == declared.unit

@@ -7,13 +7,15 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from toolkit.declared.answers import merged
+from toolkit.declared import Entry
+from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.findings import FindingEntry
-from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
 
 if TYPE_CHECKING:
@@ -26,13 +28,15 @@ if TYPE_CHECKING:
     from toolkit.worker.posix import Limits
 
 
-class _RunFiles(_Sheet):
-    out: Path | None
-    files: list[Path]
-    findings: list[FindingEntry]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanNextAnswer(NextRunPlan):
+    """The run that parts a class, and what was written of it."""
 
-
-PlanNextAnswer = merged(NextRunPlan, _RunFiles)
+    out: Annotated[Path | None, Entry("folder of the plan's files; null where none was named")]
+    files: Annotated[tuple[str, ...], Entry("in that folder")] = ()
+    findings: Annotated[tuple[FindingEntry, ...], Entry("what is to be known of it")] = ()
+    document: SheetKey = None
+    timing: TimingKey = field(default_factory=untimed)
 
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
@@ -50,8 +54,8 @@ def plan_next(
     worker: Limits | None = None,
     template: Template | None = None,
     tell: Callable[[str], None] = lambda _text: None,
-) -> tuple[dict[str, Any], str]:
-    """Return the JSON answer and the text of the run that parts an answer's class; write its files.
+) -> tuple[PlanNextAnswer, str]:
+    """Return the answer and the text of the run that parts an answer's class; write its files.
 
     Parameters
     ----------
@@ -70,7 +74,6 @@ def plan_next(
     """
     from datetime import date
 
-    from toolkit.declared import answer
     from toolkit.diagnosis.answer.reader import read_answer
     from toolkit.diagnosis.case.reader import read_case
     from toolkit.diagnosis.fit.problem import problem_of
@@ -117,13 +120,14 @@ def plan_next(
     plan = _plan(
         read, diagnosis.effects, members, chosen, repeat, len(search.judged), time.monotonic() < ends
     )
-    payload: dict[str, Any] = answer(plan) | {"out": out, "files": [], "findings": []}
+    answer = extended(PlanNextAnswer, plan, out=out)
     if out is not None:
         figures = plots(problem, members, chosen)
         files = _files(problem, members, chosen, plan, figures)
         sheet = next_sheet(plan, figures, date.today())  # noqa: DTZ011
-        payload |= write_plan(files, out, sheet, template, payload) | {"files": list(files)}
-    return payload, plan_text(plan, payload["files"]) + sheet_text(payload)
+        written = write_plan(files, out, sheet, template, answer)
+        answer = dataclasses.replace(answer, document=written, files=tuple(files))
+    return answer, plan_text(plan, answer.files) + sheet_text(answer.document)
 
 
 def _case_of(file: Path) -> Path:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime as dt
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
 
-from toolkit.declared.answers import merged
+from toolkit.declared import Entry
+from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import findings_text, table
-from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.interval import IntervalPlan
 
 if TYPE_CHECKING:
@@ -21,17 +24,19 @@ if TYPE_CHECKING:
     from toolkit.report.word.package import Template
 
 
-class _IntervalKeys(_Sheet):
-    instrument: str
-    record: str
-    in_use: Annotated[str | None, "interval, as its approval states it"]
-    next: Annotated[str, "day of the next session"]
-    method_2_days: Annotated[int | None, "what drift alone recommends"]
-    assumptions: Annotated[list[str], "what it rests on"]
-    findings: list[FindingEntry]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanIntervalAnswer(IntervalPlan):
+    """The interval of an instrument, and what stands beside it."""
 
-
-PlanIntervalAnswer = merged(IntervalPlan, _IntervalKeys)
+    instrument: Annotated[str, Entry("its name")]
+    record: Annotated[str, Entry("id of the one in force")]
+    in_use: Annotated[str | None, Entry("interval, as its approval states it")]
+    next: Annotated[str, Entry("day of the next session")]
+    method_2_days: Annotated[int | None, Entry("what drift alone recommends")]
+    assumptions: Annotated[tuple[str, ...], Entry("what it rests on")]
+    findings: Annotated[tuple[FindingEntry, ...], Entry("on the interval")]
+    document: SheetKey = None
+    timing: TimingKey = field(default_factory=untimed)
 
 
 LEAST = 0.5
@@ -47,8 +52,8 @@ def interval_plan_answer(
     load: str | None,
     out: Path | None = None,
     template: Template | None = None,
-) -> tuple[dict[str, Any], str, list[Finding]]:
-    """Return the interval of an instrument as JSON and as text, with its findings; its sheet into ``out``.
+) -> tuple[PlanIntervalAnswer, str, list[Finding]]:
+    """Return the interval of an instrument as an answer and text, with its findings; its sheet into ``out``.
 
     Raises
     ------
@@ -58,7 +63,6 @@ def interval_plan_answer(
     """
     from toolkit.calibration.control.chart import control_chart
     from toolkit.calibration.control.recall import due_of
-    from toolkit.declared import answer
     from toolkit.lab.plans.plan_sheets import interval_sheet, sheet_text, write_plan
     from toolkit.planning.interval import ASSUMPTIONS, paths_of, plan_interval
 
@@ -76,16 +80,16 @@ def interval_plan_answer(
     if not plan.days:
         raise _infeasible(plan)
     findings = _findings(plan, instrument)
-    payload = answer(plan) | {
-        "instrument": instrument, "record": due.record, "in_use": due.recall,
-        "next": (due.session_date + dt.timedelta(days=plan.days)).isoformat(),
-        "method_2_days": due.recommendation.days, "assumptions": ASSUMPTIONS,
-        "findings": [finding.as_dict() for finding in findings],
-    }  # fmt: skip
+    answer = extended(
+        PlanIntervalAnswer, plan, instrument=instrument, record=due.record, in_use=due.recall,
+        next=(due.session_date + dt.timedelta(days=plan.days)).isoformat(),
+        method_2_days=due.recommendation.days, assumptions=ASSUMPTIONS,
+        findings=tuple(finding.as_dict() for finding in findings),
+    )  # fmt: skip
     if out is not None:
         sheet = interval_sheet(plan, instrument, due.record, findings, registry.today())
-        payload |= write_plan({}, out, sheet, template, payload)
-    return payload, _text(plan, payload, findings) + sheet_text(payload), findings
+        answer = dataclasses.replace(answer, document=write_plan({}, out, sheet, template, answer))
+    return answer, _text(answer, findings) + sheet_text(answer.document), findings
 
 
 def _infeasible(plan: IntervalPlan) -> ConfigError:
@@ -110,14 +114,14 @@ def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
     return []
 
 
-def _text(plan: IntervalPlan, payload: dict[str, Any], findings: list[Finding]) -> str:
+def _text(plan: PlanIntervalAnswer, findings: list[Finding]) -> str:
     from toolkit.planning.interval import ASSUMPTIONS
 
     lines = [
-        f"{payload['instrument']}: {plan.days} days, next by {payload['next']}",
+        f"{plan.instrument}: {plan.days} days, next by {plan.next}",
         f"at its end inside the tolerance with {100 * (1 - plan.chosen.beyond):.1f} %; asked for: "
-        f"{100 * plan.reliability:g} %; in use: {payload['in_use'] or 'none'}; ILAC-G24 method 2: "
-        f"{payload['method_2_days'] or '-'} days",
+        f"{100 * plan.reliability:g} %; in use: {plan.in_use or 'none'}; ILAC-G24 method 2: "
+        f"{plan.method_2_days or '-'} days",
         f"{plan.limiting} drifts most, by {plan.readings} readings ({plan.paths} check loads and loads): "
         f"{plan.trend_per_year:+.2g} tolerances a year, random walk {plan.walk_per_root_year:.2g} in a year",
         "",

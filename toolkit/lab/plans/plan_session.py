@@ -8,14 +8,15 @@ import io
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
 
-from toolkit.declared.answers import merged
+from toolkit.declared import Entry
+from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.files import reads_as_number
 from toolkit.lab.answers import findings_text, one_line, table
-from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.session_plan import SessionPlan
 
 if TYPE_CHECKING:
@@ -32,12 +33,14 @@ if TYPE_CHECKING:
     from toolkit.report.word.package import Template
 
 
-class _SessionFiles(_Sheet):
-    fixtures_refused: Annotated[Any, "fixtures that cannot be used, and why"]
-    files: list[str]
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanSessionAnswer(SessionPlan):
+    """The plan of a session, and what was written of it."""
 
-
-PlanSessionAnswer = merged(SessionPlan, _SessionFiles)
+    fixtures_refused: Annotated[int, Entry("loads of the fixtures that are beyond a limit")]
+    files: Annotated[tuple[str, ...], Entry("that were written")] = ()
+    document: SheetKey = None
+    timing: TimingKey = field(default_factory=untimed)
 
 
 FILES = (
@@ -79,15 +82,14 @@ class PlanOrder:
     template: Template | None = None
 
 
-def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str, Any], str, list[Finding]]:
-    """Return a plan as JSON and as text, with its findings; the files of ``order.out`` are written.
+def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[PlanSessionAnswer, str, list[Finding]]:
+    """Return a plan as an answer and as text, with its findings; the files of ``order.out`` are written.
 
     Raises
     ------
     ToolkitError
         nothing applies, fixtures or demands cannot be used, no plan keeps them; nothing is written
     """
-    from toolkit.declared import answer
     from toolkit.lab.plans.plan_sheets import session_sheet, sheet_text, write_plan
     from toolkit.planning.knowledge import Knowledge
     from toolkit.planning.session_plan import plan_session
@@ -108,15 +110,16 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[dict[str,
     plan = plan_session(Knowledge.of(record, loads, check), feasible, demand)
     plan = dataclasses.replace(plan, findings=(*notes, *plan.findings))
     people = plan_text(plan, record)
-    payload = answer(plan) | {"fixtures_refused": feasible.refused, "files": []}
+    answer = extended(PlanSessionAnswer, plan, fixtures_refused=feasible.refused)
     if order.out is not None:
         files = _files(plan, record, text, people)
         sheet = session_sheet(plan, record, order.known_at or registry.today())
-        payload |= write_plan(files, order.out, sheet, order.template, payload)
-        payload["files"] = [str(order.out / name) for name in files]
-        people += "\n\n" + "\n".join(f"written: {one_line(path)}" for path in payload["files"])
-        people += sheet_text(payload)
-    return payload, people, list(plan.findings)
+        written = write_plan(files, order.out, sheet, order.template, answer)
+        paths = tuple(str(order.out / name) for name in files)
+        answer = dataclasses.replace(answer, document=written, files=paths)
+        people += "\n\n" + "\n".join(f"written: {one_line(path)}" for path in paths)
+        people += sheet_text(written)
+    return answer, people, list(plan.findings)
 
 
 def _feasible(

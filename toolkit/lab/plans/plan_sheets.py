@@ -5,12 +5,14 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NotRequired
+from typing import TYPE_CHECKING, Annotated
 
+from toolkit.declared import Entry
 from toolkit.estimate import round_uncertainty
-from toolkit.lab.answers import DeliveredDocument, Timed
+from toolkit.lab.answers import DeliveredDocument, Timing
 from toolkit.lab.home import PLAN
 from toolkit.planning.printed_units import title_of
+from toolkit.planning.sweep_plan import sweep_lines
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step
 
@@ -27,13 +29,20 @@ if TYPE_CHECKING:
     from toolkit.report.word.package import Template
 
 
-class _Sheet(Timed):
-    document: NotRequired[DeliveredDocument]
+SheetKey = Annotated[
+    DeliveredDocument | None, Entry("the plan's sheet, where a template was named", sparse=True)
+]
+TimingKey = Annotated[Timing, Entry("of the command")]
+
+
+def untimed() -> Timing:
+    """Return the time of an answer that is still on its way."""
+    return {"seconds": 0.0}
 
 
 DOCUMENT = "plan"
 """The name of the sheet's two files."""
-_WHERE = ("out", "files")  # of an answer: what was written, not what was planned
+_WHERE = ("out", "files", "timing")  # of an answer: what was written and how fast, not what was planned
 
 
 def write_plan(
@@ -41,33 +50,33 @@ def write_plan(
     out: Path,
     sheet: PlanSheet,
     template: Template | None,
-    answer: Mapping[str, Any],
-) -> dict[str, Any]:
+    planned: object,
+) -> DeliveredDocument | None:
     """Write a plan's files, its answer and, by a template, its sheet, all or none.
 
-    Returns what the answer says of the sheet. ``answer`` is written as ``plan.json``, with the kind of plan.
+    Returns what the answer says of the sheet. ``planned``, a declared answer, is written as ``plan.json``,
+    with the kind of plan.
     """
-    from toolkit.declared import json_value
+    from toolkit.declared import answer
     from toolkit.lab.answers import delivered_keys
     from toolkit.publication import publication
     from toolkit.report.deliver import deliver
     from toolkit.report.plan.content import build_plan_content
     from toolkit.report.style import read_style, style_file
 
-    stated = {key: json_value(value) for key, value in answer.items() if key not in _WHERE}
+    stated = {key: value for key, value in answer(planned).items() if key not in _WHERE}
     kept = json.dumps(stated | {"kind": sheet.kind}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
     with publication(out) as stage:
         for name, data in {**files, PLAN: kept}.items():
             (stage / name).write_bytes(data if isinstance(data, bytes) else data.encode())
         if template is None:
-            return {}
+            return None
         content = build_plan_content(sheet, read_style(style_file(template.path)))
-        return {"document": delivered_keys(deliver(template, content, out, name=DOCUMENT, stage=stage))}
+        return delivered_keys(deliver(template, content, out, name=DOCUMENT, stage=stage))
 
 
-def sheet_text(payload: Mapping[str, Any]) -> str:
+def sheet_text(document: DeliveredDocument | None) -> str:
     """Return what people are told of a delivered sheet; nothing where there is none."""
-    document = payload.get("document")
     if document is None:
         return ""
     lines = ["", f"written: {document['docx']}", f"written: {document['pdf']}"]
@@ -134,6 +143,10 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
     loads = f"{', '.join(f'{size:.0f}' for size in sizes)} {force}"
     record = "" if plan.calibration is None else f", {plan.calibration}"
 
+    recordings = 0 if plan.sweeps is None else len(plan.sweeps.recordings)
+    swept = f" and {recordings} sweeps" if recordings else ""
+    minutes = design.minutes + (0.0 if plan.sweeps is None else plan.sweeps.minutes)
+
     def wait(pause: float) -> str:
         return f"pause of {pause:.0f} s, " if pause > max(own.pauses_s) else ""
 
@@ -141,8 +154,8 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
         kind="test",
         subject=plan.machine,
         basis=f"{plan.like}{record}",
-        size=f"{design.rows} rows in {design.minutes:.1f} minutes",
-        summary=f"{design.rows} rows in place of {own.rows} of the machine's protocol, {design.minutes:.1f} "
+        size=f"{design.rows} rows{swept} in {minutes:.1f} minutes",
+        summary=f"{design.rows} rows{swept} in place of {own.rows} of the machine's protocol, {minutes:.1f} "
         f"minutes in place of {own.minutes:.1f}.",
         issued=issued,
         uncertainties=tuple(
@@ -152,9 +165,24 @@ def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> 
             Step(run=rotation, action=f"{wait(pause)}slip angle {angle:g} deg", applied=loads)
             for rotation in design.rotations
             for angle, pause in zip(design.slip_angles_deg, design.pauses_s, strict=True)
-        ),
+        )
+        + _sweep_steps(plan, units),
         assumptions=plan.assumptions,
         gives_up=plan.gives_up,
+    )  # fmt: skip
+
+
+def _sweep_steps(plan: ProtocolPlan, units: PrintedUnits) -> tuple[Step, ...]:
+    """Return a step for each recording in time."""
+    if plan.sweeps is None:
+        return ()
+    return tuple(
+        Step(
+            run=sweep.rotation, action=f"sweep in time: {line}",
+            applied=", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in sweep.loads_N) + " "
+            + _dotted(units.force),
+        )
+        for sweep, line in zip(plan.sweeps.recordings, sweep_lines(plan.sweeps), strict=True)
     )  # fmt: skip
 
 

@@ -7,15 +7,16 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from toolkit.declared.answers import merged
+from toolkit.declared import Entry
+from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.findings import FindingEntry
-from toolkit.lab.plans.plan_sheets import _Sheet
+from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.protocol_plan import ProtocolPlan
 
 if TYPE_CHECKING:
@@ -28,13 +29,15 @@ if TYPE_CHECKING:
     from toolkit.simulation.plan import Plan
 
 
-class _ProtocolFiles(_Sheet):
-    out: Path | None
-    files: Annotated[Mapping[str, Path], "by what they are for"]
-    findings: list[FindingEntry]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanTestAnswer(ProtocolPlan):
+    """The plan of a test, and what was written of it."""
 
-
-PlanTestAnswer = merged(ProtocolPlan, _ProtocolFiles)
+    out: Annotated[Path | None, Entry("folder of the plan's files; null where none was named")]
+    files: Annotated[Mapping[str, str], Entry("by what they are for")]
+    findings: Annotated[tuple[FindingEntry, ...], Entry("what is to be known of it")] = ()
+    document: SheetKey = None
+    timing: TimingKey = field(default_factory=untimed)
 
 
 PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
@@ -71,8 +74,8 @@ def plan_test(
     *,
     template: Template | None = None,
     tell: Callable[[str], None] = lambda _text: None,
-) -> tuple[dict[str, Any], str]:
-    """Return the JSON answer of a plan and its text; write the files of a plan into ``out``, its
+) -> tuple[PlanTestAnswer, str]:
+    """Return the answer of a plan and its text; write the files of a plan into ``out``, its
     sheet by a template too.
 
     Raises
@@ -83,7 +86,6 @@ def plan_test(
     """
     from datetime import date
 
-    from toolkit.declared import answer
     from toolkit.lab.plans.plan_sheets import protocol_sheet, sheet_text, write_plan
     from toolkit.machine import load_machine
     from toolkit.planning.demands import parse_demand
@@ -111,13 +113,14 @@ def plan_test(
     )  # fmt: skip
     if not plan.feasible:
         raise _beyond(plan, order) or _infeasible(plan, order.minutes)
-    payload: dict[str, Any] = answer(plan) | {"out": out, "files": {}, "findings": []}
+    answer = extended(PlanTestAnswer, plan, out=out, files={})
     units = units_of(own.protocol)
     if out is not None:
-        payload["files"] = {"protocol": PROTOCOL, "simulation": SIMULATION}
+        answer = dataclasses.replace(answer, files={"protocol": PROTOCOL, "simulation": SIMULATION})
         sheet = protocol_sheet(plan, date.today(), units)  # noqa: DTZ011
-        payload |= write_plan(_files(plan, own, tire, out), out, sheet, template, payload)
-    return payload, plan_text(plan, payload["files"], units) + sheet_text(payload)
+        written = write_plan(_files(plan, own, tire, out), out, sheet, template, answer)
+        answer = dataclasses.replace(answer, document=written)
+    return answer, plan_text(plan, answer.files, units) + sheet_text(answer.document)
 
 
 def _refuse_doubled(labels: Sequence[str], where: str, what: str) -> None:
@@ -347,6 +350,7 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
             next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
         )  # fmt: skip
     angles = ", ".join(f"{angle:g}" for angle in sorted(plan.plan.slip_angles_deg))
+    swept = "" if plan.sweeps is None else f" and {len(plan.sweeps.recordings)} sweeps"
     return ConfigError(
         f"no test{limit} reaches what is demanded", where="--u",
         got="; ".join(
@@ -356,7 +360,7 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
         expected=f"at least: {'; '.join(nearest)}",
         next_step=f"demand what is feasible{', or allow more time' * (limit != '')}; the nearest plan has "
         f"slip angles {angles} deg at {len(plan.plan.loads_N)} loads: {plan.plan.rows} rows in "
-        f"{plan.plan.minutes:.1f} min",
+        f"{plan.plan.minutes:.1f} min{swept}",
         rule="plan-infeasible",
     )  # fmt: skip
 
@@ -380,7 +384,20 @@ def _files(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> di
     }
 
 
-def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) -> str:
+def _sweeps(plan: ProtocolPlan, units: PrintedUnits) -> list[str]:
+    from toolkit.planning.sweep_plan import sweep_lines
+
+    if plan.sweeps is None:
+        return []
+    loads = ", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in plan.sweeps.recordings[0].loads_N)
+    return [
+        f"and {len(plan.sweeps.recordings)} recordings in time in {plan.sweeps.minutes:.1f} min, each at "
+        f"{loads} {units.force}:",
+        *(f"  sweep        {line}" for line in sweep_lines(plan.sweeps)),
+    ]
+
+
+def plan_text(plan: ProtocolPlan, files: Mapping[str, str], units: PrintedUnits) -> str:
     """Return a plan for people: what to measure, what it reaches, what it rests on and gives up."""
     from toolkit.estimate import plus_minus, round_uncertainty
     from toolkit.lab.answers import table
@@ -401,6 +418,9 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
             U(value.same_time_U),
         ]  # fmt: skip
 
+    swept = plan.sweeps
+    slides = design.sliding_kJ + (0.0 if swept is None else swept.sliding_kJ)
+    warms = max(design.rise_K, 0.0 if swept is None else swept.rise_K)
     rows = [row(value) for value in plan.values]
     head = [
         "",
@@ -422,6 +442,7 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
         f"  slip angles  {', '.join(f'{angle:g}' for angle in design.slip_angles_deg)} deg, in this order",
         f"  loads        {', '.join(f'{load:.0f}' for load in loads)} {units.force}",
         *pauses,
+        *_sweeps(plan, units),
         f"  like         {plan.like}"
         + (f", record {plan.calibration}" if plan.calibration is not None else ""),
         *(f"  tire {place}       {name}" for place, name in enumerate(plan.tires, start=1) if several),
@@ -429,10 +450,13 @@ def plan_text(plan: ProtocolPlan, files: dict[str, str], units: PrintedUnits) ->
         table(head, rows, align="<" + ">" * (len(head) - 1)),
         "",
         f"protocol of {plan.machine}: {own.rows} rows in {own.minutes:.1f} min",
-        f"tread: {design.sliding_kJ:.0f} kJ slide away, by the protocol {own.sliding_kJ:.0f} kJ; a recording "
-        f"warms it by {design.rise_K:.1f} K at most",
+        f"tread: {slides:.0f} kJ slide away, by the protocol {own.sliding_kJ:.0f} kJ; a recording "
+        f"warms it by {warms:.1f} K at most",
     ]
-    if plan.alike is not None:
+    settled = any(value.protocol_U is not None for value in plan.values)
+    if not settled:
+        lines.append("it gives none of what is demanded")
+    elif plan.alike is not None:
         lines.append(
             f"its uncertainties, within 5 %, in {plan.alike.rows} rows and {plan.alike.minutes:.1f} min "
             f"({100 * plan.alike.rows / own.rows:.0f} % of the rows)"

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NotRequired, TypedDic
 
 from toolkit.calibration.records.use import UsedRecord
 from toolkit.channels import CHANNELS
-from toolkit.characteristics.characteristic import BOTH
+from toolkit.characteristics.characteristic import BOTH, TRANSIENT
 from toolkit.declared.answers import entry_of
 from toolkit.estimate import plus_minus
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import (
     DraftKeys,
+    EstimateEntry,
     Timing,
     draft_keys,
     estimate_keys,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from toolkit.characteristics.model import Point
+    from toolkit.characteristics.sweep_fit import SweepFit
     from toolkit.estimate import Estimate
     from toolkit.lab.tire_tests.resolve import Resolved
     from toolkit.reduction.model import Condition as ReducedCondition
@@ -95,6 +97,23 @@ class Condition(TypedDict):
     hub: NotRequired[Annotated[Mapping[str, HubValue], "loads of the hub by symbol, where it has any"]]
 
 
+class SweptLoad(TypedDict):
+    """What a recording in time says at one load: by what distance FY lags the slip angle, delays among it."""
+
+    file: Annotated[str, "recording"]
+    rotation: Annotated[str, "forward or reverse"]
+    rows: Annotated[list[int], "first and last row, from 1 at the first row of data"]
+    FZ_N: Annotated[float, "mean load"]
+    speed_m_s: Annotated[float, "mean speed of the road"]
+    steer_rate_rad_s: Annotated[float, "rate at which the slip angle is steered"]
+    apparent_length: Annotated[
+        EstimateEntry, "relaxation length and V times the delay of FY, which one speed does not part"
+    ]
+    u_form_m: Annotated[float, "standard uncertainty by the form of the tire's answer, not among its u"]
+    delay_s: Annotated[float | None, "of FY behind the slip angle, as the machine states it"]
+    u_delay_s: Annotated[float | None, "its standard uncertainty"]
+
+
 class ReducedTest(DraftKeys):
     """A reduced test: conditions, characteristics with their budgets, findings."""
 
@@ -114,6 +133,7 @@ class ReducedTest(DraftKeys):
         "lists by the catalogue's tables (characteristics.md): load_N, rotation and SA_rad where the list "
         "has them, then each characteristic as value with uncertainty, or null; and budgets, as below",
     ]
+    sweeps: Annotated[list[SweptLoad], "recordings in time, at each load"]
     impossible: Annotated[list[FindingEntry], "values that no tire has"]
     findings: list[FindingEntry]
 
@@ -172,9 +192,22 @@ def process_payload(resolved: Resolved) -> ReducedTest:
                 if row.estimate is not None and row.SA_rad is None
             ],
         },
+        "sweeps": [_swept(sweep) for sweep in characteristics.sweeps],
         "impossible": [finding.as_dict() for finding in reduced.impossible],
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
+
+
+def _swept(sweep: SweepFit) -> SweptLoad:
+    from toolkit.estimate import Estimate
+
+    apparent = Estimate(value=sweep.length_m, u=sweep.u_m, unit="m", dof=sweep.dof)
+    return {
+        "file": sweep.file, "rotation": sweep.rotation, "rows": [sweep.first_row, sweep.last_row],
+        "FZ_N": sweep.load_N, "speed_m_s": sweep.speed_m_s, "steer_rate_rad_s": sweep.steer_rate_rad_s,
+        "apparent_length": estimate_keys(apparent), "u_form_m": sweep.form_m,
+        "delay_s": sweep.delay_s, "u_delay_s": sweep.delay_u_s,
+    }  # fmt: skip
 
 
 def _condition(c: ReducedCondition, point: Point | None) -> Condition:
@@ -252,9 +285,14 @@ def _characteristics_table(resolved: Resolved, style: Style) -> str:
     from toolkit.characteristics.catalogue import columns, tables
     from toolkit.units import from_si
 
-    printed = [one for table in tables() for one in columns(table) if one.console_heading is not None]
-    units = {characteristic.name: style.unit(characteristic.printed_unit) for characteristic in printed}
     characteristics = resolved.result.characteristics
+    printed = [
+        one
+        for wide in tables()
+        for one in columns(wide)
+        if one.console_heading is not None and (characteristics.sweeps or wide != TRANSIENT)
+    ]
+    units = {characteristic.name: style.unit(characteristic.printed_unit) for characteristic in printed}
     lines = []
     for load in characteristics.loads_N:
         rotations = {row.rotation for row in characteristics.rows if row.load_N == load}
