@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 from scipy.integrate import solve_ivp
 
 from tests.diagnosis.cases import write_case
@@ -128,11 +129,19 @@ def test_what_the_form_of_a_drag_may_leave_is_dropped_beside_it(tmp_path: Path) 
 
 
 def test_an_effect_stays_where_the_likelihood_falls_without_it_whatever_the_curvature(tmp_path: Path) -> None:
-    problem, _ = coasting(tmp_path)
+    problem, _ = coasting(tmp_path, wave=0.05)
     made, unseen, _, steps = fitted(
-        problem, quadratic_drag={"drag": 0.0022}, viscous_damping={"viscous": 1e-3}
+        problem,
+        quadratic_drag={"drag": 0.0022},
+        periodic_ripple={"amplitude": 0.05, "period": 160 * np.pi, "phase": 0.0},
     )
     folds = folds_of(problem, made)
     wide = replace(made, covariance=made.covariance * 1e9)
-    _, _, kept = search._told_from_none(problem, folds, wide, unseen, steps)
-    assert "quadratic_drag" in names(kept)
+    told, _, kept = search._told_from_none(problem, folds, wide, unseen, steps)
+    assert names(kept) == ["periodic_ripple", "quadratic_drag"]
+    # Its standard deviation is the one at which a normal likelihood falls as far from the size to none.
+    drag = next(step for step in kept if step.active.effect.name == "quadratic_drag").active.values["drag"]
+    bare = fit(problem, search.without(made.active, made.active[0]), start=made.p)
+    lost = made.log_posterior - bare.log_posterior
+    at = len(problem.free)
+    assert 0.5 * drag**2 / told.covariance[at, at] == pytest.approx(lost, rel=1e-6)

@@ -368,7 +368,8 @@ def _told_from_none(
     """Return a hypothesis without effects of one size that the others leave open: it may be none.
 
     The curvature of a fit says where to ask, and the fit without it decides: where friction holds, slides or
-    stops, an interval of the curvature reaches to zero for an effect without which nothing is foretold.
+    stops, an interval of the curvature reaches to zero for an effect without which nothing is foretold. Then
+    the likelihood's own chord from there to none is the size's standard deviation (profile likelihood).
     """
     from scipy.stats import norm
 
@@ -391,7 +392,11 @@ def _told_from_none(
             scores = hold_out(problem, folds, bare.active, bare)
         except FitError:  # the simulation needs it
             continue
-        if base.log_posterior - bare.log_posterior > reach**2 / 2:  # the likelihood ratio of its interval
+        lost = base.log_posterior - bare.log_posterior
+        if lost > reach**2 / 2:  # the likelihood ratio of its interval
+            scale = np.ones(len(base.covariance))
+            scale[own + i] = abs(applied.values[size.name] - (size.off or 0.0)) / math.sqrt(2 * lost) / sd
+            base = replace(base, covariance=base.covariance * np.outer(scale, scale))
             continue
         return _told_from_none(problem, folds, bare, scores, listed)
     return base, held_base, steps
