@@ -140,7 +140,7 @@ def test_an_effect_stays_where_the_likelihood_falls_without_it_whatever_the_curv
     told, _, kept = search._told_from_none(problem, folds, wide, unseen, steps)
     assert names(kept) == ["periodic_ripple", "quadratic_drag"]
     # Its standard deviation is the one at which a normal likelihood falls as far from the size to none.
-    drag = next(step for step in kept if step.active.effect.name == "quadratic_drag").active.values["drag"]
+    drag = dict(made.active[0].values)["drag"]
     bare = fit(problem, search.without(made.active, made.active[0]), start=made.p)
     lost = made.log_posterior - bare.log_posterior
     at = len(problem.free)

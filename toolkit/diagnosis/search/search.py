@@ -389,7 +389,6 @@ def _told_from_none(
             continue
         try:
             bare = fit(problem, without(base.active, applied), start=base.p)
-            scores = hold_out(problem, folds, bare.active, bare)
         except FitError:  # the simulation needs it
             continue
         lost = base.log_posterior - bare.log_posterior
@@ -397,6 +396,10 @@ def _told_from_none(
             scale = np.ones(len(base.covariance))
             scale[own + i] = abs(applied.values[size.name] - (size.off or 0.0)) / math.sqrt(2 * lost) / sd
             base = replace(base, covariance=base.covariance * np.outer(scale, scale))
+            continue
+        try:
+            scores = hold_out(problem, folds, bare.active, bare)
+        except FitError:  # so does a part of it
             continue
         return _told_from_none(problem, folds, bare, scores, listed)
     return base, held_base, steps
