@@ -25,6 +25,7 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.folds import HeldOut
+    from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.forward_step import Step
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
@@ -49,7 +50,7 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
     beside_laws = laws.held_out if predicting else search.held_augmented
     if alone.held_out.total - beside_laws.total < -STEP.least_gain:
         return search, laws
-    if _same(search, alone):
+    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
         return search, laws
     bare = replace(
         search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
@@ -67,9 +68,13 @@ def _leaves_process_noise(search: Search) -> bool:
     return any(part.process_sd > part.sensor_sd for part in parts)
 
 
-def _same(search: Search, alone: Laws) -> bool:
-    """Tell whether the effects take nearly all that the laws take: these are then their own formulas."""
-    problem = search.problem
+def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> bool:
+    """Tell whether effects take nearly all that laws in their place take: these are then their own formulas.
+
+    Parameters
+    ----------
+    without, named, laws : unseen rows with neither, with the effects, and with the laws in their place
+    """
 
     def error(held_out: HeldOut, name: str) -> float:
         counted = problem.kept[name]
@@ -77,10 +82,9 @@ def _same(search: Search, alone: Laws) -> bool:
 
     outputs = [name for name in problem.names if problem.kept[name].any()]
     taken = [
-        (error(search.held_refitted, name) - error(search.held_augmented, name),
-         error(search.held_refitted, name) - error(alone.held_out, name))
+        (error(without, name) - error(named, name), error(without, name) - error(laws, name))
         for name in outputs
-    ]  # fmt: skip
+    ]
     return all(by_effects >= LAWS.same * by_laws for by_effects, by_laws in taken)
 
 
@@ -92,7 +96,9 @@ def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[
     """Return a search and its laws without the effects that the laws made superfluous.
 
     Part of a law's answer looks like this effect or that one, and the search has only effects to name. One is
-    dropped where the held-out score of the laws beside refitted parameters is as good without it.
+    dropped where the held-out score of the laws beside refitted parameters is as good without it. One that
+    takes nearly all that the laws take in its place keeps its name: they mend its form (a leak of the load
+    into a force, before or after the filter).
     """
     if not any(law.predicts for law in laws.listed):
         return search, laws
@@ -137,6 +143,8 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
         else:
             augmented, held_out = search.refitted, search.held_refitted
     except FitError:
+        return None
+    if _same(problem, held_out, search.held_augmented, scores):
         return None
     values = {applied.key: applied for applied in (*bare.active, *augmented.active)}
     searched = replace(

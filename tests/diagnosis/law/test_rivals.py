@@ -1,0 +1,24 @@
+"""A law beside an effect: what has a name keeps it where the law only mends its form."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.golden.cases import columns_tire
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
+
+
+def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(tmp_path: Path) -> None:
+    """A pull in proportion to the load is added to a force that is late: crosstalk is thought of before the lag.
+
+    The law a*FZ behind it fits better; it is the same leak, and the answer is no worse for its name.
+    """
+    for name, text in columns_tire(pull=120.0, lag=0.2).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    answer = diagnose(read_case(tmp_path / "CASE.toml"), None).diagnosis
+    classes = [{effect.name, *effect.equivalent_to} for effect in answer.effects]
+    assert {"channel_delay"} in classes
+    assert any({"crosstalk", "conicity"} <= each for each in classes)
+    force = answer.held_out[0]
+    assert force.augmented_rmse < 0.05 * force.refitted_rmse
