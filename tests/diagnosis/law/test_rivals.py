@@ -10,7 +10,7 @@ from toolkit.diagnosis.diagnose import diagnose
 
 
 def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(tmp_path: Path) -> None:
-    """A pull in proportion to the load is added to a force that is late: crosstalk is thought of before the lag.
+    """A pull in proportion to the load stands beside a late force: crosstalk is thought of before the lag.
 
     The law a*FZ behind it fits better; it is the same leak, and the answer is no worse for its name.
     """
