@@ -7,7 +7,9 @@ from scipy.optimize import curve_fit
 
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.fit.descent import Space, Weighing
 from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.noise import Autoregression
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
@@ -67,3 +69,21 @@ def test_a_straight_problem_needs_differences_once_on_the_way_and_once_at_the_en
     np.testing.assert_allclose(made.p, np.polynomial.polynomial.polyfit(T, values, 1), rtol=1e-6)
     # two differences at the start and two at the solution; start, solution, and what rounding moves it by
     assert asked <= 10
+
+
+def test_a_trial_that_runs_away_is_large_and_no_fault_of_arithmetic(tmp_path):
+    """Warnings are errors here: neither the colour's products nor the square of the whole may overflow."""
+    case = read_case(
+        write_case(
+            tmp_path, CASE.format(a=1.0, k=1.0), simulator=SIMULATOR % LINE,
+            r0__csv=pd.DataFrame({"t": T, "F": 3.0 + 2.0 * T}),
+        )
+    )  # fmt: skip
+    problem = problem_of(case, model_of(case, None))
+    colour = {"F": Autoregression((0.9, -0.3), 1.0)}
+    weighing = Weighing(Space.of(problem, ()), {"F": problem.layout("F")}, colour)
+    away = np.geomspace(1.0, 1e308, problem.rows)
+    away[-1] = np.inf
+    size = weighing.size({"F": away})
+    assert np.isfinite(size)
+    assert size > 1e50 * weighing.size({"F": T})

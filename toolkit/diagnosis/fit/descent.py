@@ -36,6 +36,7 @@ _AGAIN = 3
 _BENT = 0.3  # of a step's response: more off the straight line, and derivatives are taken anew
 _STRAIGHT = 0.02  # of the whole way's response: less off, and they were good enough to end on
 _NOTHING = 0.1  # standard deviations of the noise, over the whole recording: no way at all
+_RAN_AWAY = 1e100  # standard deviations: the square of more is no number
 
 
 class Derivatives:
@@ -99,12 +100,13 @@ class Weighing:
         self._space, self._layouts, self._noise = space, layouts, noise
 
     def _whitened(self, values: Stacked) -> Array:
-        parts = [
-            whiten(values[name][where.index], where, self._noise[name])
-            for name, where in self._layouts.items()
-        ]
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away is large, no fault
+            parts = [
+                whiten(values[name][where.index], where, self._noise[name])
+                for name, where in self._layouts.items()
+            ]
         white = np.concatenate(parts)
-        return np.where(np.isfinite(white), white, 1e6)
+        return np.where(np.isfinite(white), np.clip(white, -_RAN_AWAY, _RAN_AWAY), 1e6)
 
     def size(self, values: Stacked) -> float:
         """Return the size of a difference of simulations in standard deviations of the noise."""
