@@ -80,7 +80,7 @@ def test_a_trial_that_runs_away_is_large_and_no_fault_of_arithmetic(tmp_path):
         )
     )  # fmt: skip
     problem = problem_of(case, model_of(case, None))
-    colour = {"F": Autoregression((0.9, -0.3), 1.0)}
+    colour = {"F": Autoregression(reflection=(0.9, -0.3), sd=1.0)}
     weighing = Weighing(Space.of(problem, ()), {"F": problem.layout("F")}, colour)
     away = np.geomspace(1.0, 1e308, problem.rows)
     away[-1] = np.inf
