@@ -294,10 +294,6 @@ class _Structure:
     foretold_draws: int = _set(
         399, "series of the residual's colour", "of which none may be foretold as well"
     )
-    settled: float = _set(
-        20.0, "rows to an independent value", "after which a drawn series has its own spread"
-    )
-    longest_settling: int = _set(5_000, "rows", "drawn before a series begins, at most")
     line: float = _set(1e-8, "p-value of a spectral line", "the noise's own resonances are lines as well")
     line_share: float = _set(0.05, "of a residual's variance", "a line with less matters to nobody")
     line_around: int = _set(

@@ -8,6 +8,7 @@ from scipy.stats import multivariate_normal
 from toolkit.diagnosis.fit.noise import (
     Autoregression,
     autocovariance,
+    draws,
     fit_noise,
     layout,
     log_likelihood,
@@ -84,3 +85,14 @@ def test_rows_of_a_smooth_noise_are_worth_less():
     # AR(1): the variance of a mean of n rows is (1 + phi) / (1 - phi) times that of white noise.
     assert Autoregression(reflection=(0.9,), sd=1.0).correlation_rows == pytest.approx(1.9 / 0.1, rel=1e-9)
     assert Autoregression(reflection=(), sd=1.0).correlation_rows == 1.0
+
+
+def test_drawn_noise_is_stationary_from_its_first_value_and_white_after_whitening():
+    """A gap begins a segment anew: its first value has the noise's whole spread, near a unit root too."""
+    where = layout([np.arange(40.0), np.arange(2.0)], [np.ones(40, dtype=bool), np.ones(2, dtype=bool)])
+    for reflection in ((0.9, -0.4, 0.2), (0.9999,), ()):
+        noise = Autoregression(reflection=reflection, sd=0.7)
+        series = draws(noise, where, 20_000, np.random.default_rng(1))
+        np.testing.assert_allclose(series.std(axis=1), noise.marginal_sd, rtol=0.03)
+        white = whiten(series, where, noise)
+        np.testing.assert_allclose(white @ white.T / 20_000, np.eye(42), atol=0.04)

@@ -178,9 +178,7 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) ->
     innovations = values.copy()
     for j, weight in enumerate(orders[p], start=1):
         innovations[j:] -= weight * values[:-j]
-    early = [
-        math.sqrt(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) for k in range(p)
-    ]  # innovation sd of order p over that of order k
+    early = _early(noise)
     starts = np.array([segment.start for segment in where.segments], dtype=np.intp)
     rows = np.array([segment.stop for segment in where.segments], dtype=np.intp) - starts
     # A recording with a gap in every day has hundreds of segments: the first two orders, whose products have
@@ -194,6 +192,34 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) ->
             past = orders[k] @ values[start : start + k][::-1]
             innovations[start + k] = (values[start + k] - past) * early[k]
     return innovations / noise.sd
+
+
+def draws(noise: Autoregression, where: Layout, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return series of a noise over a layout, (n, count): what `whiten` makes white again.
+
+    Stationary from the first value of a segment on, however long its memory: nothing has to settle.
+    """
+    from scipy.signal import lfilter
+
+    orders, p = predictor(noise.reflection), len(noise.reflection)
+    series = noise.sd * rng.standard_normal((where.n, count))
+    early = _early(noise)
+    denominator = np.concatenate([[1.0], -orders[p]])
+    for segment in where.segments:
+        x = series[segment]  # a view: innovations before, values after
+        begun = min(p, len(x))
+        for k in range(begun):
+            x[k] = orders[k] @ x[:k][::-1] + x[k] / early[k]
+        if len(x) > p > 0:
+            past = np.array([orders[p][j:] @ x[begun - p + j : begun][::-1] for j in range(p)])
+            x[p:] = lfilter([1.0], denominator, x[p:], axis=0, zi=past)[0]
+    return series
+
+
+def _early(noise: Autoregression) -> list[float]:
+    """Return the innovation sd of the noise's own order over that of every lower order."""
+    p = len(noise.reflection)
+    return [math.sqrt(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) for k in range(p)]
 
 
 def log_likelihood(residual: NDArray[np.float64], where: Layout, noise: Autoregression) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, predictor
+from toolkit.diagnosis.fit.noise import Layout, draws, fit_noise
 from toolkit.diagnosis.fit.sensor_noise import NoiseParts, noise_parts, spread
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE
@@ -85,7 +85,7 @@ def _followed(
     best = int(np.argmax(shares))
     if shares[best] < STRUCTURE.foretold:
         return None
-    drawn = _drawn(noise, where, np.random.default_rng(seed))
+    drawn = draws(noise, where, STRUCTURE.foretold_draws, np.random.default_rng(seed))
     if any(_foretold(column, drawn, folds, where).max() >= shares[best] for column in columns):
         return None
     return StructureFound(
@@ -108,21 +108,3 @@ def _foretold(columns: Array, series: Array, folds: Folds, where: Layout) -> Arr
         wrong += np.sum((series[held] - columns[held] @ slopes) ** 2, axis=0)
         there += np.sum(series[held] ** 2, axis=0)
     return np.asarray(1 - wrong / np.maximum(there, 1e-300))
-
-
-def _drawn(noise: Autoregression, where: Layout, rng: np.random.Generator) -> Array:
-    """Return series of the noise's colour, independent of everything, (values, draws)."""
-    from scipy.signal import lfilter
-
-    denominator = np.concatenate([[1.0], -predictor(noise.reflection)[-1]])
-    before = int(min(STRUCTURE.settled * noise.correlation_rows, STRUCTURE.longest_settling)) + 50
-    parts = [
-        lfilter(
-            [1.0],
-            denominator,
-            rng.standard_normal((before + segment.stop - segment.start, STRUCTURE.foretold_draws)),
-            axis=0,
-        )[before:]
-        for segment in where.segments
-    ]
-    return noise.sd * np.concatenate(parts)
