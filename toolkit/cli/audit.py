@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import answers, progress, stream
+from toolkit.cli.console import answers, progress, say, stream
 from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_file, into_folder
 
 NAME = "audit"
@@ -105,5 +105,5 @@ def command(
         stream({**payload_of(result), "written": [str(path) for path in written], "timing": timing})
     elif not output.quiet:
         width = shutil.get_terminal_size().columns
-        typer.echo("\n".join([text_of(result, width=width), *(str(path) for path in written)]))
+        say("\n".join([text_of(result, width=width), *(str(path) for path in written)]))
     return 0 if result.made.clean else 1

@@ -20,6 +20,23 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
 
 
+# What steers a terminal or turns the reading order: control characters but tabs and line ends, and the
+# directional formatting characters of Unicode (UAX 9; Boucher, Anderson, Trojan Source, 2021).
+_STEERING = {
+    code: repr(chr(code))[1:-1]
+    for code in (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+    if chr(code) not in "\t\n"
+}
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Print text for people; what would steer their terminal is shown as its escape.
+
+    Names and values come from files of others: none may hide a line, or write another in its place.
+    """
+    typer.echo(text.translate(_STEERING), err=err)
+
+
 def ask_passphrase(key: Path, *, twice: bool = False) -> str:
     """Ask for the passphrase of a key: at the terminal, unseen, or as the first line of the input.
 
@@ -119,7 +136,7 @@ def answer(payload: Mapping[str, Any], text: str, *, as_json: bool, quiet: bool)
             document = {"schema": 1, **json_value(payload)}
             typer.echo(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
         elif not quiet and text:
-            typer.echo(text)
+            say(text)
 
 
 @contextlib.contextmanager
@@ -190,7 +207,7 @@ def print_error(error: ToolkitError, *, as_json: bool) -> None:
         with contextlib.suppress(OSError):
             typer.echo(json.dumps({"schema": 1, "error": error.as_dict()}, ensure_ascii=False, indent=2))
             return
-    typer.echo(f"error: {error}", err=True)
+    say(f"error: {error}", err=True)
 
 
 def print_usage_error(error: Exception, *, as_json: bool) -> None:
@@ -204,7 +221,7 @@ def print_usage_error(error: Exception, *, as_json: bool) -> None:
         parts = {"rule": "usage", "what": message, "next_step": hint}
         typer.echo(json.dumps({"schema": 1, "error": parts}, ensure_ascii=False, indent=2))
     else:
-        typer.echo(f"error: {message}\n  next:     {hint}", err=True)
+        say(f"error: {message}\n  next:     {hint}", err=True)
 
 
 @contextlib.contextmanager

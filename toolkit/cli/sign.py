@@ -8,7 +8,7 @@ from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import answers, ask_passphrase
+from toolkit.cli.console import answers, ask_passphrase, say
 from toolkit.cli.options import Output, into_file
 from toolkit.errors import ConfigError
 
@@ -60,7 +60,7 @@ def command(
         raise _usage("--key, --agent", "both" if agent else "neither", "one of the two")
     opened = read_request(request)
     if not (yes and output.quiet):  # consent is to what was shown
-        typer.echo(request_text(opened), err=True)
+        say(request_text(opened), err=True)
     if key is None:
         signer = agent_signer_of(opened)
     elif passphrase_fd is not None:

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import answers
+from toolkit.cli.console import answers, say
 from toolkit.cli.options import AllowMissing, Output, RegistryOptions, ReportTemplate, into_folder
 
 NAME = "watch"
@@ -92,7 +92,7 @@ def command(
         allow_missing=allow_missing,
     )
     target = out or folder / "reports"
-    say = (lambda _text: None) if output.silent else typer.echo
+    tell = (lambda _text: None) if output.silent else say
     watched = WatchLog(keep=output.json)
     with alone(target), _stopping() as stop:
         watcher = watcher_of(
@@ -101,7 +101,7 @@ def command(
         )  # fmt: skip
         while not stop:
             look = watcher.look()
-            watched.add(look, say)
+            watched.add(look, tell)
             if once and not any(waits.reason == "files are arriving" for waits in look.waiting):
                 break
             _sleep(interval, stop)
