@@ -250,3 +250,10 @@ def test_what_no_declaration_can_hold_is_an_error_of_the_program() -> None:
         _ = table_of(Wrong).fields
     with pytest.raises(TypeError, match="no dataclass"):
         table_of(int)
+
+
+def test_a_text_with_control_characters_is_told_so() -> None:
+    """Seen on a terminal it looks like a text: what is wrong with it does not show."""
+    error = refused(MINIMAL.replace('title = "short"', 'title = "short\\u001b[2K"'))
+    assert error.expected == "a text without control characters"
+    assert "\\u001b" in str(error.line)

@@ -233,6 +233,8 @@ class TextKind(Kind):
     def read(self, value: Any, place: Place) -> Any:
         """Return the text."""
         text = value if isinstance(value, str) else self._from_number(value)
+        if text is not None and self.text.steers(text):
+            return place.refuse(value, "a text without control characters", rule=self.entry.rule)
         if text is None or not self.text.fits(text):
             return self.wrong(value, place)
         names = () if self.names is None else self.names.names(place.root)

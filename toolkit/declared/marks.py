@@ -78,10 +78,14 @@ class Text:
     numbers: str = ""
     accepts: Callable[[str], object] | None = None
 
+    def steers(self, text: str) -> bool:
+        """Tell whether a text has control characters."""
+        return _CONTROL.search(text) is not None
+
     def fits(self, text: str) -> bool:
         """Tell whether a text is as it should be."""
         return (
-            _CONTROL.search(text) is None
+            not self.steers(text)
             and (self.empty or bool(text.strip()))
             and (self.pattern is None or re.fullmatch(self.pattern, text) is not None)
             and (self.accepts is None or bool(self.accepts(text)))
