@@ -79,7 +79,7 @@ fuzz: setup
 CASES ?= 400
 proof: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m proof all --out build/proof \
-	  --cases $(CASES) --workers $(JOBS) --proof . --log proof/batches.jsonl
+	  --cases $(CASES) --workers $(JOBS) --proof docs/proof --log proof/batches.jsonl
 	TOOLKIT_PROOF=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal \
 	  tests/simulation/test_case_effects_are_named.py
 
