@@ -9,10 +9,11 @@ from tests.golden.entries import golden
 from tests.golden.surface import CALIBRATIONS, enter_proof_sessions, read_proof, write_proof_case
 from tests.golden.workplace import Workplace
 
-BATCH = "252a86e074e9b1d9"
+BATCH = "3fc192dbc9b0de9d"
 CHOSEN = (
-    "case0235 case0074 case0153 case0103 case0133 case0327 case0397 case0079 case0313 case0130 case0307 "
-    "case0298 case0237 case0048 case0044 case0047 case0268 case0286 case0260 case0310 case0343"
+    "case0033 case0084 case0088 case0091 case0020 case0027 case0049 case0058 case0075 case0077 case0095 "
+    "case0004 case0005 case0042 case0047 case0089 case0112 case0028 case0035 case0124 case0069 case0078 "
+    "case0018 case0068 case0115 case0046 case0016 case0021 case0024 case0048"
 ).split()
 """Quick ones of every mix and every kind of simulation."""
 
