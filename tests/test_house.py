@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import graphlib
 import statistics
 from pathlib import Path
 
 import grimp
+from jinja2 import Environment, nodes
+from jinja2.runtime import LoopContext
 
 import toolkit
 from tests.house.structure import NO_COMMAND_ASKED
@@ -108,3 +111,33 @@ def test_tests_lie_where_the_package_has_what_they_test() -> None:
 def test_every_folder_of_tests_is_a_package() -> None:
     folders = {path.parent for path in TESTS.rglob("*.py")}
     assert {path for path in folders if not (path / "__init__.py").is_file()} == set()
+
+
+def _written(tree: ast.AST) -> set[str]:
+    """Return every name, field, keyword and text that a module writes down."""
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.keyword(arg=str(name)):
+                names.add(name)
+            case ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()):
+                names.add(name)
+            case ast.Constant(value=str(name)):
+                names.add(name)
+    return names
+
+
+def test_what_a_page_reads_is_written_somewhere() -> None:
+    """A template asks for its values by name at run time: what only pages ask for looks dead in the code."""
+    written = {name for path in ROOT.rglob("*.py") for name in _written(ast.parse(path.read_text("utf-8")))}
+    written |= {name for builtin in (str, dict, list, LoopContext) for name in dir(builtin)}
+    pages = sorted(ROOT.rglob("*.j2"))
+    parse = Environment(autoescape=True, extensions=["jinja2.ext.do", "jinja2.ext.i18n"]).parse
+    unknown = {
+        f"{page.name}:{read.lineno}: {read.attr}"
+        for page in pages
+        for read in parse(page.read_text("utf-8")).find_all(nodes.Getattr)
+        if read.attr not in written
+    }
+    assert len(pages) > 50
+    assert not unknown

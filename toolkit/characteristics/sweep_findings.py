@@ -42,8 +42,10 @@ def _one_speed(direction: Direction) -> Finding:
     first = direction.sweeps[0]
     where = f"drum {direction.group.rotation}, {in_both(direction.group.load_N, 'lbf', '.0f')}"
     apparent = float(np.mean([sweep.length_m for sweep in direction.sweeps]))
-    text = f"swept at {3.6 * first.speed_m_s:.3g} km/h alone: FY lags by {1e3 * apparent:.0f} mm, relaxation "
-    text += "length and what is rolled within the delay of its channel together"
+    text = (
+        f"swept at {3.6 * first.speed_m_s:.3g} km/h alone: FY lags by {1e3 * apparent:.0f} mm, relaxation "
+        "length and what is rolled within the delay of its channel together"
+    )
     if first.delay_u_s is None or first.delay_s is None:
         message = f"{text}; nobody states that delay, and no relaxation length is given"
         return Finding(rule="sweep-one-speed", where=where, message=message)

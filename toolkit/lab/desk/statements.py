@@ -68,6 +68,11 @@ class Group:
         """The name as people read it: what a file counts from 0 is counted from 1."""
         return " ".join(str(int(part) + 1) if part.isdigit() else part for part in self.name.split("."))
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether anything of it is stated: the page of a session opens it then."""
+        return any(statement.text for statement in self.statements)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Section:
