@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.characteristics.sweep_factory import STIFFNESS, Form, relaxing, string, sweep, triangle
+from tests.conftest import SHARED_DATA
 from toolkit.characteristics.sweep_fit import fit_sweep
 from toolkit.machine.sweeping import Delay, Sweeping
 
 V, RATE, AMPLITUDE = 2.128, np.radians(1.0), np.radians(1.5)
 T = np.arange(0.0, 24.0, 0.02)
-TTC = Path("/work/shared/data/ttc_cornering/cornering_IA0_P83kPa.csv")
+TTC = SHARED_DATA / "ttc_cornering" / "cornering_IA0_P83kPa.csv"
 DELAY = Sweeping(
     speeds_m_s=(1.0, 4.0), steer_rates_rad_s=(0.01, 0.1), source="test",
     delay=Delay(value_s=0.0, u_s=0.002, source="test"),
@@ -114,7 +114,7 @@ def test_the_scale_of_force_and_angle_is_none_of_its_business() -> None:
     assert dataclasses.replace(scaled, stiffness_N_rad=0.0).rows == len(T)
 
 
-@pytest.mark.skipif(not TTC.exists(), reason="the recording of the TTC is not on this machine")
+@pytest.mark.skipif(not TTC.exists(), reason="the recording of the TTC is not here")
 def test_a_real_sweep_whose_channels_have_a_delay_of_their_own() -> None:
     # A flat belt at 40.2 km/h and 3.2 deg/s. A tire of 0.3 m would be 27 ms late; the crossings of zero, up
     # and down, are 5 ms apart at most, by lines through each pass, which know no drift but its mean. The

@@ -74,7 +74,7 @@ def coasting(folder: Path, wave: float = 0.0) -> tuple[Problem, float]:
 
 
 def test_what_rolls_out_is_periodic_by_the_way_that_it_rolled_and_not_by_the_simulations(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem, way = coasting(tmp_path)
     seen: list[float] = []
@@ -85,11 +85,8 @@ def test_what_rolls_out_is_periodic_by_the_way_that_it_rolled_and_not_by_the_sim
             seen.append(super().way[0])
             return super().way
 
-    with_view, along._FollowedView = along._FollowedView, View  # type: ignore[misc]
-    try:
-        found = along.proposals(problem, fit(problem))
-    finally:
-        along._FollowedView = with_view  # type: ignore[misc]
+    monkeypatch.setattr(along, "_FollowedView", View)
+    found = along.proposals(problem, fit(problem))
     assert found.scored
     assert abs(max(seen) / way - 1) < 0.1
     assert CaseView(problem, "v", None).way[0] > 1.5 * way
