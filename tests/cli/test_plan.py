@@ -42,6 +42,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(protocol_plan, "_virtual", lambda _order, _like: earlier())
 
 
+@pytest.mark.campaign("from a plan to its test and back: the plan of sweeps goes that way in every run")
 def test_the_plan_of_a_tire_file_is_simulated_and_processed_without_a_finding(run, tmp_path):
     tire = ROOT / "toolkit" / "examples" / "virtual" / "tire.tir"
     asked = ["--u", "conicity", "--u", "slope_cornering=2 %", "--load", "567 lbf", "--load", "833 lbf"]
@@ -148,16 +149,6 @@ def test_the_sheet_of_the_next_run_draws_what_each_member_predicts(run, diagnose
     assert [figure["tag"] for figure in document["figures"]] == ["tk:figure.plan_figure_1"]
     assert "filter_lag on F" in document["figures"][0]["alt"]
     assert (tmp_path / "n" / "plan.pdf").read_bytes().startswith(b"%PDF")
-
-
-@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
-def test_the_sheet_of_a_test_stands_beside_its_protocol(run, quick, tmp_path):
-    template = ROOT / "report_templates" / "plan.docx"
-    planned = run("plan", "test", "--u", "conicity", "--out", "p", "--template", template, "--json")
-    assert planned.return_value == 0, planned
-    assert json.loads(planned.stdout)["document"]["warnings"] == []
-    names = {"plan.docx", "plan.json", "plan.pdf", "plan.toml", "protocol.toml"}
-    assert {path.name for path in (tmp_path / "p").iterdir()} == names
 
 
 def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
@@ -299,10 +290,13 @@ def test_a_relaxation_length_alone_has_the_fewest_settled_steps_beside_it(run, i
 
 
 @pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
-def test_the_sheet_has_a_step_for_each_sweep(run, in_time, tmp_path):
+def test_the_sheet_stands_beside_its_protocol_and_has_a_step_for_each_sweep(run, in_time, tmp_path):
     template = ROOT / "report_templates" / "plan.docx"
     done = run("plan", "test", *SWEPT, "--out", "p", "--template", template, "--json")
     assert done.return_value == 0, done
+    assert json.loads(done.stdout)["document"]["warnings"] == []
+    names = {"plan.docx", "plan.json", "plan.pdf", "plan.toml", "protocol.toml"}
+    assert {path.name for path in (tmp_path / "p").iterdir()} == names
     with zipfile.ZipFile(tmp_path / "p" / "plan.docx") as sheet:
         text = re.sub("<[^>]*>", "", sheet.read("word/document.xml").decode())
     assert text.count("sweep in time: ") == 2
