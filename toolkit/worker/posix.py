@@ -107,7 +107,8 @@ def threads() -> frozenset[str]:
 
 def _name(task: Path) -> str:
     try:
-        return (task / "comm").read_text(errors="replace").strip()
+        with (task / "comm").open(errors="replace") as stream:
+            return stream.read().strip()
     except OSError:  # it has ended meanwhile
         return ""
 
