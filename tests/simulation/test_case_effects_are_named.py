@@ -1,7 +1,7 @@
 """There and back: an effect that the virtual machine is given is the one that the engine names.
 
 Five recordings of two steering rates, two speeds, both directions and a turned tire; inputs are exact, so
-that the noise of FY and MZ is the cells'. Two effects stand for all in the ordinary run; the others are a
+that the noise of FY and MZ is the cells'. One effect stands for all in the ordinary run; the others are a
 campaign, and `make proof` takes every one of them.
 """
 
@@ -36,7 +36,7 @@ ALL = (
     "creep.FY=fraction:0.02,time_constant:5s", "hysteresis.FY=50N", "nonlinearity.FY=cubic:3e-9",
     "sensitivity_error.MZ=2%",
 )  # fmt: skip
-USUAL = ("steer_offset=0.1deg", "channel_delay.FY=30ms")
+USUAL = ("steer_offset=0.1deg",)
 
 
 @pytest.fixture(scope="module")
