@@ -11,7 +11,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden house pages docs bench benchmarks recordings crash coverage fuzz proof setup lock clean
+.PHONY: demo test check golden house pages docs bench benchmarks recordings crash coverage fuzz campaigns proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -74,13 +74,18 @@ SECONDS ?= 600
 fuzz: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.fuzz --count $(COUNT) --seconds $(SECONDS)
 
+# The tests that stand apart from `make test`: further cases of promises that it holds by one case each. Every test says by
+# its marker, `@pytest.mark.campaign("why")`, why it stands apart.
+campaigns: setup $(BROWSER)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal -m campaign
+
 # A new sealed batch of concealed effects, the tool once on every case, then the answers opened; and every effect of the
 # virtual machine, there and back. Resumable.
 CASES ?= 400
 proof: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m proof all --out build/proof \
 	  --cases $(CASES) --workers $(JOBS) --proof docs/proof --log proof/batches.jsonl
-	TOOLKIT_PROOF=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal \
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal -m "" \
 	  tests/simulation/test_case_effects_are_named.py
 
 # The virtual environment from the lock file: exact versions, each with its hash.

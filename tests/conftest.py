@@ -14,12 +14,20 @@ from hypothesis import settings
 from tests.declared_answers import hold_to_declarations
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
+from toolkit.system import can_fork
+from toolkit.worker import posix
 
 # Machines are shared and noisy: no example is judged by its time. CI repeats the same examples; a developer's
 # machine draws new ones each time.
 settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("toolkit")
 hold_to_declarations()
+
+# A case's worker is forked where no thread holds a lock that it may want. The runner's own thread waits
+# for orders and holds none: without this every worker of every test begins as a new interpreter, 0.4 s each.
+if can_fork():
+    _RUNNER = posix.threads()
+    posix._has_threads = lambda: not posix.threads() <= _RUNNER
 
 # The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
 sys.dont_write_bytecode = False

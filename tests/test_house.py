@@ -141,3 +141,29 @@ def test_what_a_page_reads_is_written_somewhere() -> None:
     }
     assert len(pages) > 50
     assert not unknown
+
+
+def test_every_campaign_says_why_it_stands_apart() -> None:
+    """A test leaves the ordinary run for a reason that its marker states in a sentence's length."""
+    texts = {path: path.read_text("utf-8") for path in TESTS.rglob("*.py")}
+    nodes_of = {
+        path: [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Attribute | ast.Call)]
+        for path, text in texts.items()
+        if "mark.campaign" in text
+    }
+    marks = {
+        (path.name, node.lineno): node
+        for path, found in nodes_of.items()
+        for node in found
+        if isinstance(node, ast.Attribute) and ast.unparse(node).endswith("mark.campaign")
+    }
+    reasons = {
+        (path.name, node.lineno)
+        for path, found in nodes_of.items()
+        for node in found
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("mark.campaign")
+        for reason in node.args
+        if isinstance(reason, ast.Constant) and len(str(reason.value).split()) >= 4
+    }
+    assert marks
+    assert marks.keys() - reasons == set()

@@ -68,7 +68,10 @@ def test_without_steering_there_is_no_length() -> None:
     assert fit_sweep(sweep(T, 0.01 + 1e-5 * angle, -600 + 20 * force), None) is None
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.9])
+WHITE = pytest.mark.campaign("white noise, which asks less than the coloured one of every run")
+
+
+@pytest.mark.parametrize("rho", [pytest.param(0.0, marks=WHITE), 0.9])
 def test_u_is_the_scatter_of_many_under_noise_of_any_colour(rho: float) -> None:
     FY, rng = (
         relaxing(T, steered, length=0.5, V=V, form="constant"),

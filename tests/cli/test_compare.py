@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import shutil
@@ -204,7 +205,10 @@ def test_the_document_takes_the_units_that_were_asked_for(
 ) -> None:
     """By the command line, else by the style file beside the template."""
     from toolkit.errors import RenderError
+    from toolkit.lab.tire_tests import compare as reading
     from toolkit.report import deliver as delivery
+
+    read_test = reading._test
 
     loads = []
 
@@ -213,6 +217,9 @@ def test_the_document_takes_the_units_that_were_asked_for(
         raise RenderError("not made here", rule="render-failed")
 
     monkeypatch.setattr(delivery, "deliver", instead)
+    # What is compared is read once: units are those of the document alone.
+    read = functools.cache(lambda path, _options: read_test(path, **dict(_options)))
+    monkeypatch.setattr(reading, "_test", lambda path, **options: read(path, tuple(options.items())))
     template = tmp_path / "ours.docx"
     shutil.copy(packaged_home() / "report_templates" / "comparison.docx", template)
     words = ("compare", virtual_test, other_test, "--out", tmp_path / "out", "--template", template)

@@ -147,7 +147,7 @@ LEAVES = "import subprocess\n    subprocess.Popen(['sleep', '600'], start_new_se
 def test_no_process_of_a_simulator_outlives_the_tool(tmp_path, end):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     case = write_case(tmp_path, simulator=START + LEAVES + end + GOOD)
-    toolkit("diagnose", case, "--out", tmp_path / "answer", "--budget", 5, env={**os.environ, mark: "1"})
+    toolkit("diagnose", case, "--out", tmp_path / "answer", "--budget", 2, env={**os.environ, mark: "1"})
     assert alive(mark) == []
 
 

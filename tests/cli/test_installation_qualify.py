@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import shutil
-from datetime import UTC, datetime
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from toolkit import __version__
 from toolkit.cli.main import run
-from toolkit.lab.home import packaged_home
 from toolkit.qualification import numbers
 from toolkit.qualification import run as qualification
 from toolkit.qualification.run import QualificationRecord
@@ -24,29 +26,50 @@ def qualify(*arguments: str) -> int:
     return caught.value.code
 
 
+@dataclass(frozen=True, kw_only=True)
+class Qualified:
+    """What the command finds, prints and writes, and what it finds where a packaged number is changed."""
+
+    whole: QualificationRecord
+    spoiled: QualificationRecord
+    printed: str
+    out: Path
+
+
 @pytest.fixture(scope="module")
-def records(tmp_path_factory: pytest.TempPathFactory) -> dict[str, QualificationRecord]:
-    """What qualifying finds, and what it finds where one digit of one packaged number is changed."""
+def records(tmp_path_factory: pytest.TempPathFactory) -> Qualified:
+    """The command run once, as JSON and into a file; and once with one digit of a packaged number changed."""
     copy = Path(shutil.copytree(numbers.FOLDER, tmp_path_factory.mktemp("spoiled") / "data"))
     path = copy / "pontius.toml"
     path.write_text(path.read_text().replace("2.16844", "2.16845", 1))
-    asked = {"calibrations": packaged_home() / "calibrations", "on": datetime.now(tz=UTC).date()}
-    whole = qualification.qualify(**asked)
+    out = tmp_path_factory.mktemp("qualified") / "new" / "record.json"
+    qualified, asked_for, printed = qualification.qualify, {}, io.StringIO()
+    answered: list[QualificationRecord] = []
+
+    def noted(**asked: Any) -> QualificationRecord:
+        asked_for.update(asked)
+        answered.append(qualified(**asked))
+        return answered[0]
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        patch.setattr(qualification, "qualify", noted)
+        assert qualify("--json", "--out", str(out)) == 0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numbers, "FOLDER", copy)
-        return {"whole": whole, "spoiled": qualification.qualify(**asked)}
+        spoiled = qualified(**asked_for)
+    return Qualified(whole=answered[0], spoiled=spoiled, printed=printed.getvalue(), out=out)
 
 
 @pytest.fixture
-def spoiled(records: dict[str, QualificationRecord], monkeypatch: pytest.MonkeyPatch) -> None:
+def spoiled(records: Qualified, monkeypatch: pytest.MonkeyPatch) -> None:
     """Qualifying finds a changed digit."""
-    monkeypatch.setattr(qualification, "qualify", lambda **_: records["spoiled"])
+    monkeypatch.setattr(qualification, "qualify", lambda **_: records.spoiled)
 
 
 @pytest.fixture
-def known(records: dict[str, QualificationRecord], monkeypatch: pytest.MonkeyPatch) -> None:
+def known(records: Qualified, monkeypatch: pytest.MonkeyPatch) -> None:
     """Qualifying was done already: the command is asked what it makes of it."""
-    monkeypatch.setattr(qualification, "qualify", lambda **_: records["whole"])
+    monkeypatch.setattr(qualification, "qualify", lambda **_: records.whole)
 
 
 @pytest.mark.usefixtures("known")
@@ -69,10 +92,8 @@ def test_the_record_as_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert "asked for less" not in text
 
 
-def test_the_record_as_json_is_also_the_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    out = tmp_path / "new" / "record.json"
-    assert qualify("--json", "--out", str(out)) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_the_record_as_json_is_also_the_file(records: Qualified) -> None:
+    found = json.loads(records.printed)
     assert found["schema"] == 1
     assert found["passed"] is True
     assert found["software"] == __version__
@@ -82,8 +103,8 @@ def test_the_record_as_json_is_also_the_file(capsys: pytest.CaptureFixture[str],
     sign = rows["E5 negated, against the history"]
     assert (sign["quantity"], sign["required"], sign["reached"]) == ("approval", "sign", "sign")
     assert "the sign changed" in sign["note"]
-    assert json.loads(out.read_text()) == found
-    assert [path.name for path in out.parent.iterdir()] == ["record.json"]
+    assert json.loads(records.out.read_text()) == found
+    assert [path.name for path in records.out.parent.iterdir()] == ["record.json"]
 
 
 @pytest.mark.usefixtures("spoiled")

@@ -42,6 +42,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(protocol_plan, "_virtual", lambda _order, _like: earlier())
 
 
+@pytest.mark.campaign("from a plan to its test and back: the plan of sweeps goes that way in every run")
 def test_the_plan_of_a_tire_file_is_simulated_and_processed_without_a_finding(run, tmp_path):
     tire = ROOT / "toolkit" / "examples" / "virtual" / "tire.tir"
     asked = ["--u", "conicity", "--u", "slope_cornering=2 %", "--load", "567 lbf", "--load", "833 lbf"]
@@ -68,11 +69,15 @@ def test_the_plan_of_a_tire_file_is_simulated_and_processed_without_a_finding(ru
             assert U == pytest.approx(value["planned_U"], rel=0.5)
 
 
-def test_the_text_says_what_is_assumed_and_given_up(run, quick):
-    shown = run("plan", "test", "--u", "slope_cornering=3 %", "--load", "833 lbf")
+def test_the_text_says_what_is_assumed_and_given_up_and_no_earlier_test_is_the_class_of_passenger_tires(
+    run, quick, tmp_path
+):
+    shown = run("plan", "test", "--u", "slope_cornering=3 %", "--load", "833 lbf", "--out", "p")
     assert shown.return_value == 0, shown
     for part in ("U by protocol", "assumed:", "given up:", "the reversed runs", "no calibration record"):
         assert part in shown.stdout
+    tires = str(json.loads((tmp_path / "p" / "plan.json").read_text())["tires"])
+    assert [part for part in ("0.41", "1.11") if part not in tires] == []
 
 
 def test_what_cannot_be_reached_names_the_nearest_plan_and_writes_nothing(run, quick, tmp_path):
@@ -150,16 +155,6 @@ def test_the_sheet_of_the_next_run_draws_what_each_member_predicts(run, diagnose
     assert (tmp_path / "n" / "plan.pdf").read_bytes().startswith(b"%PDF")
 
 
-@pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
-def test_the_sheet_of_a_test_stands_beside_its_protocol(run, quick, tmp_path):
-    template = ROOT / "report_templates" / "plan.docx"
-    planned = run("plan", "test", "--u", "conicity", "--out", "p", "--template", template, "--json")
-    assert planned.return_value == 0, planned
-    assert json.loads(planned.stdout)["document"]["warnings"] == []
-    names = {"plan.docx", "plan.json", "plan.pdf", "plan.toml", "protocol.toml"}
-    assert {path.name for path in (tmp_path / "p").iterdir()} == names
-
-
 def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
     shown = run("plan", "next", diagnosed)
     assert shown.return_value == 0, shown
@@ -224,20 +219,14 @@ def test_limits_that_no_run_keeps_name_the_nearest_that_one_does(run, diagnosed,
     assert run("plan", "next", diagnosed, "--limit", limit[1]).return_value == 0
 
 
-def test_a_class_is_planned_for_each_of_its_tires(run, quick):
+def test_a_class_is_planned_for_each_of_its_tires(run, quick, tmp_path):
     asked = ["--u", "slope_cornering=3 %", "--load", "833 lbf", "--spread", "stiffness=0.5..1.2"]
-    planned = run("plan", "test", *asked, "--json")
+    planned = run("plan", "test", *asked, "--out", "p")
     assert planned.return_value == 0, planned
-    answer = json.loads(planned.stdout)
+    assert "0.5 of its stiffness" in planned.stdout
+    answer = json.loads((tmp_path / "p" / "plan.json").read_text())
     assert len(answer["tires"]) == 3
     assert [value["name"] for value in answer["values"]] == ["slope_cornering"]
-    shown = run("plan", "test", *asked).stdout
-    assert "0.5 of its stiffness" in shown
-
-
-def test_no_earlier_test_is_the_class_of_passenger_tires(run, quick):
-    planned = run("plan", "test", "--u", "slope_cornering=3 %", "--load", "833 lbf", "--json")
-    assert [part for part in ("0.41", "1.11") if part not in str(json.loads(planned.stdout)["tires"])] == []
 
 
 def test_a_tire_file_of_other_loads_than_the_machines_is_refused(run, tmp_path):
@@ -299,10 +288,13 @@ def test_a_relaxation_length_alone_has_the_fewest_settled_steps_beside_it(run, i
 
 
 @pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
-def test_the_sheet_has_a_step_for_each_sweep(run, in_time, tmp_path):
+def test_the_sheet_stands_beside_its_protocol_and_has_a_step_for_each_sweep(run, in_time, tmp_path):
     template = ROOT / "report_templates" / "plan.docx"
     done = run("plan", "test", *SWEPT, "--out", "p", "--template", template, "--json")
     assert done.return_value == 0, done
+    assert json.loads(done.stdout)["document"]["warnings"] == []
+    names = {"plan.docx", "plan.json", "plan.pdf", "plan.toml", "protocol.toml"}
+    assert {path.name for path in (tmp_path / "p").iterdir()} == names
     with zipfile.ZipFile(tmp_path / "p" / "plan.docx") as sheet:
         text = re.sub("<[^>]*>", "", sheet.read("word/document.xml").decode())
     assert text.count("sweep in time: ") == 2

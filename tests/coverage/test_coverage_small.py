@@ -41,6 +41,9 @@ def test_a_row_counts_what_it_says() -> None:
     assert (empty.n, empty.low, empty.high) == (0, 0.0, 1.0)
 
 
+@pytest.mark.campaign(
+    "whole tests drawn again and again: characteristics of reduced tests cover in every run"
+)
 @pytest.mark.parametrize(("cell", "repetitions"), [(0, 16), (1, 16)])
 def test_characteristics_of_whole_virtual_tests(cell: int, repetitions: int) -> None:
     """Twice too wide, as the swing of a block's rows once made them, is beyond the chance of chi-square."""

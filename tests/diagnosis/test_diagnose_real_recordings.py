@@ -85,6 +85,7 @@ def test_calibration_factors_of_a_heat_flow_meter_need_nothing(tmp_path):
     assert (made.verdict, made.effects) == ("nothing", ())
 
 
+@pytest.mark.campaign("the longest of the real recordings; the proof takes it whole")
 def test_a_positioning_drive_rubs(tmp_path):
     made = diagnosed("emps-force", tmp_path, runs=("run01", "run04"), every=2)
     dry = next(one for one in made.effects if one.name == "coulomb_friction")

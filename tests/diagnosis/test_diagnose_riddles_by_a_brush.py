@@ -133,6 +133,7 @@ def test_the_same_brush_on_the_flat_road_misses_nothing(tmp_path):
     assert (found.verdict, found.effects) == ("nothing", ())
 
 
+@pytest.mark.campaign("the riddle once more: the virtual machine asks it in every run")
 def test_sandpaper_against_steel_is_the_surface(tmp_path):
     frame = steps()
     surfaces = ["sandpaper", "sandpaper", "steel", "steel"]
@@ -158,6 +159,7 @@ def actuator(commanded, t, *, speed):
     return np.array(made)
 
 
+@pytest.mark.campaign("the riddle once more: the virtual machine asks it in every run")
 def test_five_repeats_of_which_two_had_a_slower_actuator(tmp_path):
     t = np.arange(0, 40, 0.5)
     commanded = np.where((t // 5) % 2 == 0, 2000.0, 5500.0)

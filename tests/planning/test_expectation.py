@@ -62,7 +62,10 @@ def drawn(design: Design, seed: int) -> TestResult:
     return TestResult(reduced=reduced, characteristics=characterise(reduced, machine=M15, record=None))
 
 
-@pytest.mark.parametrize("design", [PROTOCOL, PLAN], ids=["protocol", "plan"])
+WHOLE = pytest.mark.campaign("the machine's whole protocol: a plan of few steps asks more of the prediction")
+
+
+@pytest.mark.parametrize("design", [pytest.param(PROTOCOL, marks=WHOLE), PLAN], ids=["protocol", "plan"])
 def test_the_uncertainty_that_is_predicted_is_that_of_tests_of_the_design(design: Design) -> None:
     known = dataclasses.replace(earlier(), load_spread=0.0)
     question = Question(tires=(known,), demands=DEMANDS, loads_N=LOADS)

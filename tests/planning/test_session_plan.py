@@ -139,7 +139,7 @@ def test_minutes_need_fixtures_that_state_them(knowledge: Knowledge, feasible: F
 
 def test_contradictory_demands_name_both_ways_out(knowledge: Knowledge, feasible: FeasibleLoads) -> None:
     with pytest.raises(ConfigError) as refused:
-        plan_session(knowledge, feasible, Demand(U=(("FY", 0.256),), loads=30, simulated=8))
+        plan_session(knowledge, feasible, Demand(U=(("FY", 0.262),), loads=30, simulated=8))
     assert refused.value.rule == "plan-infeasible"
     assert "for this U; or 30 loads" in str(refused.value.expected)
 

@@ -56,7 +56,16 @@ def test_a_class_is_its_corners_and_the_tire_itself() -> None:
     assert len({tire.tire for tire in one}) == 3
 
 
-@pytest.mark.parametrize("names", [("slope_cornering", "conicity"), ("slope_cornering=3 %", "peak=3 %")])
+PROTOCOLS = pytest.mark.campaign("demands as large as the protocol's: stated ones are served in every run")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        pytest.param(("slope_cornering", "conicity"), marks=PROTOCOLS),
+        ("slope_cornering=3 %", "peak=3 %"),
+    ],
+)
 def test_a_plan_for_a_class_serves_the_tires_between(names: tuple[str, ...]) -> None:
     spread = {"stiffness": (0.6, 1.4), "friction": (0.9, 1.1)}
     demands, loads = tuple(map(parse_demand, names)), LOADS[2:3]

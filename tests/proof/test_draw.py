@@ -107,7 +107,13 @@ def test_a_case_is_drawn_the_same_again_and_tells_nothing(
         assert not outputs & set(head)
 
 
-@pytest.mark.parametrize("family", draw.STIRRED)
+LONG = pytest.mark.campaign("families of stiff or long runs: the others stand for them in every run")
+
+
+@pytest.mark.parametrize(
+    "family",
+    [pytest.param(name, marks=LONG) if name in ("pendulum", "drive") else name for name in draw.STIRRED],
+)
 def test_process_noise_is_another_in_every_run_and_no_effect(family: str) -> None:
     drawn = draw_case(17, 0, "stirred null", picked=(family, ()))
     s, p = drawn.scenario, drawn.scenario.true_parameters()

@@ -44,6 +44,7 @@ def flat_table(tmp_path_factory):
     return answer(tmp_path_factory.mktemp("flat"), read_plan(RIDDLES / "flat_table.toml"))
 
 
+@pytest.mark.campaign("the slowest of the riddles: it is asked of a brush in every run")
 def test_a_makers_flat_table_against_the_lower_values_of_a_drum(flat_table):
     effect, parameters = told(flat_table)
     assert "drum_curvature" in (effect.name, *effect.equivalent_to)

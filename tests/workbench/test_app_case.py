@@ -48,6 +48,7 @@ def added(page: Page, table: str, name: str) -> None:
     expect(page.locator(f"[data-group='{table}.{name}']")).to_be_visible()
 
 
+@pytest.mark.campaign("a whole work in the browser: every run holds the page of a case by its requests")
 def test_a_case_is_built_of_recordings_a_simulation_and_columns(
     browser: BrowserContext, bench: Served, tmp_path: Path
 ) -> None:

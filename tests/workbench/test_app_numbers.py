@@ -22,8 +22,8 @@ from toolkit.lab.laboratory import example, open_laboratory
 
 Capture = pytest.CaptureFixture[str]
 _FILE = re.compile(r"\.(xlsx|png|csv|json|js|css|docx|pdf|toml|txt)$")
-PLANS = {"session": ("cell",), "test": ("--u", "conicity"), "interval": ("cell", "--tests", "100")}
-"""Kinds of plans with what each is asked for; the run that parts a class has a test of its own."""
+PLANS = {"session": ("cell",), "interval": ("cell", "--tests", "100")}
+"""Kinds of plans with what each is asked for; the numbers of every kind have a test of their own."""
 
 
 @pytest.fixture(scope="module")

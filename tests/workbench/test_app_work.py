@@ -58,6 +58,7 @@ def own_template(path: Path, *, tag: str) -> Path:
     return path
 
 
+@pytest.mark.campaign("a whole work in the browser: every run holds the pages of templates and reports")
 def test_make_a_report_from_an_own_template(browser: BrowserContext, bench: Served, tmp_path: Path) -> None:
     put_recording(bench.home / "tests" / "few")
     page = opened(browser, bench, [], [])

@@ -6,6 +6,7 @@ import contextlib
 import os
 import pickle
 import struct
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -144,3 +145,22 @@ def test_last_words_are_bounded_and_plain():
     assert words.endswith("end")
     assert len(words) <= 400
     assert words.isprintable()
+
+
+@pytest.mark.parametrize(("name", "counts"), [("another", True), ("jemalloc_bg_thd", False)])
+def test_a_thread_of_the_memory_allocator_costs_no_new_interpreter(name, counts):
+    before, named, done = posix.threads(), threading.Event(), threading.Event()
+
+    def wait() -> None:
+        Path(f"/proc/self/task/{threading.get_native_id()}/comm").write_text(name)
+        named.set()
+        done.wait()
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    try:
+        assert named.wait(60)
+        assert (len(posix.threads() - before) == 1) is counts
+    finally:
+        done.set()
+        thread.join()

@@ -175,7 +175,7 @@ def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
     if annotation is Any:
         return
     if _is_table(annotation) and isinstance(value, Mapping):
-        entries = {key: (held, required) for key, held, required in _entries(annotation)}
+        entries = {key: (held, required) for key, held, required in _declared(annotation)}
         for key in (*entries, *(key for key in value if key not in entries)):
             path = f"{place}.{key}".lstrip(".")
             if key not in entries:

@@ -62,7 +62,13 @@ class Response:
 
     def information(self, points: NDArray[np.intp], run: NDArray[np.intp], runs: int) -> NDArray[np.float64]:
         """Return the information of rows, with what is known beforehand."""
-        rows = np.concatenate([self.row(points[run == r], r, runs) for r in range(runs)])
+        order = np.argsort(run, kind="stable")
+        points, run = points[order], run[order]
+        columns, effects = self.common.shape[1], self.of_run.shape[1]
+        rows = np.zeros((len(points), columns + runs * effects))
+        rows[:, :columns] = self.common[points]
+        own = columns + run[:, None] * effects + np.arange(effects)
+        rows[np.arange(len(points))[:, None], own] = self.of_run[points]
         precision = np.concatenate([self.precision, np.tile(self.run_precision, runs)])
         return np.asarray(rows.T @ rows + np.diag(precision))
 

@@ -6,6 +6,7 @@ the next one. Neither needs a term where the order is such that the coefficients
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,6 +69,7 @@ def _best_order(
     """Return a run's rows by exchange of its visits' places, the best of a few starts."""
     places = range(len(groups))
 
+    @functools.cache  # an exchange comes to most orders by both of the visits that change places
     def answers(order: tuple[int, ...]) -> float:
         return float(_squares(_sequence(groups, order), weights, relative).sum())
 
@@ -92,8 +94,15 @@ def _squares(
     rows: NDArray[np.intp], weights: NDArray[np.float64], relative: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the squared answers (results, 2) of a run's rows in their order."""
-    drift = np.linspace(-0.5, 0.5, len(rows))
+    drift, each = _drift(len(rows)), weights[:, rows]
+    creep = np.diff(relative[:, rows], axis=1, prepend=0.0)  # what the load before leaves
+    return np.stack([(each @ drift) ** 2, np.sum(each * creep, axis=1) ** 2], axis=1)
+
+
+@functools.cache
+def _drift(count: int) -> NDArray[np.float64]:
+    """Return a drift of one unit over a run (rows,), zero in the mean."""
+    drift = np.linspace(-0.5, 0.5, count)
     drift -= drift.mean()
-    share = relative[:, rows]
-    creep = np.diff(share, axis=1, prepend=0.0)  # what the load before leaves: it rises towards the new one
-    return np.stack([(weights[:, rows] @ drift) ** 2, np.sum(weights[:, rows] * creep, axis=1) ** 2], axis=1)
+    drift.flags.writeable = False
+    return drift

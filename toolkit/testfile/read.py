@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -121,7 +122,7 @@ def _result(sheets: dict[str, list[Cells]], items: Cells) -> TestResult:
     reduced = ReducedTest(
         info=TestInfo(
             **{
-                field.name: _as(get_type_hints(TestInfo)[field.name], items[f"info.{field.name}"])
+                field.name: _as(_hints(TestInfo)[field.name], items[f"info.{field.name}"])
                 for field in dataclasses.fields(TestInfo)
             }
         ),
@@ -178,19 +179,25 @@ def _stated(items: Cells) -> tuple[TypeB, ...]:
     )
 
 
-def _as(kind: Any, value: Any) -> Any:
+@functools.cache
+def _hints(cls: type) -> dict[str, str]:
+    """Return the annotations of a class as texts; resolved for each row they took a fifth of the reading."""
+    return {name: str(kind) for name, kind in get_type_hints(cls).items()}
+
+
+def _as(kind: str, value: Any) -> Any:
     """Return a cell as the type of its field; an empty cell is None."""
     if value in ("", None):
         return None
-    if "bool" in str(kind):
+    if "bool" in kind:
         return bool(value)
-    if "float" in str(kind):
+    if "float" in kind:
         return float(value)
-    return int(value) if "int" in str(kind) else str(value)
+    return int(value) if "int" in kind else str(value)
 
 
 def _condition(row: Cells) -> Condition:
-    hints = get_type_hints(Condition)
+    hints = _hints(Condition)
     conditions = {name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS}
     cells = tuple(number(value) for key, value in row.items() if key.startswith("indication_"))
     hub = tuple(
@@ -227,12 +234,12 @@ def _interval(row: Cells) -> tuple[float | None, float | None] | None:
 
 
 def _fit(row: Cells, parameters: list[Cells], covariances: dict[tuple[str, str], float]) -> CurveFit:
-    hints = get_type_hints(CurveFit)
+    hints = _hints(CurveFit)
     cells: Cells = {}
     for field in dataclasses.fields(CurveFit):
         if field.name in row:
             value = row[field.name]
-            is_list = "tuple" in str(hints[field.name])
+            is_list = "tuple" in hints[field.name]
             cells[field.name] = tuple(str(value).split()) if is_list else _as(hints[field.name], value)
     cells["message"] = cells["message"] or ""
     names = [str(parameter["parameter"]) for parameter in parameters]
@@ -315,7 +322,7 @@ def _characteristics(sheets: dict[str, list[Cells]], reduced: ReducedTest) -> Ch
 
 
 def _sweep(cells: Cells) -> SweepFit:
-    hints = get_type_hints(SweepFit)
+    hints = _hints(SweepFit)
     texts = {name: _as(hints[name], cells[name]) for name in hints}
     return SweepFit(**(texts | {"file_sha256": str(cells["file_sha256"])}))
 

@@ -15,8 +15,10 @@ import os
 import select
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import NoReturn
 
 from toolkit.errors import ConfigError
@@ -28,6 +30,7 @@ with contextlib.suppress(ModuleNotFoundError):  # another system: `begin` refuse
     import resource
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_ALLOCATORS = frozenset({"jemalloc_bg_thd"})  # Arrow's, which pandas loads: jemalloc is ready for forks
 _PDEATHSIG, _SUBREAPER = 1, 36  # of prctl(2)
 _LOOK_S = 0.05  # between two counts of the worker's processes: a bomb of Python has some dozens by then
 _URGENT = -10  # of nice(2): where that is allowed, the guardian is not kept from its work by a bomb
@@ -60,7 +63,8 @@ def begin(limits: Limits, ends: tuple[int, int, int], scratch: str) -> int:
     """Return the id of a new guardian, which holds three descriptors: socket, output, status.
 
     A process of one thread is forked: everything is loaded already. One of several may hold a lock at that
-    moment, which nobody would ever open in the child: a new interpreter begins there.
+    moment, which nobody would ever open in the child: a new interpreter begins there. A thread of the memory
+    allocator's own does not count.
 
     Raises
     ------
@@ -78,7 +82,10 @@ def begin(limits: Limits, ends: tuple[int, int, int], scratch: str) -> int:
     try:
         if _has_threads() and sys.executable:
             return _executed(limits, high, scratch)
-        parent, child = os.getpid(), os.fork()
+        parent = os.getpid()
+        with warnings.catch_warnings():  # from Python 3.12 on, of any thread
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
         if child == 0:
             _guarded(limits, high, scratch, parent)
         return child
@@ -88,7 +95,22 @@ def begin(limits: Limits, ends: tuple[int, int, int], scratch: str) -> int:
 
 
 def _has_threads() -> bool:
-    return len(os.listdir("/proc/self/task")) > 1  # noqa: PTH208  no paths are wanted
+    return len(threads()) > 1
+
+
+def threads() -> frozenset[str]:
+    """Return the ids of this process' threads, without those that no fork has to fear."""
+    return frozenset(
+        task.name for task in Path("/proc/self/task").iterdir() if _name(task) not in _ALLOCATORS
+    )
+
+
+def _name(task: Path) -> str:
+    try:
+        with (task / "comm").open(errors="replace") as stream:
+            return stream.read().strip()
+    except OSError:  # it has ended meanwhile
+        return ""
 
 
 def _executed(limits: Limits, high: list[int], scratch: str) -> int:

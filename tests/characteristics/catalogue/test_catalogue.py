@@ -185,6 +185,7 @@ def program(folder: Path, *words: object, code: str = PROGRAM) -> Any:
     return json.loads(completed.stdout)
 
 
+@pytest.mark.campaign("the recipe of CONTRIBUTING.md adds one characteristic more in every run")
 def test_one_more_characteristic_is_one_file(
     tmp_path: Path, virtual_test: Path, other_virtual_test: Path
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -111,6 +110,7 @@ def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path):
     )
     assert simulated.exit_code == 0, simulated.output
     predicted = pd.read_csv(tmp_path / "out/predictions/r1.csv")
+    assert len(predicted) == 500
     again = pd.read_csv(tmp_path / "sim/r1.csv")
     np.testing.assert_allclose(again.F, predicted.F_augmented, rtol=1e-9)
     page = (tmp_path / "out/diagnosis.html").read_text()
@@ -128,6 +128,7 @@ def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path):
     assert json.loads(settled.output)["verdict"] == "nothing"
 
 
+@pytest.mark.campaign("a product of an input and a state is held in every run")
 def test_a_product_of_two_signals_is_learned(tmp_path):
     answer = diagnosed(tmp_path, lambda r, _: r.F + 12 * r.x * r.v)
     (law,) = answer["laws"]
@@ -184,9 +185,3 @@ def test_of_noise_no_law_is_learned(tmp_path):
     assert answer["verdict"] == "nothing"
     assert answer["laws"] == []
     assert answer["fit"]["held_out"][0]["with_laws_rmse"] is None
-
-
-def test_predictions_have_every_row_of_their_inputs(tmp_path):
-    diagnosed(tmp_path, lambda r, _: r.F + 12 * r.x * r.v)
-    with (tmp_path / "out/predictions/r1.csv").open() as file:
-        assert len(list(csv.reader(file))) == 501

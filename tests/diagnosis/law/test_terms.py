@@ -154,6 +154,7 @@ def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path):
     assert estimates(law)["a"][0] == pytest.approx(0.002, rel=0.02)
 
 
+@pytest.mark.campaign("the law whose imitator is not named stands for it: this search takes the most steps")
 def test_several_effects_that_leave_more_than_noise_give_way_to_one_law(tmp_path):
     answer = _diagnosed(tmp_path, HIDDEN["a damper that acts one way"])
     assert (answer["verdict"], answer["effects"]) == ("unknown", [])
@@ -164,6 +165,7 @@ def test_several_effects_that_leave_more_than_noise_give_way_to_one_law(tmp_path
         assert low < truth < high
 
 
+@pytest.mark.campaign("a second event: one of an output is held in every run, and a law in a state as well")
 def test_a_push_in_one_run_is_told_with_its_run_and_its_times(tmp_path):
     answer = _diagnosed(tmp_path, HIDDEN["a push in one run"])
     law = answer["laws"][0]

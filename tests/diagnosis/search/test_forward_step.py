@@ -81,6 +81,7 @@ def test_a_degree_is_a_zero_of_the_steering_and_no_plies_pull_as_far(tmp_path):
     assert (effect.name, effect.equivalent_to) == ("steer_offset", ("plysteer",))
 
 
+@pytest.mark.campaign("the likeliest of equals by its size is held by a carriage in every run")
 def test_a_drift_that_takes_half_of_the_range_is_a_force(tmp_path):
     (effect,) = diagnose(coasts(tmp_path, force=0.12), None).diagnosis.effects
     assert (effect.name, effect.equivalent_to) == ("constant_force", ("zero_drift",))
@@ -102,14 +103,22 @@ def test_what_few_rows_of_coloured_noise_hint_at_has_to_explain_most_of_unseen_r
     assert step_groups((), (), frozenset(), STEP.first) == []
 
 
-@pytest.mark.parametrize(("noise_alone", "place"), [(True, 0), (False, 1)])
-def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_before_the_better_fit(
-    tmp_path, monkeypatch, noise_alone, place
-):
-    problem = problem_of(case := coasts(tmp_path, force=0.12), model_of(case, None, None))
+@pytest.fixture(scope="module")
+def fitted_step(tmp_path_factory):
+    """Runs under a force: their problem, its fit, the screen, the two best joint fits, and unseen rows."""
+    case = coasts(tmp_path_factory.mktemp("force"), force=0.12)
+    problem = problem_of(case, model_of(case, None, None))
     base = fit(problem)
     view = look(problem, base, candidates(problem), turn=0, seed=1)
     two = joint_fits(problem, base, best_of(view.scored)[:4])[:2]
+    return problem, base, view, two, hold_out(problem, folds_of(problem, base), (), base)
+
+
+@pytest.mark.parametrize(("noise_alone", "place"), [(True, 0), (False, 1)])
+def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_before_the_better_fit(
+    fitted_step, monkeypatch, noise_alone, place
+):
+    problem, base, view, two, before = fitted_step
     assert two[0].score - base.log_posterior < 2 * (two[1].score - base.log_posterior)
     totals = {two[0].fit: 100.0, two[1].fit: 110.0}
 
@@ -118,7 +127,6 @@ def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_bef
 
     monkeypatch.setattr(forward_step, "hold_out", foretold)
     monkeypatch.setattr(forward_step, "_leaves_more_than_noise", lambda *_: not noise_alone)
-    before = hold_out(problem, folds_of(problem, base), (), base)
     nothing = HeldOut(scores=(0.0,), simulated=before.simulated, fits=())
     outcome = best_step(problem, folds_of(problem, base), base, nothing, two, view.p_of, STEP.first, before)
     assert outcome is not None

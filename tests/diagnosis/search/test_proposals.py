@@ -148,6 +148,9 @@ def test_an_output_that_is_read_late_is_not_told_as_forces(tmp_path: Path) -> No
     assert "channel_delay" in (effect.name, *effect.equivalent_to)
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis more: a ball whose speed is far off its prior keeps its drag in every run"
+)
 def test_a_parameter_with_a_wrong_prior_does_not_withdraw_what_foretells_all_else(tmp_path: Path) -> None:
     """Three sd off with and without the spring: it is the prior that is wrong, and the spring stands."""
     problem = driven(tmp_path, stiffness=12.0, k3=K3, damping=(2.2, 0.4))

@@ -111,6 +111,7 @@ th = { unit = "rad", role = "output", sd = 0.004 }
 """
 
 
+@pytest.mark.campaign("a whole diagnosis: friction that a unit leaves out is named in every run")
 def test_friction_that_a_refitted_damping_hides_is_found(tmp_path):
     # A torsion pendulum, driven below and above its resonance. By steps of a thousandth of a period, the
     # torque of 0.24 rad/s^2 against the motion, on a body that never rests.

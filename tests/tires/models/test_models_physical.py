@@ -30,6 +30,7 @@ TIRES = {
 OFFSETS = {"SH": 0.004, "SV": 0.02, "SM": 1e-3}
 NAMES = tuple(TIRES)
 ALL = pytest.mark.parametrize("name", NAMES)
+LONG = pytest.mark.campaign("the two slowest fits: both describe a published tire in every run")
 # The M-15's own plan: 13 slip angles [deg], five loads [N].
 ANGLES = (0, 1, -1, -2, 2, 4, -4, -6, 6, 8, -8, -10, 10)
 LOADS = (1112.0, 2522.0, 3705.0, 4898.0, 6103.0)
@@ -217,7 +218,9 @@ def test_a_published_passenger_tire_is_described(name):
 
 
 @pytest.mark.skipif(not SHARED_DATA.is_dir(), reason="no shared data")
-@ALL
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=LONG) if name in ("treadsim", "tmeasy") else name for name in NAMES]
+)
 def test_a_real_cornering_run_is_described(name):
     d = np.genfromtxt(SHARED_DATA / "ttc_cornering" / "cornering_IA0_P83kPa.csv", delimiter=",", names=True)
     data = measured(

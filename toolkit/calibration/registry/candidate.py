@@ -8,6 +8,7 @@ coefficients follow from any data.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -339,6 +340,7 @@ def _precise(
     )
 
 
+@functools.cache
 def _software() -> tuple[tuple[str, str], ...]:
     import platform
     from importlib.metadata import version
