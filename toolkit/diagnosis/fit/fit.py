@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 
 _OPEN = 1e12  # variance, in searched units, of what the data leave open altogether
+_NOTHING = 1e-100  # a parameter that moves all outputs by less is open, and squares of it would overflow
 
 
 def covariance(
@@ -65,7 +66,7 @@ def covariance(
             parts.append(whiten(columns, where, noise[name]))
     rows = np.vstack([*parts, prior])
     size = np.sqrt((rows**2).sum(axis=0))
-    size[size == 0] = 1.0
+    size[size < _NOTHING] = 1.0
     _, s, vt = np.linalg.svd(rows / size, full_matrices=False)
     keep = s > 1e-10 * s.max()
     inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
