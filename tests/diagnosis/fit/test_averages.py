@@ -96,6 +96,21 @@ def test_an_unsigned_output_is_no_noise_of_the_inputs(tmp_path: Path) -> None:
     assert rows_of(case_of(tmp_path, *(frame.assign(F=frame["F"].abs()) for frame in frames))) == 1
 
 
+def test_a_case_without_inputs_has_no_noise_of_inputs(tmp_path: Path) -> None:
+    frames = [swept(seed).rename(columns={"a": "S"}).drop(columns="v") for seed in range(2)]
+    toml = """schema = 1
+[simulation]
+kind = "columns"
+simulated = { F = "S" }
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+F = { unit = "N", role = "output" }
+"""
+    assert rows_of(case_of(tmp_path, *frames, toml=toml)) == 1
+
+
 def test_an_angle_that_wraps_is_never_averaged(tmp_path: Path) -> None:
     toml = HEAD.replace("F = {", 'turn = { unit = "deg", role = "covariate" }\nF = {')
     frames = [frame.assign(turn=(400 * frame["t"]) % 360) for frame in (swept(0), swept(1))]

@@ -62,14 +62,16 @@ def rows_averaged(problem: Problem, simulated: Stacked) -> int:
     """Return over how many rows of the quickest run means are to be taken; 1 where every row tells something.
 
     Means are taken where the simulation as declared moves by itself, over as few rows as leave of a slope
-    nearly what any means would.
+    nearly what any means would; never of a case without inputs, which cannot have noise.
 
     Parameters
     ----------
     simulated : outputs of the simulation as declared, over all runs
     """
     case = problem.case
-    if not (problem.model.capability.averages and case.has_time and all(map(_is_regular, case.runs))):
+    if not (problem.model.capability.averages and case.drivers and case.has_time):
+        return 1
+    if not all(map(_is_regular, case.runs)):
         return 1
     if any(_turns(run, channel.name, channel.unit) for run in case.runs for channel in case.drivers):
         return 1

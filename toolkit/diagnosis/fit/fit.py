@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 
 _OPEN = 1e12  # variance, in searched units, of what the data leave open altogether
-_NOTHING = 1e-100  # a parameter that moves all outputs by less is open, and squares of it would overflow
 
 
 def covariance(
@@ -66,16 +65,17 @@ def covariance(
             parts.append(whiten(columns, where, noise[name]))
     rows = np.vstack([*parts, prior])
     size = np.sqrt((rows**2).sum(axis=0))
-    size[size < _NOTHING] = 1.0
+    size[size == 0] = 1.0
     _, s, vt = np.linalg.svd(rows / size, full_matrices=False)
     keep = s > 1e-10 * s.max()
     inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
     if plain:
-        inverse = inverse @ (spread / np.outer(size, size)) @ inverse
+        inverse = inverse @ (spread / size[:, None] / size) @ inverse
     if not keep.all():
         inverse[np.diag_indices_from(inverse)] += np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, _OPEN, 0.0)
     scale = sizes / size
-    return np.asarray(inverse * np.outer(scale, scale))
+    with np.errstate(over="ignore"):  # of what moves nothing: open, as far as numbers go
+        return np.asarray(np.nan_to_num(inverse * scale[:, None] * scale))
 
 
 def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
