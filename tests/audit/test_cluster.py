@@ -16,12 +16,14 @@ import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
 import dask
 import distributed
 import pytest
+from distributed import utils
 from typer.testing import CliRunner
 
 from tests.audit.archive_made import FY, dated, recording, write
@@ -41,6 +43,14 @@ REGISTRY = Registry(HOME / "calibrations")
 KNOWN = dt.date(2026, 1, 1)
 PATIENCE_S = 300  # a loaded machine starts slowly
 FILES = 23
+
+
+@pytest.fixture(scope="module", autouse=True)
+def dask_without_its_thread():
+    """End dask's thread of large messages with these tests: beside it every later worker would begin anew."""
+    yield
+    utils._offload_executor.shutdown()
+    utils._offload_executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="Dask-Offload")
 
 
 def free_port():

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import math
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,30 @@ def other_test(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Any) -> P
     return folder
 
 
+@pytest.fixture(scope="module")
+def reader() -> Callable[..., Any]:
+    """What reads a test for a comparison, each test once."""
+    from toolkit.lab.tire_tests import compare as reading
+
+    read_test, known = reading._test, {}
+
+    def read(path: Path, *, step: Callable[[str], None], **options: Any) -> Any:
+        key = (path, *options.items())
+        if key not in known:
+            known[key] = read_test(path, step=step, **options)
+        return known[key]
+
+    return read
+
+
+@pytest.fixture
+def read_once(reader: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reading the same test again says nothing new: that two whole runs agree has a test of its own."""
+    from toolkit.lab.tire_tests import compare as reading
+
+    monkeypatch.setattr(reading, "_test", reader)
+
+
 def maker(path: Path) -> Path:
     """A maker's table: a Magic Formula at two loads inside those of the virtual test."""
     lines = ["SA [deg],FZ [N],FY [N],MZ [N*m]"]
@@ -53,6 +77,7 @@ def maker(path: Path) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("read_once")
 def test_two_surfaces(
     virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -82,6 +107,7 @@ def test_two_surfaces(
         assert Path(path).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.usefixtures("read_once")
 def test_a_reduced_test_compares_as_its_folder_does(
     virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -93,14 +119,25 @@ def test_a_reduced_test_compares_as_its_folder_does(
 
 
 def test_two_runs_answer_the_same(
-    virtual_test: Path, other_test: Path, capsys: pytest.CaptureFixture[str]
+    virtual_test: Path,
+    other_test: Path,
+    reader: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    answers = [toolkit(capsys, "compare", virtual_test, other_test)[1] for _ in range(2)]
+    """By what the other tests have read, and by a reading of its own."""
+    from toolkit.lab.tire_tests import compare as reading
+
+    with monkeypatch.context() as patch:
+        patch.setattr(reading, "_test", reader)
+        answers = [toolkit(capsys, "compare", virtual_test, other_test)[1]]
+    answers.append(toolkit(capsys, "compare", virtual_test, other_test)[1])
     for one in answers:
         one.pop("timing")
     assert answers[0] == answers[1]
 
 
+@pytest.mark.usefixtures("read_once")
 def test_against_a_maker_s_table(
     virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -120,6 +157,7 @@ def test_against_a_maker_s_table(
     assert any("has no conicity" in one for one in turned["left_out"])
 
 
+@pytest.mark.usefixtures("read_once")
 def test_against_a_maker_s_characteristics(
     virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -130,6 +168,7 @@ def test_against_a_maker_s_characteristics(
     assert [one["reference"]["standard_uncertainty"] for one in answer["differences"]] == [3.0, 3.0]
 
 
+@pytest.mark.usefixtures("read_once")
 def test_repeats_have_their_precision(
     virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], virtual_plan: Any
 ) -> None:
@@ -162,6 +201,7 @@ def test_repeats_have_their_precision(
     assert (code, refused["error"]["rule"]) == (2, "no-other-laboratory")
 
 
+@pytest.mark.usefixtures("read_once")
 def test_people_read_it_in_their_units(
     virtual_test: Path, other_test: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -179,6 +219,7 @@ def test_people_read_it_in_their_units(
     assert first(si) / first(lbf) == pytest.approx(4.448, rel=0.02)
 
 
+@pytest.mark.usefixtures("read_once")
 @pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")), reason="LibreOffice and poppler make the PDF"
 )
@@ -200,15 +241,13 @@ def test_the_document_is_verified_and_two_runs_agree(
     assert made[0]["content_sha256"] == made[1]["content_sha256"]
 
 
+@pytest.mark.usefixtures("read_once")
 def test_the_document_takes_the_units_that_were_asked_for(
     virtual_test: Path, other_test: Path, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """By the command line, else by the style file beside the template."""
     from toolkit.errors import RenderError
-    from toolkit.lab.tire_tests import compare as reading
     from toolkit.report import deliver as delivery
-
-    read_test = reading._test
 
     loads = []
 
@@ -217,9 +256,6 @@ def test_the_document_takes_the_units_that_were_asked_for(
         raise RenderError("not made here", rule="render-failed")
 
     monkeypatch.setattr(delivery, "deliver", instead)
-    # What is compared is read once: units are those of the document alone.
-    read = functools.cache(lambda path, _options: read_test(path, **dict(_options)))
-    monkeypatch.setattr(reading, "_test", lambda path, **options: read(path, tuple(options.items())))
     template = tmp_path / "ours.docx"
     shutil.copy(packaged_home() / "report_templates" / "comparison.docx", template)
     words = ("compare", virtual_test, other_test, "--out", tmp_path / "out", "--template", template)
@@ -230,6 +266,7 @@ def test_the_document_takes_the_units_that_were_asked_for(
     assert loads == ["N", "lbf", "N", "lbf", "lbf", "N"]
 
 
+@pytest.mark.usefixtures("read_once")
 @pytest.mark.parametrize(
     ("words", "rule"),
     [

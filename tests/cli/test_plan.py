@@ -14,11 +14,13 @@ from typer.testing import CliRunner
 
 import toolkit
 from tests.planning.class_factory import answer, found, write_case
-from tests.planning.planning_factory import earlier
+from tests.planning.planning_factory import LOADS, earlier
 from toolkit.cli.main import _register, app
 from toolkit.diagnosis.answer.serial import as_json
 from toolkit.errors import ConfigError
 from toolkit.lab.plans import protocol_plan
+from toolkit.planning import protocol_plan as planning
+from toolkit.planning.sweep_search import least_sweeps
 
 ROOT = Path(toolkit.__file__).resolve().parents[1]
 CALIBRATIONS = ROOT / "calibrations"
@@ -36,10 +38,14 @@ def run(tmp_path, monkeypatch):
     return call
 
 
+NEAR = LOADS[1:4]
+"""Loads of the earlier test about that which is asked for: further ones are tried alike, and take as long."""
+
+
 @pytest.fixture
 def quick(monkeypatch):
     """An earlier test that takes no time to simulate."""
-    monkeypatch.setattr(protocol_plan, "_virtual", lambda _order, _like: earlier())
+    monkeypatch.setattr(protocol_plan, "_virtual", lambda _order, _like: earlier(NEAR))
 
 
 @pytest.mark.campaign("from a plan to its test and back: the plan of sweeps goes that way in every run")
@@ -246,12 +252,30 @@ def test_a_tire_that_is_named_twice_is_refused(run, quick):
 SWEPT = ("--u", "relaxation_length=40 mm", "--load", "833 lbf")
 
 
+@pytest.fixture(scope="module")
+def sought():
+    """The search of sweeps, each once: most tests ask for the same, beside other things."""
+    known = {}
+
+    def search(tires, demand, loads_N, *, machine, between_files_s, to_load_s, tell):
+        key = (tuple(tire.tire for tire in tires), demand, loads_N, machine.name, between_files_s, to_load_s)
+        if key not in known:
+            known[key] = least_sweeps(
+                tires, demand, loads_N, machine=machine, between_files_s=between_files_s,
+                to_load_s=to_load_s, tell=tell,
+            )  # fmt: skip
+        return known[key]
+
+    return search
+
+
 @pytest.fixture
-def in_time(monkeypatch):
+def in_time(monkeypatch, sought):
     """The earlier test of the virtual machine, which states what it can sweep."""
     from tests.planning.test_sweep_search import VIRTUAL
 
-    known = dataclasses.replace(earlier(), machine=VIRTUAL)
+    known = dataclasses.replace(earlier(NEAR), machine=VIRTUAL)
+    monkeypatch.setattr(planning, "least_sweeps", sought)
     monkeypatch.setattr(protocol_plan, "_virtual", lambda _order, _like: known)
 
 

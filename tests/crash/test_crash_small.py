@@ -32,7 +32,16 @@ def signed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
         yield Bench(signed_folder, tmp_path_factory.mktemp("crash"), runner)
 
 
-@pytest.mark.parametrize("command", SIGNED, ids=lambda command: command.name)
+ALIKE = pytest.mark.campaign(
+    "an entry in the list of persons, or in the ledger, is cut off by another command"
+)
+FURTHER = ("person revoke", "calibration withdraw (answered)")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(command, id=command.name, marks=[ALIKE] * (command.name in FURTHER)) for command in SIGNED],
+)
 def test_between_signature_and_entry_neither_or_both_are_there(signed: Bench, command) -> None:
     count = signed.judge(command, most=2)
     assert (count.lost, count.mixed) == ([], [])

@@ -22,13 +22,22 @@ SPEED = 20.0
 PROTOCOL = standard(M15, M15.rotations)
 
 
-def tread(*, energy_J: float = math.inf, rise_K: float = math.inf) -> Tread:
-    return Tread(tires=(earlier(),), pace=PACE, speed_m_s=SPEED, energy_J=energy_J, rise_K=rise_K)
+NEAR = LOADS[1:4]
+"""Of an earlier test for what each load is tried alike for: every load more takes as long again."""
 
 
-def question(*demands: str, loads: tuple[float, ...] = LOADS) -> Question:
+def tread(
+    *, energy_J: float = math.inf, rise_K: float = math.inf, measured: tuple[float, ...] = LOADS
+) -> Tread:
+    return Tread(tires=(earlier(measured),), pace=PACE, speed_m_s=SPEED, energy_J=energy_J, rise_K=rise_K)
+
+
+def question(
+    *demands: str, loads: tuple[float, ...] = LOADS, measured: tuple[float, ...] = LOADS
+) -> Question:
     parsed = tuple(map(parse_demand, demands))
-    return Question.beside(PROTOCOL, tires=(earlier(),), demands=parsed, loads_N=loads)
+    protocol = dataclasses.replace(PROTOCOL, loads_N=measured)
+    return Question.beside(protocol, tires=(earlier(measured),), demands=parsed, loads_N=loads)
 
 
 def test_the_uncertainties_of_the_protocol_are_reached_in_fewer_rows() -> None:
@@ -103,22 +112,22 @@ def test_a_demand_at_a_slip_angle_that_no_test_measures_is_refused() -> None:
 
 
 def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
-    asked = question("slope_cornering=4 %", loads=LOADS[2:3])
-    free = least_plan(asked, tread())
-    used = float(tread().energies_J(free.design).sum())
-    spared = least_plan(asked, tread(energy_J=0.8 * used))
+    asked = question("slope_cornering=4 %", loads=LOADS[2:3], measured=NEAR)
+    free = least_plan(asked, tread(measured=NEAR))
+    used = float(tread(measured=NEAR).energies_J(free.design).sum())
+    spared = least_plan(asked, tread(energy_J=0.8 * used, measured=NEAR))
     assert spared.feasible
-    assert tread().energies_J(spared.design).sum() <= 0.8 * used
+    assert tread(measured=NEAR).energies_J(spared.design).sum() <= 0.8 * used
     assert asked.covers([asked.candidates_rad.index(angle) for angle in spared.design.slip_angles_rad])
-    impossible = least_plan(asked, tread(energy_J=0.01 * used))
+    impossible = least_plan(asked, tread(energy_J=0.01 * used, measured=NEAR))
     assert not impossible.feasible
     assert impossible.excess > 0
 
 
 def test_a_limit_of_warmth_costs_pauses_and_they_count_in_the_time() -> None:
-    asked = question("slope_cornering=3 %", loads=LOADS[2:3])
-    free = least_plan(asked, tread())
-    cold = tread(rise_K=1.05 * float(tread().rises_K(free.design).max()))
+    asked = question("slope_cornering=3 %", loads=LOADS[2:3], measured=NEAR)
+    free = least_plan(asked, tread(measured=NEAR))
+    cold = tread(rise_K=1.05 * float(tread(measured=NEAR).rises_K(free.design).max()), measured=NEAR)
     paused = least_plan(asked, cold)
     assert paused.feasible
     waits = cold.pauses_s(paused.design) - PACE.between_files_s

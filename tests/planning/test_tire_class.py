@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -83,11 +84,12 @@ def test_a_plan_for_a_class_serves_the_tires_between(names: tuple[str, ...]) -> 
 
 
 def test_a_class_costs_what_its_most_demanding_tire_costs() -> None:
-    demands = (parse_demand("conicity"),)
+    demands, measured = (parse_demand("conicity"),), LOADS[1:4]
+    protocol = dataclasses.replace(PROTOCOL, loads_N=measured)
 
     def rows(spread: dict[str, tuple[float, float]]) -> int:
-        tires = members(earlier(), spread)
-        asked = Question.beside(PROTOCOL, tires=tires, demands=demands, loads_N=LOADS[2:3])
+        tires = members(earlier(measured), spread)
+        asked = Question.beside(protocol, tires=tires, demands=demands, loads_N=LOADS[2:3])
         return least_plan(asked, Tread(tires=tires, pace=pace_of(M15), speed_m_s=2.0)).design.rows
 
     alone, together = rows({}), rows({"stiffness": (0.5, 1.5)})

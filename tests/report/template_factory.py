@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import docx
 from lxml import etree
@@ -73,8 +75,41 @@ def make(
     edit: Callable[[dict[str, bytes]], None] | None = None,
 ) -> Path:
     """Write a template; ``edit`` may change the members of the package afterwards."""
+    body += p(HASH) if hash_ else ""
+    path = folder / name
+    members = _with_more(body, header, footnote) if header or footnote else _with_body(body)
+    if edit is not None:
+        edit(members)
+    with zipfile.ZipFile(path, "w") as archive:
+        for one, content in members.items():
+            archive.writestr(one, content)
+    return path
+
+
+@functools.cache
+def _blank() -> dict[str, bytes]:
+    """Return the members of a document without content."""
+    return _members(docx.Document())
+
+
+def _members(document: Any) -> dict[str, bytes]:
+    stream = io.BytesIO()
+    document.save(stream)
+    with zipfile.ZipFile(stream) as archive:
+        return {one: archive.read(one) for one in archive.namelist()}
+
+
+def _with_body(body: str) -> dict[str, bytes]:
+    root = etree.fromstring(_blank()["word/document.xml"])
+    for element in elements(body):
+        root[0].insert(len(root[0]) - 1, element)
+    text = etree.tostring(root, encoding="UTF-8", standalone=True)
+    return {**_blank(), "word/document.xml": text}
+
+
+def _with_more(body: str, header: str, footnote: str) -> dict[str, bytes]:
     document = docx.Document()
-    for element in elements(body + (p(HASH) if hash_ else "")):
+    for element in elements(body):
         document.element.body.insert(len(document.element.body) - 1, element)
     if header:
         root = document.sections[0].header._element
@@ -91,21 +126,7 @@ def make(
         )
         part = Part(PackURI("/word/footnotes.xml"), FOOTNOTES[1], blob, document.part.package)
         document.part.relate_to(part, FOOTNOTES[0])
-    stream = io.BytesIO()
-    document.save(stream)
-    data = stream.getvalue()
-    if edit is not None:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = {one: archive.read(one) for one in archive.namelist()}
-        edit(members)
-        stream = io.BytesIO()
-        with zipfile.ZipFile(stream, "w") as archive:
-            for one, content in members.items():
-                archive.writestr(one, content)
-        data = stream.getvalue()
-    path = folder / name
-    path.write_bytes(data)
-    return path
+    return _members(document)
 
 
 def opened(folder: Path, body: str, **more: object) -> Template:

@@ -22,7 +22,7 @@ at which the length acts, by the residuals' own spectrum, each ordinate counted 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -143,11 +143,10 @@ def forms_of(sweep: Sweep, starts_m: Sequence[float] = STARTS_M) -> tuple[Lag, f
     4.3.7). Noise alone parts the fit from the one of fewer terms by the difference of their variances
     (Hausman, Econometrica 46 (1978) 1251), which is in the length's own uncertainty already.
     """
-    fits = [
-        _nearest(sweep, starts_m, falling=falling, sharp=sharp)
-        for falling, sharp in ((False, True), (True, True), (False, False))
-    ]
-    lag, falls, plain = fits
+    sharp = [_settled(sweep, start, sharp=True) for start in starts_m]
+    lag, plain = _nearest(sharp), _nearest(_settled(sweep, start, sharp=False) for start in starts_m)
+    # A length that falls with the slope is sought from where the one that does not has settled.
+    falls = _nearest(None if settled is None else _falling(sweep, settled) for settled in sharp)
     if lag is None or falls is None or plain is None:
         return None
     by_noise = max(lag.noise[0] ** 2 - plain.noise[0] ** 2, 0.0)
@@ -156,41 +155,56 @@ def forms_of(sweep: Sweep, starts_m: Sequence[float] = STARTS_M) -> tuple[Lag, f
     return lag, math.sqrt(away / 3)
 
 
-def _nearest(sweep: Sweep, starts_m: Sequence[float], *, falling: bool, sharp: bool) -> Lag | None:
-    """Return the fit of the smallest residuals from several starts; None where none ends inside."""
-    fits = (fit_lag(sweep, falling=falling, sharp=sharp, start_m=start) for start in starts_m)
-    inside = [fit for fit in fits if fit is not None]
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Settled:
+    # A fit that further turns change no more, the curve's slope [N/rad] at every row, and the length [m]
+    # that the last turn stepped to.
+    lag: Lag
+    slope: Array
+    length_m: float
+
+
+def _nearest(fits: Iterable[_Settled | None]) -> Lag | None:
+    """Return the fit of the smallest residuals; None where none ends inside."""
+    inside = [fit.lag for fit in fits if fit is not None]
     return min(inside, key=lambda fit: float(fit.residual @ fit.residual), default=None)
 
 
-def fit_lag(sweep: Sweep, *, falling: bool, sharp: bool, start_m: float) -> Lag | None:
+def _settled(sweep: Sweep, start_m: float, *, sharp: bool, ratio: Array | None = None) -> _Settled | None:
     """Return the fit from one start (Gauss and Newton, what is linear eliminated); None where it runs away.
 
     Parameters
     ----------
-    falling : whether the length falls with the slope of the curve
     sharp : whether a term of second order in the rate stands beside the lag
+    ratio : of the length at every row to the one at zero slip; without it they are the same
     """
     s = sweep.distance_m
-    length, ratio = start_m, np.ones_like(s)
-    fitted: Lag | None = None
-    for _ in range(_FORMS if falling else 1):
-        for _ in range(_TURNS):
-            fitted, slope = _at(length, ratio, sweep, s, sharp=sharp)
-            squares = float(fitted.moved @ fitted.moved)
-            if squares <= 0:
-                return None
-            step = float(fitted.moved @ fitted.residual) / squares
-            reach = 0.5 * abs(length) + 0.1
-            length += float(np.clip(step, -reach, reach))
-            if abs(length) > _LONGEST_M:
-                return None
-            if abs(step) < _SURE_M:
-                break
-        if fitted is None or not fitted.slope:
+    length = start_m
+    ratio = np.ones_like(s) if ratio is None else ratio
+    for _ in range(_TURNS):
+        fitted, slope = _at(length, ratio, sweep, s, sharp=sharp)
+        squares = float(fitted.moved @ fitted.moved)
+        if squares <= 0:
             return None
-        ratio = np.maximum(slope / fitted.slope, _LEAST_SLOPE)
-    return fitted
+        step = float(fitted.moved @ fitted.residual) / squares
+        reach = 0.5 * abs(length) + 0.1
+        length += float(np.clip(step, -reach, reach))
+        if abs(length) > _LONGEST_M:
+            return None
+        if abs(step) < _SURE_M:
+            break
+    return _Settled(lag=fitted, slope=slope, length_m=length) if fitted.slope else None
+
+
+def _falling(sweep: Sweep, settled: _Settled) -> _Settled | None:
+    """Return the fit whose length falls with the slope of the curve, from the one whose length does not."""
+    for _ in range(_FORMS - 1):
+        ratio = np.maximum(settled.slope / settled.lag.slope, _LEAST_SLOPE)
+        following = _settled(sweep, settled.length_m, sharp=True, ratio=ratio)
+        if following is None:
+            return None
+        settled = following
+    return settled
 
 
 def _at(length: float, ratio: Array, sweep: Sweep, s: Array, *, sharp: bool) -> tuple[Lag, Array]:

@@ -194,21 +194,29 @@ class ProtocolSearch:
     ) -> None:
         self.question, self.tread, self.loads_N, self._tell = question, tread, loads_N, tell
         self.candidates = question.candidates_rad
-        full = self.design(tuple(range(len(self.candidates))))
         self.exposure = Exposure(
-            energies_J=tread.energies_J(full),
+            energies_J=tread.energies_J(self._full),
             minutes=np.array([tread.minutes(self.design((i,))) for i in range(len(self.candidates))]),
             energy_limit_J=tread.energy_J,
             minutes_limit=minutes,
         )
-        self._screens: list[Screen] = []
-        self.full = self.judged(full)
-        self._screens = [
-            screen_of(earlier, full, [reach for reach in self.full.reaches if reach.tire == earlier.tire])
-            for earlier in question.tires
-        ]
         self._points = PointSearch(self._criterion, len(self.candidates))
         self._best: dict[int, Points] = {}
+        self._judged: dict[Design, Judged] = {}
+
+    @property
+    def _full(self) -> Design:
+        """The design of every candidate."""
+        return self.design(tuple(range(len(self.candidates))))
+
+    @cached_property
+    def _screens(self) -> tuple[Screen, ...]:
+        """Of each tire: made when a design is asked for, which a time that holds none never does."""
+        reaches = self.question.reaches(self._full)
+        return tuple(
+            screen_of(earlier, self._full, [reach for reach in reaches if reach.tire == earlier.tire])
+            for earlier in self.question.tires
+        )
 
     def design(self, points: Points) -> Design:
         """Return the design of slip angles at the search's loads, in all directions that are needed."""
@@ -216,12 +224,17 @@ class ProtocolSearch:
         return Design(slip_angles_rad=angles, loads_N=self.loads_N, rotations=self.question.rotations)
 
     def judged(self, design: Design) -> Judged:
-        """Return a design with what it reaches."""
+        """Return a design with what it reaches; one that was judged before is not judged again."""
+        if design not in self._judged:
+            self._judged[design] = self._judge(design)
+        return self._judged[design]
+
+    def _judge(self, design: Design) -> Judged:
         points = [self.candidates.index(angle) for angle in design.slip_angles_rad]
         return Judged(
             design=design, reaches=self.question.reaches(design), minutes=self.tread.minutes(design),
             excess=self.exposure.excess(points),
-            openness=openness(self._screens, points) if self._screens else 0.0,
+            openness=openness(self._screens, points),
             demanded=bool(self.question.demands),
         )  # fmt: skip
 

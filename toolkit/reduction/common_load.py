@@ -107,7 +107,7 @@ def _terms(x: NDArray[np.float64], y: NDArray[np.float64], nodes: Sequence[int])
     at, table = x[nodes], y[nodes]
     terms, product = [], 1.0
     for order in range(1, len(nodes)):
-        table = np.diff(table) / (at[order:] - at[:-order])
+        table = (table[1:] - table[:-1]) / (at[order:] - at[:-order])
         terms.append(float(table[0]) * product)
         product *= float(at[0] - at[order])
     return terms

@@ -6,6 +6,7 @@ takes one Python format spec after the bar, a figure ``width=120mm``.
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass
 
@@ -37,6 +38,7 @@ class Tag:
         return f"tk:{self.path}" + (f"|{self.spec}" if self.spec is not None else "")
 
 
+@functools.lru_cache(maxsize=4096)
 def parse_tag(text: str) -> Tag | None:
     """Read ``tk:path|format``; None where the text is no tag of the toolkit.
 

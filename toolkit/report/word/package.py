@@ -3,11 +3,13 @@
 # ruff: noqa: TRY301  a refusal raised while the archive is open is the plainest reading
 from __future__ import annotations
 
+import functools
 import io
 import posixpath
 import re
 import struct
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,6 +71,10 @@ class Template:
     data: bytes
 
 
+RootOf = Callable[[str], Element]
+"""Returns the root of a part by its name, read once for all checks, which change nothing."""
+
+
 def read_template(path: Path) -> Template:
     """Read and check a template.
 
@@ -80,11 +86,16 @@ def read_template(path: Path) -> Template:
     raw = read_input(path, TEMPLATE_FILE)
     sha256 = sha256_bytes(raw)
     members = _members(path, raw)
-    kind = _main_part(path, members)
-    _check_relationships(path, members)
+
+    @functools.cache
+    def root_of(name: str) -> Element:
+        return _xml(path, name, members[name])
+
+    kind = _main_part(path, members, root_of)
+    _check_relationships(path, members, root_of)
     for name, data in members.items():
-        _check_member(path, name, data)
-    _check_references(path, members)
+        _check_member(path, name, data, root_of)
+    _check_references(path, members, root_of)
     return Template(path=path, sha256=sha256, data=_document(members) if kind == TEMPLATE else raw)
 
 
@@ -222,7 +233,7 @@ def _xml(path: Path, name: str, data: bytes) -> Element:
     return root
 
 
-def _main_part(path: Path, members: dict[str, bytes]) -> str:
+def _main_part(path: Path, members: dict[str, bytes], root_of: RootOf) -> str:
     if "[Content_Types].xml" not in members or "_rels/.rels" not in members:
         raise _refuse(
             path,
@@ -231,7 +242,7 @@ def _main_part(path: Path, members: dict[str, bytes]) -> str:
             got="a zip without Word's parts",
             expected="a Word file (.docx or .dotx)",
         )
-    types = _xml(path, "[Content_Types].xml", members["[Content_Types].xml"])
+    types = root_of("[Content_Types].xml")
     overrides = {
         (one.get("PartName") or "").lstrip("/"): one.get("ContentType") or ""
         for one in types.iter(f"{_CT}Override")
@@ -240,7 +251,7 @@ def _main_part(path: Path, members: dict[str, bytes]) -> str:
     for kind in every:
         if "macroEnabled" in kind or "vbaProject" in kind or "vbaData" in kind:
             raise _refuse(path, "macros", "the template can run macros", got=kind)
-    for rel in _xml(path, "_rels/.rels", members["_rels/.rels"]).iter(_REL):
+    for rel in root_of("_rels/.rels").iter(_REL):
         if (rel.get("Type") or "").endswith("/officeDocument"):
             name = (rel.get("Target") or "").lstrip("/")
             kind = overrides.get(name, "")
@@ -263,11 +274,11 @@ def _main_part(path: Path, members: dict[str, bytes]) -> str:
     )
 
 
-def _check_relationships(path: Path, members: dict[str, bytes]) -> None:
-    for name, data in members.items():
+def _check_relationships(path: Path, members: dict[str, bytes], root_of: RootOf) -> None:
+    for name in members:
         if not name.lower().endswith(".rels"):
             continue
-        for rel in _xml(path, name, data).iter(_REL):
+        for rel in root_of(name).iter(_REL):
             kind = (rel.get("Type") or "").rpartition("/")[2]
             target = rel.get("Target") or ""
             if not rel.get("Id") or not kind:
@@ -294,7 +305,7 @@ def _check_relationships(path: Path, members: dict[str, bytes]) -> None:
             )  # fmt: skip
 
 
-def _check_member(path: Path, name: str, data: bytes) -> None:
+def _check_member(path: Path, name: str, data: bytes, root_of: RootOf) -> None:
     low = posixpath.basename(name).lower()
     if low.startswith(("vbaproject", "vbadata")):
         raise _refuse(path, "macros", "the template holds a macro project", where=name)
@@ -309,7 +320,7 @@ def _check_member(path: Path, name: str, data: bytes) -> None:
         b"\0", b""
     ):
         return
-    root = _xml(path, name, data)
+    root = root_of(name)
     if etree.QName(root).localname == "svg":
         _check_drawing(path, name, root)
     for element in root.iter(*_FORBIDDEN_TAGS):
@@ -338,15 +349,15 @@ def _check_member(path: Path, name: str, data: bytes) -> None:
             )
 
 
-def _check_references(path: Path, members: dict[str, bytes]) -> None:
+def _check_references(path: Path, members: dict[str, bytes], root_of: RootOf) -> None:
     """Refuse a part that refers to a relation it has not: Word would not open what is made of it."""
-    for name, data in members.items():
+    for name in members:
         folder, file = posixpath.split(name)
         if folder != "word" or not file.endswith(".xml"):
             continue
-        relations = members.get(f"word/_rels/{file}.rels", b"<none/>")
-        known = {rel.get("Id") for rel in _xml(path, f"word/_rels/{file}.rels", relations).iter(_REL)}
-        asked = _xml(path, name, data).iterfind(f".//*[@{q('r:id')}]")
+        relations = f"word/_rels/{file}.rels"
+        known = {rel.get("Id") for rel in root_of(relations).iter(_REL)} if relations in members else set()
+        asked = root_of(name).iterfind(f".//*[@{q('r:id')}]")
         lost = [
             str(element.get(q("r:id"))) for element in asked if element.get(q("r:id")) not in {*known, ""}
         ]
