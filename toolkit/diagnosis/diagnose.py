@@ -14,17 +14,20 @@ from toolkit.diagnosis.answer.case_findings import calibration_findings, case_fi
 from toolkit.diagnosis.answer.failed_runs import FailedRuns
 from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.case.case import Case
+from toolkit.diagnosis.fit.averages import averages_finding, is_smooth, of_kept_rows, rows_averaged
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
-from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
 from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Search, search
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
+from toolkit.diagnosis.simulators.averaged import MeansOf, averaged, smoothed
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
 from toolkit.diagnosis.simulators.case_code import WORKER_LIMITS, CaseCode, running
-from toolkit.diagnosis.simulators.simulator import Supervised
+from toolkit.diagnosis.simulators.simulator import Model, Supervised
+from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.worker.posix import Limits
 from toolkit.worker.worker import LateError
@@ -79,55 +82,103 @@ def diagnose(
         return _diagnosed(case, calibrations, budget, budget_s, code)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Posed:
+    """A case as a problem: its simulation ends with the budget until released, its failures are counted."""
+
+    case: Case
+    problem: Problem
+    failed: FailedRuns
+    supervised: Supervised
+
+
+def _posed(case: Case, model: Model, budget: TimeBudget) -> _Posed:
+    failed = FailedRuns(model.simulate)
+    supervised = Supervised(model, failed, budget.guarded)
+    return _Posed(case=case, problem=problem_of(case, supervised), failed=failed, supervised=supervised)
+
+
 def _diagnosed(
     case: Case, calibrations: Path | None, budget: TimeBudget, budget_s: float, code: CaseCode | None
 ) -> Result:
     try:
-        model = budget.guarded(model_of)(case, calibrations, code)
+        posed = _posed(case, budget.guarded(model_of)(case, calibrations, code), budget)
     except BudgetSpentError:
         return Result(diagnosis=_too_late(case, None, None, (), budget.step), search=None)
-    failed = FailedRuns(model.simulate)
-    supervised = Supervised(model, failed, budget.guarded)
-    problem = problem_of(case, supervised)
-    findings = (
-        *case_findings(problem),
+    findings: tuple[Finding, ...] = (
+        *case_findings(posed.problem),
         *built_in_findings(case),
         *calibration_findings(case, calibrations),
     )
     declared, outcome, laws = None, None, None
     try:
-        declared = _first_look(problem, budget)
-        if does_not_vary(problem):
+        declared = _first_look(posed.problem, budget)
+        means = _of_means(posed.problem, declared, calibrations, budget, code)
+        if means is not None:
+            posed, told = means
+            findings, declared = (*findings, told), _first_look(posed.problem, budget)
+        if does_not_vary(posed.problem):
             answer = without_search(
-                case, problem, declared, why="the outputs do not vary", findings=findings,
+                posed.case, posed.problem, declared, why="the outputs do not vary", findings=findings,
                 next_measurements=("Vary the inputs: an output that stands still tells nothing.",),
             )  # fmt: skip
         else:
             seed = int(case.sha256[:12], 16)
             with budget.limited():
-                outcome = search(problem, seed=seed, budget=budget)
+                outcome = search(posed.problem, seed=seed, budget=budget)
                 laws = learned(outcome, withdrawn=mostly_unknown(outcome), budget=budget)
                 outcome, laws = without_imitations(outcome, laws, budget)
                 outcome, laws = judged_by_laws(outcome, laws, budget)
-            answer = answer_of(case, outcome, laws, findings)
+            answer = answer_of(posed.case, outcome, laws, findings)
     except BudgetSpentError as error:
-        answer = _too_late(case, problem, declared, findings, str(error))
+        answer = _too_late(posed.case, posed.problem, declared, findings, str(error))
     finally:
-        supervised.release()
+        posed.supervised.release()
     deaths = () if code is None else code.findings()
-    answer = replace(answer, findings=(*answer.findings, *failed.findings(case), *deaths))
-    files, late = _predictions(problem, outcome, laws, budget, budget_s, code)
+    answer = replace(answer, findings=(*answer.findings, *posed.failed.findings(case), *deaths))
+    files, late = _predictions(posed.problem, outcome, laws, budget, budget_s, code)
     if late:
         answer = replace(answer, complete=False, skipped=(*answer.skipped, late))
     return Result(diagnosis=answer, search=outcome, laws=laws, predictions=files)
 
 
+def _of_means(
+    problem: Problem,
+    declared: dict[str, NDArray[np.float64]],
+    calibrations: Path | None,
+    budget: TimeBudget,
+    code: CaseCode | None,
+) -> tuple[_Posed, Finding] | None:
+    """Return the case with its rows averaged; None where single rows tell something, or have no means."""
+    problem = without_outliers(problem, {name: problem.observed[name] - declared[name] for name in declared})
+    rows = rows_averaged(problem, declared)
+    if rows == 1:
+        return None
+    whole = of_kept_rows(problem)
+    even, case = smoothed(whole, rows), averaged(whole, rows)
+    if code is not None:
+        code.learn((*whole.runs, *even.runs))
+    build = budget.guarded(model_of)
+    smooth = build(even, calibrations, code)
+    steady = _posed(even, smooth, budget).problem
+    try:
+        if not is_smooth(problem, declared, steady.simulate(_values(steady), ()), rows):
+            return None
+    except FitError:  # it does not take inputs between those that were recorded
+        return None
+    model = MeansOf(build(whole, calibrations, code), smooth, (whole, even, case), rows)
+    return _posed(case, model, budget), averages_finding(problem, rows)
+
+
+def _values(problem: Problem) -> tuple[float, ...]:
+    return tuple(parameter.value for parameter in problem.free)
+
+
 def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.float64]]:
     """Return the simulation as declared; what cannot be simulated ends here."""
     budget.tell("the simulation as declared")
-    values = tuple(parameter.value for parameter in problem.free)
     started = time.monotonic()
-    simulated = problem.simulate(values, ())
+    simulated = problem.simulate(_values(problem), ())
     quick = time.monotonic() - started < BUDGET.quick_s * len(problem.runs)
     repeats = problem.model.capability.repeats
     if quick and repeats is not None:

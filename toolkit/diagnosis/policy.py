@@ -109,6 +109,38 @@ class _Noise:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Averages:
+    """When rows are averaged, as their quick changes are noise of the inputs."""
+
+    slope: float = _set(
+        0.85,
+        "of the slope that the best means leave",
+        "more rows in a mean would only blur what is looked for",
+    )
+    beside_recorded: float = _set(
+        0.25,
+        "of the recorded power",
+        "of the quickest octave kept: more noise is worth a low-pass of its own",
+    )
+    beside_shared: float = _set(
+        0.5,
+        "of the power in common",
+        "or as little: a recording that a lag has made weak is followed even so",
+    )
+    fewest: int = _set(32, "means of all runs", "as many must be left to judge by")
+    window: int = _set(256, "rows", "of a window of the spectra: five octaves and more")
+    windows: int = _set(4, "windows side by side", "fewer are alike by chance")
+    shortest: int = _set(
+        16, "rows of a window", "three octaves: a shorter stretch tells nothing of quick changes"
+    )
+    missed: float = _set(
+        0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
+    )
+    jitter: float = _set(0.1, "of the usual step", "rows further apart than that are no series")
+    jittering: float = _set(0.01, "of all steps", "a clock stumbles now and then")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Scatter:
     """How far runs of the same thing may differ."""
 
@@ -403,13 +435,13 @@ class _Surface:
 
 
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
-SCATTER = _Scatter()
+SCATTER, AVERAGES = _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
 UNSEEN, FOLLOWING = _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, PRIORS, NOISE, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN, FOLLOWING, LATTICE,
-    STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN, FOLLOWING,
+    LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
 
 

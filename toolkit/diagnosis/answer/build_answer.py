@@ -32,7 +32,7 @@ from toolkit.diagnosis.answer.refit_findings import refit_findings
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.sensor_noise import noise_parts, spread
 from toolkit.diagnosis.fit.structure import RUNS, groups
-from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
+from toolkit.diagnosis.policy import PRIORS, SCREENING, STEP, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.parameter_units import unit_of
@@ -144,11 +144,14 @@ def _is_within_accuracy(search: Search) -> bool:
     """Tell whether effects move every output by less than a simulation is off without any.
 
     Another integrator or a tire's formula misses its plant by as much, and some effect takes a share of that.
-    One that takes most of what is above the noise is what was left out, however small.
+    One that takes most of what is above the noise is what was left out, however small: of some runs within
+    them, of several by their zeros as well, which that effect then foretells.
     """
     if all(step.active.effect.from_digits for step in search.steps):
         return False
     problem = search.problem
+    if len(problem.runs) >= STEP.runs and _takes_nearly_all(search):
+        return False
     for name, kept in problem.kept.items():
         # about every run's own mean: zeros that move are no effect's to take
         before, after, floor = (

@@ -55,6 +55,7 @@ class AcquisitionModel:
             cells=record.indications,
             unsure={},
             findings=(),
+            averages=False,
             repeats=None,
             together=None,
             motion=None,

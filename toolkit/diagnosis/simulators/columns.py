@@ -97,6 +97,7 @@ class ColumnsModel(AlongMotion):
             cells=(),
             unsure={} if self._surface is None else self._surface.unsure,
             findings=findings,
+            averages=True,
             repeats=None,
             together=None,
             motion=self.moving(),

@@ -125,6 +125,7 @@ class MachineModel:
             cells=() if self.cells is None else self.cells.names,
             unsure={},
             findings=tir.findings(),
+            averages=False,
             repeats=None,
             together=None,
             motion=None,

@@ -96,6 +96,7 @@ class OdeModel:
             cells=(),
             unsure={},
             findings=(),
+            averages=False,
             repeats=None,
             together=self._prepare,
             motion=Moving(

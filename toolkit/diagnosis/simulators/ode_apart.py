@@ -64,6 +64,7 @@ class OdeApart:
             cells=(),
             unsure={},
             findings=(),
+            averages=False,
             repeats=None,
             together=self._together,
             motion=Moving(

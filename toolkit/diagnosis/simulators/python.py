@@ -137,6 +137,7 @@ class PythonModel(AlongMotion):
             cells=(),
             unsure={},
             findings=(),
+            averages=True,
             repeats=self._repeats,
             together=None,
             motion=self.moving(),
