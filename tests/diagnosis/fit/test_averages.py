@@ -142,7 +142,7 @@ def simulate(inputs, p):
         frames.append(frame.assign(gear=gear, F=frame["F"] * np.where(gear == 1.0, 1.0, 0.5)))
     case = case_of(tmp_path, *frames, toml=toml, simulator=looked_up)
     assert rows_of(case) > 1
-    assert "case-averaged" not in {one.rule for one in diagnose(case, None, budget_s=20).diagnosis.findings}
+    assert "case-averaged" not in {one.rule for one in diagnose(case, None, budget_s=4).diagnosis.findings}
 
 
 def test_a_simulation_that_bends_within_a_mean_is_not_that_of_means(tmp_path: Path) -> None:

@@ -70,12 +70,12 @@ def covariance(
     keep = s > 1e-10 * s.max()
     inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
     if plain:
-        inverse = inverse @ (spread / size[:, None] / size) @ inverse
+        inverse = inverse @ (spread / np.outer(size, size)) @ inverse
     if not keep.all():
         inverse[np.diag_indices_from(inverse)] += np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, _OPEN, 0.0)
     scale = sizes / size
-    with np.errstate(over="ignore"):  # of what moves nothing: open, as far as numbers go
-        return np.asarray(np.nan_to_num(inverse * scale[:, None] * scale))
+    with np.errstate(over="ignore", invalid="ignore"):  # of what moves nothing: open, as far as numbers go
+        return np.asarray(np.nan_to_num(inverse * np.outer(scale, scale)))
 
 
 def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
