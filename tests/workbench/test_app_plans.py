@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.sync_api import BrowserContext, expect
 
 from tests.workbench.conftest import Served
@@ -36,6 +37,7 @@ def test_an_interval_is_planned_by_the_keyboard(browser: BrowserContext, own: Se
     page.close()
 
 
+@pytest.mark.campaign("a plan of every kind for its look alone: one is made by the keyboard in every run")
 def test_every_kind_of_plan_is_accessible_in_light_dark_and_phone_width(
     browser: BrowserContext, planned: tuple[Served, dict[str, str]]
 ) -> None:

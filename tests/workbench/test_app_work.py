@@ -138,6 +138,7 @@ def test_find_why_a_file_is_wrong_and_repair_it(browser: BrowserContext, bench: 
     page.close()
 
 
+@pytest.mark.campaign("a whole work in the browser: every run holds the pages of a case and of its answer")
 def test_learn_what_a_simulation_lacks(browser: BrowserContext, bench: Served, tmp_path: Path) -> None:
     for name, data in CASE_FILES:
         (tmp_path / name).write_bytes(data)
