@@ -14,7 +14,7 @@ from toolkit.diagnosis.answer.case_findings import calibration_findings, case_fi
 from toolkit.diagnosis.answer.failed_runs import FailedRuns
 from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.fit.averages import averages_finding, is_smooth, of_kept_rows, rows_averaged
+from toolkit.diagnosis.fit.averages import averages_findings, is_smooth, of_kept_rows, rows_averaged
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
 from toolkit.diagnosis.law.learn import Laws, learned
@@ -116,7 +116,7 @@ def _diagnosed(
         means = _of_means(posed.problem, declared, calibrations, budget, code)
         if means is not None:
             posed, told = means
-            findings, declared = (*findings, told), _first_look(posed.problem, budget)
+            findings, declared = (*findings, *told), _first_look(posed.problem, budget)
         if does_not_vary(posed.problem):
             answer = without_search(
                 posed.case, posed.problem, declared, why="the outputs do not vary", findings=findings,
@@ -148,26 +148,27 @@ def _of_means(
     calibrations: Path | None,
     budget: TimeBudget,
     code: CaseCode | None,
-) -> tuple[_Posed, Finding] | None:
+) -> tuple[_Posed, tuple[Finding, ...]] | None:
     """Return the case with its rows averaged; None where single rows tell something, or have no means."""
     problem = without_outliers(problem, {name: problem.observed[name] - declared[name] for name in declared})
     rows = rows_averaged(problem, declared)
     if rows == 1:
         return None
-    whole = of_kept_rows(problem)
-    even, case = smoothed(whole, rows), averaged(whole, rows)
+    whole = of_kept_rows(problem, rows)
+    even, means = smoothed(whole, rows), averaged(whole, rows)
     if code is not None:
         code.learn((*whole.runs, *even.runs))
     build = budget.guarded(model_of)
-    smooth = build(even, calibrations, code)
-    steady = _posed(even, smooth, budget).problem
+    plain, smooth = build(whole, calibrations, code), build(even, calibrations, code)
+    of_rows, steady = _posed(whole, plain, budget).problem, _posed(even, smooth, budget).problem
     try:
-        if not is_smooth(problem, declared, steady.simulate(_values(steady), ()), rows):
-            return None
+        as_recorded, as_smooth = (each.simulate(_values(each), ()) for each in (of_rows, steady))
     except FitError:  # it does not take inputs between those that were recorded
         return None
-    model = MeansOf(build(whole, calibrations, code), smooth, (whole, even, case), rows)
-    return _posed(case, model, budget), averages_finding(problem, rows)
+    if not is_smooth(of_rows, as_recorded, as_smooth, rows):
+        return None
+    told = averages_findings(problem.case, rows)
+    return _posed(means, MeansOf(plain, smooth, (whole, even, means), rows), budget), told
 
 
 def _values(problem: Problem) -> tuple[float, ...]:

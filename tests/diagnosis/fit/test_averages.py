@@ -16,7 +16,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.averages import is_smooth, rows_averaged
 from toolkit.diagnosis.fit.problem import problem_of
-from toolkit.diagnosis.simulators.averaged import averaged, smoothed
+from toolkit.diagnosis.simulators.averaged import averaged, smoothed, windows
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 STEP = 0.005
@@ -182,8 +182,26 @@ def test_means_hold_no_gap_and_skip_missing_samples(tmp_path: Path) -> None:
     there = np.isfinite(run.columns["F"])
     assert 70 < there.sum() < 94
     assert (run.columns["F"] - (2 - run.t))[there] == pytest.approx(0.0, abs=2 * STEP)
-    # White noise of one row has a quarter of its variance in four.
-    assert case.channel("F").sd == pytest.approx(4.0)
+    # The stated noise of a mean is that of white noise in the window, drawn.
+    rows = read_case(tmp_path / "CASE.toml")
+    white = np.random.default_rng(1).normal(0, 8.0, (400, 4000))
+    assert case.channel("F").sd == pytest.approx(windows(rows, rows.runs[0], 4).mean(white).std(), rel=0.01)
+
+
+@pytest.mark.parametrize("rows", [1, 5, 12, 40])
+def test_a_run_too_short_for_means_is_left_out_and_told(tmp_path: Path, rows: int) -> None:
+    answer = diagnose(case_of(tmp_path, swept(0), swept(1), swept(2).iloc[:rows]), None).diagnosis
+    assert answer.verdict == "nothing"
+    told = [finding for finding in answer.findings if finding.rule == "case-averaged"]
+    assert [finding.where for finding in told] == ["CASE.toml", "r2.csv"]
+
+
+@pytest.mark.parametrize("rows", [70, 120, 200])
+def test_many_short_runs_are_averaged_over_fewer_rows(tmp_path: Path, rows: int) -> None:
+    runs = [swept(seed).iloc[k : k + rows] for seed in range(3) for k in range(0, 1200 - rows, 300)]
+    answer = diagnose(case_of(tmp_path, *runs), None).diagnosis
+    assert not answer.effects
+    assert "case-averaged" in {finding.rule for finding in answer.findings}
 
 
 def test_a_value_far_off_is_in_no_mean(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import layout
-from toolkit.diagnosis.policy import AVERAGES, NOISE
+from toolkit.diagnosis.policy import AVERAGES, NOISE, ROWS
 from toolkit.diagnosis.simulators.averaged import usual_step, windows
 from toolkit.findings import Finding
 from toolkit.units import unit
@@ -75,7 +75,11 @@ def rows_averaged(problem: Problem, simulated: Stacked) -> int:
         return 1
     if any(_turns(run, channel.name, channel.unit) for run in case.runs for channel in case.drivers):
         return 1
-    most = int(math.log2(max(problem.rows / AVERAGES.fewest, 1)))
+    most = 0
+    while sum(len(windows(case, run, 2 ** (most + 1)).rows) for run in long_runs(case, 2 ** (most + 1))) >= (
+        AVERAGES.fewest
+    ):
+        most += 1
     octaves = [_octaves(problem, name, simulated[name]) for name in problem.names]
     return int(2 ** max(_first(each, most) for each in octaves))
 
@@ -93,11 +97,19 @@ def _first(octaves: Sequence[Octave], most: int) -> int:
     return 0 if all(octave.is_quiet for octave in octaves[:first]) else first
 
 
-def of_kept_rows(problem: Problem) -> Case:
-    """Return the case with its outputs where they count: a value far off would be in all means around."""
+def long_runs(case: Case, rows: int) -> tuple[Run, ...]:
+    """Return the runs that have more than a few means over some rows."""
+    return tuple(run for run in case.runs if len(windows(case, run, rows).rows) > ROWS.fewest)
+
+
+def of_kept_rows(problem: Problem, rows: int) -> Case:
+    """Return the case of its long runs, with outputs where they count.
+
+    A value far off would be in all means around it.
+    """
     places = dict(zip((run.name for run in problem.runs), problem.slices, strict=True))
     runs = []
-    for run in problem.case.runs:
+    for run in long_runs(problem.case, rows):
         columns = dict(run.columns)
         for name in set(columns) & set(problem.kept) if run.name in places else ():
             columns[name] = np.where(problem.kept[name][places[run.name]], columns[name], np.nan)
@@ -124,23 +136,27 @@ def is_smooth(
         for run, place in zip(problem.runs, problem.slices, strict=True):
             mean = windows(problem.case, run, rows).mean
             missed.append(mean(smooth[name][place] - simulated[name][place]))
-            counted = np.where(problem.kept[name][place], problem.observed[name][place], np.nan)
-            mismatch.append(mean(counted - simulated[name][place]))
-        most = AVERAGES.missed**2 * np.nanmean(np.concatenate(mismatch) ** 2)
-        if not np.mean(np.concatenate(missed) ** 2) <= most:
+            mismatch.append(mean(problem.observed[name][place] - simulated[name][place]))
+        most = AVERAGES.missed**2 * np.nansum(np.concatenate(mismatch) ** 2)
+        there = np.isfinite(np.concatenate(mismatch))
+        if np.sum(np.concatenate(missed)[there] ** 2) > most:
             return False
     return True
 
 
-def averages_finding(problem: Problem, rows: int) -> Finding:
-    """Return the note that rows were averaged, and why."""
-    step = min(usual_step(run) for run in problem.case.runs)
-    return Finding(
-        rule="case-averaged",
-        where=problem.case.path.name,
-        level="note",
-        message=f"rows were averaged by {rows}, over {rows * step:.3g} s: quicker changes of the simulation "
-        "are not in the recording, as where inputs are recorded with noise",
+def averages_findings(case: Case, rows: int) -> tuple[Finding, ...]:
+    """Return the notes that rows of a case were averaged, and why, and which runs were too short for it."""
+    step, kept = min(usual_step(run) for run in case.runs), long_runs(case, rows)
+    lines = [
+        (
+            case.path.name,
+            f"rows were averaged by {rows}, over {rows * step:.3g} s: quicker changes of the simulation "
+            "are not in the recording, as where inputs are recorded with noise",
+        ),
+        *((run.name, "too short for these means: it was left out") for run in case.runs if run not in kept),
+    ]
+    return tuple(
+        Finding(rule="case-averaged", where=where, level="note", message=message) for where, message in lines
     )
 
 

@@ -73,14 +73,13 @@ def windows(case: Case, run: Run, rows: int) -> Windows:
         piece.start + reach + np.arange(max((piece.stop - piece.start - 2 * reach) // count - 1, 0)) * count
         for piece in _pieces(run)
     ]
-    angle = 2 * np.pi * (np.arange(2 * count) + 0.5) / (2 * count)
-    return Windows(np.concatenate(firsts)[:, None] + np.arange(2 * count), (1 - np.cos(angle)) / (2 * count))
+    return Windows(np.concatenate(firsts)[:, None] + np.arange(2 * count), _weights(count))
 
 
 def averaged(case: Case, rows: int) -> Case:
     """Return a case whose recordings are means.
 
-    What is stated of a sensor's noise is that of a row: that of a mean is less by the root of their number.
+    What is stated of a sensor's noise is that of a row: a mean has what its window leaves of white noise.
     """
     runs = []
     for run in case.runs:
@@ -178,6 +177,10 @@ class MeansOf:
         return {name: of.mean(columns) for name, columns in responses.items()}
 
 
+def _weights(count: int) -> NDArray[np.float64]:
+    return np.asarray((1 - np.cos(np.pi * (np.arange(2 * count) + 0.5) / count)) / (2 * count))
+
+
 def _reach(count: int) -> int:
     """Return how many rows to each side a polynomial has: where they are not there, it is no mean's.
 
@@ -199,4 +202,4 @@ def _pieces(run: Run) -> list[slice]:
 
 
 def _of_mean(sd: float | None, rows: int) -> float | None:
-    return None if sd is None else sd / math.sqrt(rows)
+    return None if sd is None else sd * float(np.linalg.norm(_weights(rows)))

@@ -140,7 +140,7 @@ class Capability:
     cells : names of the load cells that a calibration turns into outputs
     unsure : output -> what the simulation itself is unsure by, in the output's unit
     findings : what a reader of the answer must know of the simulation
-    averages : whether means of its rows are rows of it as well, as nothing in it is counted by rows
+    averages : whether noise of its inputs may go straight into its outputs: means of its rows tell more
     repeats : (run, parameters) -> nothing; FitError where a second call gives another answer. None where the
         simulation is our own
     together : makes several simulations of some runs at once, for `simulate` to find; None where it cannot
