@@ -6,6 +6,7 @@ An entry is written before the tool has seen its recording and is not changed by
 from __future__ import annotations
 
 from benchmarks.recordings import readers
+from benchmarks.recordings.losses import LOSSES
 from benchmarks.recordings.recording import Recording
 from benchmarks.recordings.rigs import RIGS
 
@@ -158,4 +159,5 @@ RECORDINGS: tuple[Recording, ...] = (
         "Buildings 135, 2017, recalled and not read again); simulated: the steady flow through a resistance",
     ),
     *RIGS,
+    *LOSSES,
 )  # fmt: skip
