@@ -50,6 +50,8 @@ from toolkit.staging import (
 )
 from toolkit.system import sync_folder, unlock_folder
 
+_REGISTRY = "calibrations"
+_LEDGER_FILES = ("ledger.jsonl", "head.json")
 PENDING, ENTERING = f"{PASSING}results", f"{PASSING}entering"
 _DESCRIBING = (".json", ".toml")
 # What a disk says that is full, over its quota, read only or broken: the place is to blame.
@@ -73,6 +75,7 @@ def publication(folder: Path) -> Iterator[Path]:
         message says that the results are whole and enter with the next command
     """
     target = real_path(folder)
+    check_unguarded(target)
     if any(part.startswith(STAGED) for part in target.parts):
         target.mkdir(parents=True, exist_ok=True)
         yield target
@@ -139,6 +142,62 @@ def settle(folder: Path) -> None:
 
 def check_folder(folder: Path) -> None:
     """Refuse a folder that no results can enter, before they are worked out.
+
+    Raises
+    ------
+    OutputError
+        ``not-writable``; ``guarded``: it is part of a registry
+    """
+    check_unguarded(folder)
+    check_place(folder)
+
+
+def check_unguarded(folder: Path) -> None:
+    """Refuse a folder in which nothing but records and ledgers may lie: a file of another kind damages it.
+
+    Raises
+    ------
+    OutputError
+        ``guarded``
+    """
+    target = real_path(folder)
+    for place in (target, *target.parents):
+        if _is_guarded(place):
+            raise OutputError(
+                "results cannot be written among records and ledgers", where=folder, got=f"a place in {place}",
+                expected="a folder outside the registry and the log of people",
+                next_step="choose another place; nothing was written", rule="guarded",
+            )  # fmt: skip
+
+
+def _is_guarded(folder: Path) -> bool:
+    """Tell whether a folder is a registry, an instrument's folder of one, or the log of people.
+
+    A registry has its name, or holds nothing but folders of instruments.
+    """
+    if _is_ledger(folder):
+        return True
+    try:
+        with os.scandir(folder) as entries:
+            folders = (Path(entry.path) for entry in entries if _is_open_folder(entry))
+            if folder.name == _REGISTRY:
+                return True
+            first = next(folders, None)
+            return first is not None and _is_ledger(first) and all(map(_is_ledger, folders))
+    except (OSError, ValueError):  # there is none, or nobody may look into it
+        return False
+
+
+def _is_open_folder(entry: os.DirEntry[str]) -> bool:
+    return not entry.name.startswith(".") and entry.is_dir(follow_symlinks=False)
+
+
+def _is_ledger(folder: Path) -> bool:
+    return all(os.path.lexists(folder / name) for name in _LEDGER_FILES)
+
+
+def check_place(folder: Path) -> None:
+    """Refuse a folder that cannot be written to.
 
     Raises
     ------

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toolkit.calibration.registry.clock import begun
+from toolkit.days import parse_day
 from toolkit.errors import ConfigError
 from toolkit.files import read_toml, same_file
 from toolkit.inputs import is_regular
@@ -98,7 +99,7 @@ def _date(value: object, toml: Path) -> dt.date:
     if isinstance(value, dt.date):
         return value
     try:
-        return dt.date.fromisoformat(str(value))
+        return parse_day(str(value))
     except ValueError as error:
         raise ConfigError(
             "the test's date is no date",

@@ -308,8 +308,10 @@ def _day_or_none(text: str | None, option: str) -> dt.date | None:
 
 
 def _day(text: str, option: str) -> dt.date:
+    from toolkit.days import parse_day
+
     try:
-        return dt.date.fromisoformat(text)
+        return parse_day(text)
     except ValueError as error:
         from toolkit.errors import ConfigError
 

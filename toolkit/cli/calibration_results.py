@@ -20,7 +20,9 @@ from toolkit.cli.options import (
     day,
     into_file,
     into_folder,
+    moment_of,
 )
+from toolkit.days import FORM
 
 CERTIFICATE = "certificate"
 
@@ -85,14 +87,17 @@ def apply(
         Path,
         typer.Argument(metavar="DATA", help="Indications: CSV, .xlsx, TDMS, LVM, MDF 4, MAT or Parquet."),
     ],
-    out: Annotated[Path, typer.Option("--out", help="A new file: .csv, .xlsx, .tdms, .mf4 or .parquet.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", callback=into_file, help="A new file: .csv, .xlsx, .tdms, .mf4 or .parquet."),
+    ],
     tare: Annotated[
         str | None,
         typer.Option("--tare", help="Unloaded indications, A=..,B=.., in the units of the file."),
     ] = None,
     on: Annotated[
         datetime | None,
-        typer.Option("--on", formats=["%Y-%m-%d"], help="Day of the measurement; default: today."),
+        typer.Option("--on", parser=moment_of, metavar=FORM, help="Day of the measurement; default: today."),
     ] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
@@ -266,7 +271,8 @@ def chart(
 def due(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
     on: Annotated[
-        datetime | None, typer.Option("--on", formats=["%Y-%m-%d"], help="The day to judge; default: today.")
+        datetime | None,
+        typer.Option("--on", parser=moment_of, metavar=FORM, help="The day to judge; default: today."),
     ] = None,
     *,
     place: RegistryOptions,

@@ -210,18 +210,15 @@ def print_error(error: ToolkitError, *, as_json: bool) -> None:
     say(f"error: {error}", err=True)
 
 
-def print_usage_error(error: Exception, *, as_json: bool) -> None:
+def print_usage_error(error: Exception, words: Sequence[str], *, as_json: bool) -> None:
     """Print what was wrong with the command's words."""
-    hint = "see 'toolkit --help' or 'toolkit COMMAND --help'"
     message = str(getattr(error, "format_message", error.__str__)()).strip()
     if message.startswith("Usage:"):  # no words at all: the help is the answer
         typer.echo(message, err=not as_json)
         return
-    if as_json:
-        parts = {"rule": "usage", "what": message, "next_step": hint}
-        typer.echo(json.dumps({"schema": 1, "error": parts}, ensure_ascii=False, indent=2))
-    else:
-        say(f"error: {message}\n  next:     {hint}", err=True)
+    from toolkit.cli.usage import usage_error
+
+    print_error(usage_error(error, words), as_json=as_json)
 
 
 @contextlib.contextmanager

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 import typer
 
 from toolkit.cli.console import answers
-from toolkit.cli.options import Output, into_file
+from toolkit.cli.options import Output, into_file, moment_of
+from toolkit.days import FORM
 from toolkit.findings import FindingEntry
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def correct(
     ] = None,
     on: Annotated[
         datetime | None,
-        typer.Option("--on", formats=["%Y-%m-%d"], help="Day of the decision; default today."),
+        typer.Option("--on", parser=moment_of, metavar=FORM, help="Day of the decision; default today."),
     ] = None,
     *,
     output: Output,

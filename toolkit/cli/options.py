@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from toolkit.cli import console
+from toolkit.days import FORM, parse_day
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -67,6 +68,14 @@ def new_registry(folder: Path | None) -> Path | None:
 
         registry_to_write(folder)
     return folder
+
+
+def moment_of(text: str) -> datetime:
+    """Read the day of an option: the parser of every one that takes a day."""
+    try:
+        return datetime.combine(parse_day(text), datetime.min.time())
+    except ValueError:
+        raise typer.BadParameter(f"'{text}' is not a valid day {FORM}, such as 2026-03-31") from None
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
@@ -157,7 +166,9 @@ CalibrationId = Annotated[
 ]
 KnownAt = Annotated[
     datetime | None,
-    typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
+    typer.Option(
+        "--known-at", parser=moment_of, metavar=FORM, help="Judge the registry as known on this day."
+    ),
 ]
 Draft = Annotated[
     bool,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypedDict, cast
 
 import typer
 
-from toolkit.cli.console import Command, answers, ask_passphrase
+from toolkit.cli.console import answers, ask_passphrase
 from toolkit.cli.options import (
     DecisionOptions,
     Output,
@@ -168,7 +169,7 @@ def policy(
 
 
 @ledger.command()
-@Command
+@answers("toolkit.lab.signatures.people:ProofAnswer")
 def prove(
     instrument: Instrument,
     entry: Annotated[int | None, typer.Option("--entry", help="Entry, from 1; default: the last.")] = None,
@@ -178,6 +179,7 @@ def prove(
     ] = None,
     *,
     place: RegistryOptions,
+    output: Output,
 ) -> int:
     """Print an entry with the proof that it is in the ledger of today, for `ledger check` on any later day.
 
@@ -191,7 +193,11 @@ def prove(
         from toolkit.lab.signatures.sealing import stamped
 
         document = stamped(document, time_stamp)
-    typer.echo(document, nl=False)
+    payload = json.loads(document)
+    del payload["schema"]  # every answer has it
+    output.answer(
+        payload, document.rstrip("\n")
+    )  # with --json and without: the document is for `ledger check`
     return 0
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast
 import typer
 
 from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_folder
+from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_folder, moment_of
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -83,7 +83,10 @@ def session(
     on: Annotated[
         datetime | None,
         typer.Option(
-            "--on", formats=["%Y-%m-%d"], help="Day whose record in force is taken; default: today."
+            "--on",
+            parser=moment_of,
+            metavar="YYYY-MM-DD",
+            help="Day whose record in force is taken; default: today.",
         ),
     ] = None,
     out: Out = None,

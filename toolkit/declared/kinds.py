@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
+from toolkit.days import parse_day
 from toolkit.declared.faults import Fault, display, nearest
 from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Path, Text
 from toolkit.files import is_number, number_expected
@@ -320,9 +321,9 @@ class DateKind(Kind):
         day = value if type(value) is dt.date else None
         if self.moment and isinstance(value, dt.datetime):
             day = value.date()
-        if isinstance(value, str) and len(value) == len("2026-03-31"):
+        if isinstance(value, str):
             try:
-                day = dt.date.fromisoformat(value)
+                day = parse_day(value)
             except ValueError:
                 day = None
         if day is None:

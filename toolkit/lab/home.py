@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
 from toolkit.files import real_path
-from toolkit.publication import check_folder, publication
+from toolkit.publication import check_place, publication
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -90,7 +90,7 @@ def calibrations_folder(calibrations: Path | None = None, home: Path | None = No
 def registry_to_write(calibrations: Path | None = None, home: Path | None = None) -> Path:
     """Return the registry folder of a command that enters a record: one that was named may yet be made."""
     if calibrations is not None and not os.path.lexists(calibrations):
-        check_folder(calibrations)
+        check_place(calibrations)
         return calibrations.absolute()
     return calibrations_folder(calibrations, home)
 

@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse
 
 from toolkit.calibration.registry.registry import ID
+from toolkit.days import parse_day
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab.desk.chart import Chart, Series
 from toolkit.lab.desk.pending import decide as settle_decision
@@ -185,7 +186,7 @@ def _order(decision: str, record_id: str, form: Mapping[str, str]) -> Order:
 
 def _day(form: Mapping[str, str], name: str) -> dt.date:
     try:
-        return dt.date.fromisoformat(form.get(name, ""))
+        return parse_day(form.get(name, ""))
     except ValueError as error:
         raise ConfigError(
             "a day cannot be read", where=name.replace("_", " "), got=form.get(name) or "nothing",

@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.calibration.session.session_file import SessionFile
+from toolkit.days import parse_day
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab.desk import drafts
 from toolkit.lab.desk.pending import decide
@@ -242,7 +243,7 @@ def _to(bench: Bench, place: str) -> Response:
 
 def _day(text: str) -> dt.date:
     try:
-        return dt.date.fromisoformat(text)
+        return parse_day(text)
     except ValueError as error:
         raise _unstated("date", text or "nothing", "YYYY-MM-DD") from error
 

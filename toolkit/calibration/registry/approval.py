@@ -11,48 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry import gates
-from toolkit.calibration.registry.clock import check_begun, now, today, untimely
+from toolkit.calibration.registry.clock import now, today
 from toolkit.calibration.registry.judgement import judge_stored, machine_of, read_polarity_file
+from toolkit.calibration.registry.life import check_line
 from toolkit.calibration.registry.registry import Registry, instrument_of
-from toolkit.calibration.registry.status import RecordStatus, parse_interval, status_of
+from toolkit.calibration.registry.status import RecordStatus, parse_interval
 from toolkit.calibration.registry.store import Change
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.errors import RegistryError, ToolkitError
 from toolkit.findings import Finding
 from toolkit.inputs import read_regular
-from toolkit.trust.people import name_key
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.ledger import Entry, Ledger
-
-
-def check_names(record: CalibrationRecord, checked_by: str, approved_by: str | None) -> None:
-    """Refuse a decision whose names are not different.
-
-    Raises
-    ------
-    RegistryError
-        ``names``
-    """
-    names = [("entered by", record.entered_by), ("checked by", checked_by)]
-    names += [("approved by", approved_by)] if approved_by is not None else []
-    roles: dict[str, str] = {}
-    for role, name in names:
-        key = name_key(name)
-        if not key or key in roles:
-            raise RegistryError(
-                "entered, checked and approved must be different names",
-                where=record.id,
-                got=f"{role} {name!r}" + (f", also {roles[key]}" if key in roles else ""),
-                expected=f"a name that is none of {', '.join(f'{n!r} ({r})' for r, n in names if r != role)}",
-                next_step=f"nothing was changed; see 'toolkit calibration show {record.id}'",
-                rule="names",
-            )
-        roles[key] = role
+    from toolkit.calibration.registry.ledger import Ledger
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,46 +85,27 @@ def approve(
     folder = registry.folder / instrument_of(record_id)
     day = known_on or registry.today()
     record = registry.load(record_id)
-    check_names(record, checked_by, approved_by)
     definition = machine_of(record.instrument, machine)
     readings = () if polarity is None else read_polarity_file(polarity, record)
-    if in_force_from < day and not reason and in_force_from < dt.date.fromisoformat(record.date):
-        raise _refused(
-            record_id, "an in-force date before the session's own date needs a reason",
-            f"in force from {in_force_from.isoformat()}, session of {record.date}",
-            f"a date from {record.date} on, or --reason TEXT, which the ledger keeps", "approval",
-        )  # fmt: skip
-    _check_day(record, day, reason, registry.today())
     interval = None if recall is None else str(parse_interval(recall))
     early = (day - in_force_from).days
     note = f"in force from {_days(early)} before the decision" if early > 0 else None
     decided: list[Decision] = []
 
     def build(ledger: Ledger) -> Change | None:
-        if record_id not in ledger.entered():
-            # The folder was removed or exchanged since the record was read.
-            raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
-        status = status_of(record_id, ledger.of(record_id), dt.date.max)
-        if status.ended:
-            raise _refused(
-                record_id, f"a {status.state} record cannot be approved",
-                f"{status.state}: {status.reason or 'no reason stated'}", "a new session", "approval",
-            )  # fmt: skip
-        changes = status.in_force_from != in_force_from or interval not in (None, status.recall)
-        if status.in_force_from is not None and not (reason and changes):
-            raise _refused(
-                record_id, "the record is approved already",
-                f"in force from {status.in_force_from.isoformat()}",
-                "another in-force date or recall interval, with --reason TEXT", "approval",
-            )  # fmt: skip
-        if status.in_force_from is not None and in_force_from > status.in_force_from:
-            # The first approval stands: the days between would stay in force, whatever was answered here.
-            raise _refused(
-                record_id, "an approved record cannot come into force later than it did",
-                in_force_from.isoformat(),
-                f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void",
-                "approval",
-            )  # fmt: skip
+        event: dict[str, Any] = {
+            "event": "approved",
+            "id": record_id,
+            "time": now(),
+            "by": checked_by,
+            "known_on": day.isoformat(),
+            "since": in_force_from.isoformat(),
+        }
+        stated = {"approved_by": approved_by, "reason": reason, "note": note, "recall": interval}
+        event |= {key: value for key, value in stated.items() if value}
+        if approved_by is not None:
+            event["approved_by"] = approved_by
+        check_line(event, ledger, record, today=registry.today)
         judged = judge_stored(registry, record, ledger, machine=definition, readings=readings, reason=reason)
         failed = judged.failed
         check, loads = stored_check(registry.folder, record), stored_loads(registry.folder, record)
@@ -175,20 +130,7 @@ def approve(
         )
         if failed:
             return None
-        event: dict[str, Any] = {
-            "event": "approved",
-            "id": record_id,
-            "time": now(),
-            "by": checked_by,
-            "known_on": day.isoformat(),
-            "since": in_force_from.isoformat(),
-            "unverifiable": list(terms),
-        }
-        details = {
-            "approved_by": approved_by, "reason": reason, "note": note, "recall": interval,
-            "evidence": list(evidence),
-        }  # fmt: skip
-        event |= {key: value for key, value in details.items() if value}
+        event |= {"unverifiable": list(terms)} | ({"evidence": list(evidence)} if evidence else {})
         return Change(files={}, event=event)
 
     registry.commit(folder.name, build)
@@ -218,26 +160,8 @@ def withdraw(
         ``time``: a day in the future, or before the session
     """
     folder = registry.folder / instrument_of(record_id)
-    if not reason.strip():
-        raise _refused(record_id, "a withdrawal needs a reason", "nothing", "--reason TEXT", "withdrawal")
-    if not name_key(by):
-        raise _refused(record_id, "a withdrawal needs a name", "nothing", "--by NAME: who withdraws", "names")
-    check_begun(on, "the day on which the fault became known", record_id)
 
     def build(ledger: Ledger) -> Change:
-        if record_id not in ledger.entered():
-            raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
-        _check_not_before(_read(folder, record_id), on)
-        status = status_of(record_id, ledger.of(record_id), dt.date.max)
-        if status.ended:
-            raise _refused(
-                record_id,
-                f"the record is {status.state} already",
-                f"{status.state}: {status.reason or 'no reason stated'}",
-                "a record that stands",
-                "withdrawal",
-            )
-        _check_after_approval(record_id, ledger.of(record_id), on)
         event: dict[str, Any] = {
             "event": "withdrawn",
             "id": record_id,
@@ -251,44 +175,14 @@ def withdraw(
             "since": void_from and void_from.isoformat(),
             "note": f"entered {_days(late)} after it became known" if late > 0 else None,
         }
-        return Change(files={}, event=event | {key: value for key, value in details.items() if value})
+        event |= {key: value for key, value in details.items() if value}
+        check_line(event, ledger, _read(folder, record_id), today=registry.today)
+        return Change(files={}, event=event)
 
     if not folder.is_dir():
         raise _refused(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
     registry.commit(folder.name, build)
     return registry.status(record_id, known_at=max(on, today()))
-
-
-def _check_day(record: CalibrationRecord, day: dt.date, reason: str | None, entered_on: dt.date) -> None:
-    """Refuse a decision in the future, before its session, or dated back without a reason."""
-    check_begun(day, "the day of the decision", record.id)
-    _check_not_before(record, day)
-    if day < entered_on and not (reason and reason.strip()):
-        raise _refused(
-            record.id, "a decision that is dated back needs a reason",
-            f"decided on {day.isoformat()}, entered on {entered_on.isoformat()}",
-            "--reason TEXT, which says why it was not entered on its day; the ledger keeps both days", "time",
-        )  # fmt: skip
-
-
-def _check_not_before(record: CalibrationRecord | None, day: dt.date) -> None:
-    # A legacy record has no session: its date is that of the source that names its coefficients.
-    if record is not None and record.kind == "fit" and day < dt.date.fromisoformat(record.date):
-        raise untimely(
-            "a decision lies before the session that it is about", record.id,
-            f"decided on {day.isoformat()}, session of {record.date}", f"a day from {record.date} on",
-        )  # fmt: skip
-
-
-def _check_after_approval(record_id: str, entries: Sequence[Entry], on: dt.date) -> None:
-    """Refuse a withdrawal that was known before the approval: that would not have been made."""
-    days = [entry.known_on for entry in entries if entry.event == "approved" and entry.known_on is not None]
-    if days and on < min(days):
-        raise untimely(
-            "a withdrawal lies before the approval that it ends", record_id,
-            f"known on {on.isoformat()}, approved on {min(days).isoformat()}",
-            f"a day from {min(days).isoformat()} on; --from says from which day on the record is void",
-        )  # fmt: skip
 
 
 def _read(folder: Path, record_id: str) -> CalibrationRecord | None:
@@ -327,33 +221,18 @@ def discard(registry: Registry, record_id: str, *, reason: str, by: str) -> Reco
         Nothing is written
     """
     folder = registry.folder / instrument_of(record_id)
-    if not reason.strip():
-        raise _refused(record_id, "a discard needs a reason", "nothing", "--reason TEXT", "discard")
-    if not name_key(by):
-        raise _refused(record_id, "a discard needs a name", "nothing", "--by NAME: who discards", "names")
 
     def build(ledger: Ledger) -> Change:
-        if record_id not in ledger.entered():
-            raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
-        _check_not_before(_read(folder, record_id), registry.today())
-        status = status_of(record_id, ledger.of(record_id), dt.date.max)
-        if status.state != "candidate":
-            standing = f"{status.state}: {status.reason}" if status.reason else status.state
-            raise _refused(
-                record_id, f"the record is {status.state}, and only a candidate can be discarded", standing,
-                "a candidate that was never approved; an approved record is withdrawn", "discard",
-            )  # fmt: skip
-        return Change(
-            files={},
-            event={
-                "event": "discarded",
-                "id": record_id,
-                "time": now(),
-                "by": by,
-                "known_on": registry.today().isoformat(),
-                "reason": reason.strip(),
-            },
-        )
+        event = {
+            "event": "discarded",
+            "id": record_id,
+            "time": now(),
+            "by": by,
+            "known_on": registry.today().isoformat(),
+            "reason": reason.strip(),
+        }
+        check_line(event, ledger, _read(folder, record_id), today=registry.today)
+        return Change(files={}, event=event)
 
     if not folder.is_dir():
         instruments = ", ".join(registry.instruments()) or "a record"

@@ -11,20 +11,21 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry.gates import GateResult, layout, sign_and_span
-from toolkit.calibration.registry.registry import load_checked
 from toolkit.calibration.registry.response import main_indications, response, same_dimension
 from toolkit.calibration.registry.status import status_of
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
 
 if TYPE_CHECKING:
+    from datetime import date
+    from pathlib import Path
+
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
-    from toolkit.calibration.registry.registry import Registry
 
 # Another cell for the same loads may be of another capacity; ten times the output is a slip of a unit.
 REPLACED_SPAN = 10.0
@@ -41,8 +42,24 @@ class History:
 NO_HISTORY = History(last=None, returned={})
 
 
-def approved_ids(ledger: Ledger, *, but: str = "") -> list[str]:
-    """Return the approved records that are not withdrawn, the newest first."""
+class Records(Protocol):
+    """Where the records of a ledger are read: a registry."""
+
+    @property
+    def folder(self) -> Path:
+        """The registry's folder."""
+
+    def load_by(self, ledger: Ledger, record_id: str) -> CalibrationRecord:
+        """Return a record that passes the gates of its loading."""
+
+
+def approved_ids(ledger: Ledger, *, but: str = "", before: int | None = None) -> list[str]:
+    """Return the approved records that are not withdrawn, the newest first.
+
+    ``before``: those that were approved and not withdrawn before a line of the ledger.
+    """
+    if before is not None:
+        return _approved_before(ledger, but, before)
     ranks = []
     known_on = ledger.known_on()
     for record_id in ledger.entered():
@@ -53,8 +70,28 @@ def approved_ids(ledger: Ledger, *, but: str = "") -> list[str]:
     return [record_id for _, _, record_id in sorted(ranks, reverse=True)]
 
 
-def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *, but: str = "") -> History:
-    """Return what a record's cells are compared with.
+def _approved_before(ledger: Ledger, but: str, line: int) -> list[str]:
+    since: dict[str, date] = {}
+    for entry in ledger.decisions:
+        if entry.seq >= line:
+            break
+        if entry.event != "approved":
+            since.pop(entry.id, None)
+        elif entry.since is not None and entry.id != but:
+            since[entry.id] = min(entry.since, since.get(entry.id, entry.since))
+    newest = max(since.values(), default=None)
+    last = {
+        record_id: max(entry.seq for entry in ledger.of(record_id) if entry.seq < line)
+        for record_id, day in since.items()
+        if day == newest
+    }
+    return sorted(since, key=lambda record_id: (since[record_id], last.get(record_id, 0)), reverse=True)
+
+
+def history_of(
+    registry: Records, record: CalibrationRecord, ledger: Ledger, *, but: str = "", before: int | None = None
+) -> History:
+    """Return what a record's cells are compared with; ``before`` as of `approved_ids`.
 
     Only where a cell is not that of the last record are older ones read.
 
@@ -63,10 +100,10 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
     RecordError
         a record that is compared with fails a gate
     """
-    folder, ids = registry.folder / record.instrument, approved_ids(ledger, but=but)
+    folder, ids = registry.folder / record.instrument, approved_ids(ledger, but=but, before=before)
     if not ids:
         return NO_HISTORY
-    last = load_checked(folder, ids[0], ledger)
+    last = registry.load_by(ledger, ids[0])
     serials = {cell.name: cell.serial for cell in record.cells}
     # Without a serial nobody knows which cell it is.
     sought = {name for name in exchanged(record, last) if serials[name] is not None}
@@ -80,7 +117,7 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
             continue
         unchanged = {cell.name for cell in had.cells if serials.get(cell.name) == cell.serial} & sought
         if unchanged:
-            checked = load_checked(folder, record_id, ledger)
+            checked = registry.load_by(ledger, record_id)
             returned |= dict.fromkeys(unchanged, checked)
             sought -= unchanged
         if not sought:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,15 +17,21 @@ import numpy as np
 
 from toolkit.calibration.apply import apply_record
 from toolkit.calibration.registry.gates import GateResult, check_loads
-from toolkit.calibration.registry.history import NO_HISTORY, History, agreeing, compared, history_of
+from toolkit.calibration.registry.history import NO_HISTORY, History, Records, agreeing, compared, history_of
 from toolkit.calibration.registry.plausible import plausible, tare_claim
-from toolkit.calibration.registry.response import largest_load, main_indications, response, tolerance
+from toolkit.calibration.registry.response import (
+    largest_load,
+    main_indications,
+    response,
+    same_dimension,
+    tolerance,
+)
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.session.readings import PolarityReading, polarity_readings
 from toolkit.calibration.session.statements import scope_of, statements_of
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, parse_toml
+from toolkit.files import check_keys, parse_toml, reads_as_number
 from toolkit.inputs import SETTINGS_FILE, read_input
 from toolkit.machine import load_machine, machine_names
 from toolkit.units import si_scale
@@ -34,7 +41,6 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
-    from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
     from toolkit.machine.definition import Machine
 
@@ -138,7 +144,8 @@ def reading_polarity(
             }
             indications |= signs
             evidence.append(
-                f"polarity reading: {comparison}; it shows {', '.join(sorted(signs)) or 'no cell'}"
+                f"polarity reading of {reading.load}: {comparison}; it shows "
+                f"{', '.join(sorted(signs)) or 'no cell'}"
             )
             continue
         failed.append(GateResult(rule="polarity-reading", where=reading.place, message=message))
@@ -188,6 +195,69 @@ def _in_rows(reading: PolarityReading, table: Table) -> bool:
     return bool((np.abs(rows - np.array(values)) <= _EQUAL * scale).all(axis=1).any())
 
 
+_BY_MACHINE = re.compile(
+    r"signs as machine (?P<name>.+), version (?P<version>.+), states them: (?P<pairs>.+)", re.DOTALL
+)
+_BY_READING = re.compile(
+    r"polarity reading(?: of (?P<load>.+))?: (?P<predicted>\S+) (?P<unit>.+) by the record where "
+    r"(?P<value>\S+) (?P=unit) were applied; it shows (?P<cells>.+)",
+    re.DOTALL,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """What the evidence of an approval says of signs: by which machine (name, version), and by readings."""
+
+    machine: tuple[str, str] | None
+    stated: Confirmed
+    read: Confirmed
+
+
+def evidence_of(texts: Sequence[str], record: CalibrationRecord) -> Evidence:
+    """Read the evidence of an approval back: the texts of `machine_polarity` and `reading_polarity`.
+
+    A reading of earlier versions does not name its load: it is one of those in its unit.
+    """
+    machine: tuple[str, str] | None = None
+    pairs: set[tuple[str, str]] = set()
+    loads: set[str] = set()
+    indications: set[str] = set()
+    for text in texts:
+        if match := _BY_MACHINE.fullmatch(text):
+            machine = match["name"], match["version"]
+            stated = (pair.rpartition(" ") for pair in match["pairs"].split(", "))
+            pairs |= {(load, name) for load, _, name in stated}
+        elif (match := _BY_READING.fullmatch(text)) and _agree(match["predicted"], match["value"]):
+            loads |= {
+                load.load for load in record.loads
+                if match["load"] in (None, load.load) and same_dimension(load.unit, match["unit"])
+            }  # fmt: skip
+            indications |= {name for name in match["cells"].split(", ") if name in record.indications}
+    stated_pairs = frozenset(pairs)
+    return Evidence(
+        machine=machine,
+        stated=Confirmed(
+            pairs=stated_pairs, loads=frozenset(load for load, _ in stated_pairs),
+            indications=frozenset(name for _, name in stated_pairs), evidence=(),
+        ),
+        read=Confirmed(
+            pairs=frozenset(), loads=frozenset(loads), indications=frozenset(indications), evidence=()
+        ),
+    )  # fmt: skip
+
+
+def _agree(predicted: str, value: str) -> bool:
+    return reads_as_number(predicted) and reads_as_number(value) and float(predicted) * float(value) > 0
+
+
+def _joined(first: Confirmed, second: Confirmed) -> Confirmed:
+    return Confirmed(
+        pairs=first.pairs | second.pairs, loads=first.loads | second.loads,
+        indications=first.indications | second.indications, evidence=(*first.evidence, *second.evidence),
+    )  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
     """What the gates say, and ``evidence``: by what the signs are confirmed, in words."""
@@ -216,6 +286,7 @@ def judge(
     check: Table | None = None,
     reason: str | None = None,
     confirmed_before: bool = False,
+    evidence: Evidence | None = None,
 ) -> Judgement:
     """Return what every gate says about a record.
 
@@ -227,11 +298,14 @@ def judge(
     loads, check : its reference loads and check loads, in its own units
     reason : why cells were replaced, where the session does not say it
     confirmed_before : the record was approved once, so that its signs need no other confirmation
+    evidence : what an approval was shown of its signs, where it is judged again
     """
     readings = (*session_readings(record), *readings)
     tables = [table for table in (loads, check) if table is not None]
     by_machine, stated = machine_polarity(record, machine)
     by_reading, read = reading_polarity(record, readings, tables)
+    if evidence is not None:
+        stated, read = _joined(stated, evidence.stated), _joined(read, evidence.read)
     # A wire turns an indication in every load: where load and indication are confirmed, their pair is.
     confirmed = {
         (load, name) for load in stated.loads | read.loads for name in stated.indications | read.indications
@@ -262,7 +336,7 @@ def judge(
 
 
 def judge_stored(
-    registry: Registry,
+    registry: Records,
     record: CalibrationRecord,
     ledger: Ledger,
     *,

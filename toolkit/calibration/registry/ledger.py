@@ -14,7 +14,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import hashlib
-import itertools
 import json
 import re
 import sys
@@ -26,6 +25,7 @@ from typing import Any
 
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.clock import day_of, moment, today
+from toolkit.days import parse_day
 from toolkit.files import sha256_bytes
 from toolkit.trust.decisions import SIGNATURE
 
@@ -70,7 +70,7 @@ class LineForm:
     def finish(self, body: dict[str, Any]) -> None:
         """Make of the entries of such a line what `Entry` has: days, and lists that nobody changes."""
         for name in self._days:
-            body[name] = date.fromisoformat(body[name])
+            body[name] = parse_day(body[name])
         for name in self._lists:
             body[name] = tuple(body[name])
 
@@ -150,6 +150,7 @@ EVENTS = ("entered", "approved", "withdrawn", "discarded", "issued", "enrolled")
 _FORMS = LineForms()
 """Those of the lines of all ledgers that this process has read: few, and their names are in memory once."""
 _DAMAGE = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+_DECIDING = frozenset(("approved", "withdrawn", "discarded"))
 BRINGING = ("entered", "enrolled")  # events with files of their own
 
 
@@ -227,7 +228,7 @@ class Ledger:
     ``hidden`` are the files of a write that was cut off: they belong to no record. ``lines`` are the texts of
     the entries, ``void`` the numbers of those that decide nothing: their key was stolen.
 
-    Without slots: the two look-ups by id are made once and kept.
+    Without slots: its look-ups are made once and kept.
     """
 
     entries: tuple[Entry, ...]
@@ -240,6 +241,10 @@ class Ledger:
     def head(self) -> str:
         """The last line's hash; zeros where there is none."""
         return self.entries[-1].sha256 if self.entries else START
+
+    def texts(self) -> list[str]:
+        """Return the lines as text."""
+        return [line.decode() for line in self.lines]
 
     @property
     def decided(self) -> str:
@@ -257,16 +262,6 @@ class Ledger:
         """
         return known_at or max([today(), *(day_of(entry.time) for entry in self.entries[-1:])])
 
-    def disorder(self) -> str | None:
-        """Say which entry's time lies before that of the one before it; None where none does."""
-        for last, entry in itertools.pairwise(self.entries):
-            if moment(entry.time) < moment(last.time):
-                return (
-                    f"line {entry.seq} was entered at {entry.time}, before line {last.seq} at {last.time}: "
-                    "a clock was set back"
-                )
-        return None
-
     def of(self, record_id: str) -> tuple[Entry, ...]:
         """Return the events of one record, oldest first."""
         return self._events.get(record_id, ())
@@ -274,6 +269,11 @@ class Ledger:
     def entered(self) -> Mapping[str, Entry]:
         """Return each record's entry by id."""
         return self._entered
+
+    @cached_property
+    def decisions(self) -> tuple[Entry, ...]:
+        """The lines that put a record in force or end it, without those that decide nothing."""
+        return tuple(e for e in self.entries if e.event in _DECIDING and e.seq not in self.void)
 
     @cached_property
     def _events(self) -> dict[str, tuple[Entry, ...]]:

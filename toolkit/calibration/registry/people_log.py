@@ -19,9 +19,11 @@ from typing import Any
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.clock import now
 from toolkit.calibration.registry.ledger import START, Ledger
+from toolkit.calibration.registry.life import disorder
 from toolkit.calibration.registry.lock import writing
 from toolkit.calibration.registry.signatures import Place, unproved
 from toolkit.calibration.registry.store import Change, commit
+from toolkit.calibration.registry.witnessed import contradicted
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import sha256_bytes, write_atomic
 from toolkit.inputs import read_regular
@@ -67,11 +69,19 @@ def read_people(calibrations: Path) -> PeopleLog:
         ``people-log``: the log is damaged, or one of its entries is no decision of the people before it
     """
     folder = place_of(calibrations)
+    # Of an instrument that is called so the witnesses signed under its name.
+    shared = (calibrations / FOLDER).is_dir()
     if not folder.is_dir():
+        lost = None if shared else contradicted(calibrations, FOLDER, list)
+        if lost is not None:
+            raise _damaged(folder, lost)
         return PeopleLog(history=History(), heads=())
     ledger = settled.read(folder)
-    if ledger.damage is not None:
-        raise _damaged(folder, ledger.damage)
+    damage = ledger.damage or disorder(ledger)
+    if damage is None and not shared:
+        damage = contradicted(calibrations, FOLDER, ledger.texts)
+    if damage is not None:
+        raise _damaged(folder, damage)
     history = _history(folder, ledger)
     if history.now is None:
         return PeopleLog(history=History(), heads=())

@@ -169,9 +169,12 @@ def _intercept(record: CalibrationRecord, load: LoadFit, loads: Table) -> list[G
     if INTERCEPT not in load.terms or not load.covariance:
         return []
     at = load.terms.index(INTERCEPT)
+    value, own = load.coefficients[at], load.standard_errors[at]
+    if abs(value) <= max(AT_ZERO * _limit(load), _SIGMAS * own):
+        return []  # whatever reversal and misfit add
     scatter = scatter_of(record, loads, load)
-    value, u = load.coefficients[at], math.hypot(load.standard_errors[at], scatter.reversal, scatter.misfit)
-    if abs(value) <= max(AT_ZERO * _limit(load), _SIGMAS * u):
+    u = math.hypot(own, scatter.reversal, scatter.misfit)
+    if abs(value) <= _SIGMAS * u:
         return []
     message = (
         f'zero = "tared" does not hold: the intercept is {value:+.4g} {load.unit}, its standard uncertainty '

@@ -12,21 +12,21 @@ from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
-from toolkit.calibration.records.record import CalibrationRecord, from_bytes
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry import settled
-from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.registry.clock import day_of, now, today
+from toolkit.calibration.registry.conformity import check_conforms
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, decisions
+from toolkit.calibration.registry.life import check_line, misplaced
+from toolkit.calibration.registry.loading import load_reproduced
 from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, instruments_of, read_people
-from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.signatures import revoked, signature_line, unproved
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
-from toolkit.calibration.registry.stored import bad_record as _bad
-from toolkit.calibration.registry.stored import parse_loads, reason_of
-from toolkit.errors import RecordError, RegistryError, ToolkitError
+from toolkit.calibration.registry.stored import reason_of
+from toolkit.calibration.registry.witnessed import contradicted
+from toolkit.errors import RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
-from toolkit.inputs import read_regular
 from toolkit.trust.keys import Signer
 from toolkit.trust.signing import HERE, Signing, Travel
 
@@ -138,7 +138,11 @@ class Registry:
                     got=f"{len(self.people().heads)} versions of them", expected=f"{len(people.heads)}",
                     next_step="repeat the command; nothing was changed", rule="ledger-moved",
                 )  # fmt: skip
-            return build(ledger)
+            change = build(ledger)
+            if change is not None:
+                # Nothing is written that no reader would believe.
+                check_line(change.event, ledger)
+            return change
 
         return commit(
             self.folder / instrument,
@@ -155,7 +159,9 @@ class Registry:
         key = (instrument, ledger.head, "" if version is None else version.sha256)
         if key not in self._proved:
             self._proved[key] = (
-                unproved(ledger, people.history, people.places(instrument)),
+                misplaced(ledger, instrument)
+                or unproved(ledger, people.history, people.places(instrument))
+                or contradicted(self.folder, instrument, ledger.texts),
                 revoked(ledger, people.history),
             )
         damage, void = self._proved[key]
@@ -200,12 +206,17 @@ class Registry:
         Raises
         ------
         RecordError
-            with rule ``missing unreadable hash ledger data refit golden``
+            with rule ``missing unreadable hash ledger data refit golden``; that of a line that no command
+            writes: ``names approval withdrawal discard time recall``
         RegistryError
             the text is no record id
         """
         instrument = instrument_of(record_id)
         return load_checked(self.folder / instrument, record_id, self.ledger(instrument))
+
+    def load_by(self, ledger: Ledger, record_id: str) -> CalibrationRecord:
+        """Return a record as `load` does, by a ledger that was read before."""
+        return load_checked(self.folder / instrument_of(record_id), record_id, ledger)
 
     def usable(self, instrument: str) -> tuple[tuple[CalibrationRecord, ...], tuple[Refused, ...]]:
         """Return the records that pass every gate, and those that do not with the reason."""
@@ -324,43 +335,8 @@ def record_ids(folder: Path, ledger: Ledger) -> tuple[str, ...]:
 
 def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRecord:
     """Read one record and run every load-time gate, in the order of the rules in `Registry.load`."""
-    path = folder / f"{record_id}.json"
-    entered = ledger.entered().get(record_id)
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        raise RecordError(
-            f"record {record_id} is missing" if entered else f"the registry has no record {record_id}",
-            where=path,
-            got=error.strerror if entered else record_id,
-            expected="the record's file" if entered else ", ".join(ledger.entered()) or "a record",
-            next_step="restore it from a backup" if entered else "see 'toolkit calibration list'",
-            rule="missing",
-        ) from error
-    record = from_bytes(data, where=path)
-    if ledger.damage is not None:
-        raise _bad(record_id, path, f"the ledger is damaged: {ledger.damage}", "an unbroken ledger", "ledger")
-    if entered is None or record.id != record_id or record.instrument != folder.name:
-        raise _bad(record_id, path, "no entry of this record in the ledger", "an 'entered' line", "ledger")
-    if entered.record != record.sha256:
-        raise _bad(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
-    if entered.signatures and (entered.action == "import") != (record.kind == "legacy"):
-        raise _bad(
-            record_id, path, f"a {record.kind} record", f"what its entry says: {entered.action}", "ledger"
-        )
-    if entered.file != sha256_bytes(data):
-        raise _bad(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
-    contents = {part.role: _data_file(record_id, folder / part.file, part.sha256) for part in record.data}
-    try:
-        if record.kind == "legacy":
-            check_transcribed(record, contents["source"])
-            return record
-        table = parse_loads(record, contents["loads"], folder)
-        check_agrees(record, contents["session"], table, contents.get("dcc"))
-    except KeyError as error:
-        raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
-    check_reproduces(record, table)
-    check_inputs(record)
+    record = load_reproduced(folder, record_id, ledger)
+    check_conforms(folder, record, ledger)
     return record
 
 
@@ -375,18 +351,6 @@ def load_many(
         except ToolkitError as error:
             loaded[record_id] = error
     return loaded
-
-
-def _data_file(record_id: str, path: Path, expected: str) -> bytes:
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        raise _bad(
-            record_id, path, f"{path.name}: {error.strerror}", "the data that belong to the record", "data"
-        ) from error
-    if (digest := sha256_bytes(data)) != expected:
-        raise _bad(record_id, path, f"{path.name} with sha256 {digest}", f"{expected} as entered", "data")
-    return data
 
 
 def _best(ledger: Ledger, on: date, known_on: date) -> str | None:

@@ -114,8 +114,12 @@ def unproved(
     line is judged by the version before it.
     """
     if history.now is None:
-        signed = next((entry.seq for entry in ledger.entries if entry.signatures), None)
-        return None if signed is None else f"line {signed} is signed, and the log of people is missing"
+        for entry in ledger.entries:
+            # What only a signed line says stays where its signatures were taken off.
+            if entry.signatures or entry.people or entry.extends:
+                states = "is signed" if entry.signatures else "names the people of its time and is not signed"
+                return f"line {entry.seq} {states}, and the log of people is missing"
+        return None
     for number, place in enumerate(places, start=1):
         if place is not None and _end(ledger, place[0]) != place[1]:
             there = "" if number == 1 else f" for version {number}"

@@ -5,18 +5,19 @@ Many records are shared out among processes; the rows are the same and in the sa
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
-from toolkit.calibration.registry.clock import begun, moment
-from toolkit.calibration.registry.ledger import HEAD, LEDGER, Entry, Ledger
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
+from toolkit.calibration.registry.people_log import FOLDER
 from toolkit.calibration.registry.registry import ID, load_many
 from toolkit.calibration.registry.settled import is_passing
+from toolkit.calibration.registry.witnessed import attested
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
 from toolkit.system import can_fork, processors
@@ -74,7 +75,19 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
             rows.append(VerifyRow(id=HEAD, ok=False, verified=False, reason=f"ledger: {damage}"))
     for instrument, ledger in ledgers.items():
         rows += _instrument(registry.folder / instrument, ledger)
+    for instrument in sorted(_attested(registry) - {*ledgers, FOLDER}):
+        reason = "missing: people or witnesses have signed entries of its ledger"
+        rows.append(VerifyRow(id=instrument, ok=False, verified=False, reason=reason))
     return tuple(rows)
+
+
+def _attested(registry: Registry) -> set[str]:
+    """Return the instruments of whose ledgers something was signed."""
+    names = set(attested(registry.folder))
+    with contextlib.suppress(ToolkitError):  # `_people` says what is wrong with them
+        for heads in registry.people().heads:
+            names |= {name for name, row in (heads or {}).items() if row.get("count")}
+    return names
 
 
 def _people(registry: Registry) -> list[VerifyRow]:
@@ -104,8 +117,6 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     for row, files in _judged(folder, ids, ledger):
         rows.append(row)
         owned |= {f"{row.id}.json", *files}
-    if (disorder := ledger.disorder()) is not None:
-        rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"time: {disorder}"))
     if ledger.damage is not None and not rows:
         rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"ledger: {ledger.damage}"))
     rows += [_stray(name) for name in _files(folder) if name not in owned and not is_passing(name)]
@@ -148,43 +159,17 @@ def _judge_shared(folder: Path, ids: Sequence[str]) -> list[_Judged]:
 def _judge(folder: Path, ids: Sequence[str], ledger: Ledger) -> list[_Judged]:
     """Return the rows of some records and the names of their files."""
     loaded = load_many(folder, ids, ledger)
-    return [_row(folder, record_id, result, ledger) for record_id, result in loaded.items()]
+    return [_row(folder, record_id, result) for record_id, result in loaded.items()]
 
 
-def _row(folder: Path, record_id: str, loaded: CalibrationRecord | ToolkitError, ledger: Ledger) -> _Judged:
+def _row(folder: Path, record_id: str, loaded: CalibrationRecord | ToolkitError) -> _Judged:
     if isinstance(loaded, ToolkitError):
         reason = f"{loaded.rule or 'unreadable'}: {loaded.what}"
         reason += f" (got {loaded.got}, expected {loaded.expected})" if loaded.got else ""
         row = VerifyRow(id=record_id, ok=False, verified=False, reason=reason)
         return row, tuple(_owned_by_bad(folder, record_id))
-    late = _untimely(loaded, ledger.of(record_id))
-    untimely = None if late is None else f"time: {late}"
-    row = VerifyRow(id=record_id, ok=late is None, verified=loaded.verified, reason=untimely)
+    row = VerifyRow(id=record_id, ok=True, verified=loaded.verified, reason=None)
     return row, tuple(part.file for part in loaded.data)
-
-
-def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None:
-    """Say which day of a record and its decisions cannot be; None where all can."""
-    day = date.fromisoformat(record.date)
-    approvals = [entry.known_on for entry in entries if entry.event == "approved" and entry.known_on]
-    for entry in entries:
-        if entry.event == "entered" and not begun(day, moment(entry.time)):
-            return f"its session of {record.date} lies after its entry at {entry.time}"
-        if entry.known_on is None:
-            continue
-        if not begun(entry.known_on, moment(entry.time)):
-            return f"it was {entry.event} at {entry.time} by a decision of {entry.known_on}"
-        if entry.event == "withdrawn" and approvals and entry.known_on < min(approvals):
-            return (
-                f"it was withdrawn on {entry.known_on.isoformat()}, before its approval on "
-                f"{min(approvals).isoformat()}"
-            )
-        # A legacy record has no session: its date is that of the source.
-        if record.kind == "fit" and entry.known_on < day:
-            return (
-                f"it was {entry.event} on {entry.known_on.isoformat()}, before its session of {record.date}"
-            )
-    return None
 
 
 def _files(folder: Path) -> list[str]:

@@ -16,6 +16,7 @@ from typing import Any, cast
 
 from toolkit.calibration.records.record import ZEROS, Zero, canonical
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
+from toolkit.days import parse_day
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import is_number, number_expected, parse_toml, sha256_bytes
 from toolkit.units import si_scale, unit
@@ -206,7 +207,7 @@ def date_of(value: object, key: str, where: object) -> dt.date:
     if type(value) is dt.date:
         return value
     try:
-        return dt.date.fromisoformat(cast("str", value))
+        return parse_day(cast("str", value))
     except (TypeError, ValueError) as error:
         raise wrong(where, key, value, "a date such as 2026-03-31") from error
 

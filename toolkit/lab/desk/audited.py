@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.audit.model import CLEAN, GRADES
+from toolkit.days import parse_day
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.inputs import RESULT_FILE, open_regular, unreadable
 from toolkit.lab.archives.audit import LINES
@@ -181,7 +182,7 @@ def read_audited(folder: Path) -> Audited:
     try:
         with open_regular(lines) as stream:
             head = json.loads(stream.readline())
-            known_at = dt.date.fromisoformat(head["known_at"])
+            known_at = parse_day(head["known_at"])
             place = stream.tell()
             for line in stream:
                 files.append(_file(json.loads(_head(line)), place))

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 from toolkit.calibration.registry.people_log import PeopleLog, enrol
+from toolkit.calibration.registry.witnessed import ORIGIN
 from toolkit.errors import RegistryError, ToolkitError, TrustError
 from toolkit.files import write_atomic
 from toolkit.inputs import PDF_FILE, read_regular
-from toolkit.lab.signatures.proofs import ORIGIN, anchor_in, ledgers_of, raw_lines
+from toolkit.lab.signatures.proofs import anchor_in, ledgers_of, raw_lines
 from toolkit.publication import check_file
 from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import SUFFIX, Checkpoint, countersign, parse_checkpoint, place, remembered
@@ -67,6 +68,16 @@ class CheckLedgerAnswer(TypedDict):
     time_stamp: NotRequired[Annotated[str, "moment of the document's time stamp"]]
     time_stamp_by: NotRequired[Annotated[str | None, "who stamped it"]]
     time_stamp_state: NotRequired[str]
+
+
+class ProofAnswer(TypedDict):
+    """An entry of a ledger, with the proof that it is there."""
+
+    line: Annotated[str, "the entry as it stands in the ledger"]
+    index: Annotated[int, "its place, from 0"]
+    path: Annotated[list[str], "hashes from the entry to the root, base64"]
+    checkpoint: Annotated[str, "name, size and root of the ledger, with the signatures of it"]
+    time_stamp: NotRequired[Annotated[str, "RFC 3161 token of the checkpoint, base64"]]
 
 
 class WitnessAnswer(TypedDict):

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.calibration.records.use import UNSIGNED
+from toolkit.calibration.registry.witnessed import ORIGIN, witnessed
 from toolkit.errors import ToolkitError
-from toolkit.inputs import read_regular
 from toolkit.trust.anchor import COMPACT, Anchor, compare, parse_anchor, parse_compact
-from toolkit.trust.checkpoint import SUFFIX, parse_checkpoint
 from toolkit.trust.seal.check import Signature
 
 if TYPE_CHECKING:
@@ -26,9 +25,6 @@ if TYPE_CHECKING:
 
 PROOF = "toolkit.json"
 """Name of the JSON document in an issued PDF: its records, its ledger's proof, the files issued with it."""
-
-ORIGIN = "toolkit/"
-"""What the name of a laboratory's log begins with; the instrument follows."""
 
 Continuity = Literal["continues", "forked", "rolled_back", "unknown"]
 _NO_LEDGER = "no ledger here knows its records"
@@ -250,15 +246,9 @@ def ledger_file_state(path: Path) -> LedgerState:
 
 def _witnessed(registry: Registry, instrument: str, signature: Signature, why: str) -> LedgerState:
     """Return the state of a ledger whose lines hold, held against what witnesses have signed of it."""
-    known = sorted((registry.folder.parent / "trust" / "witnessed").glob(f"{instrument}-*{SUFFIX}"))
-    lines = raw_lines(registry, instrument) if known else []
     continuity: Continuity = "unknown"
-    for file in known:
-        checkpoint = parse_checkpoint(read_regular(file).decode(errors="replace"), where=file)
-        if checkpoint.origin != f"{ORIGIN}{instrument}":
-            continue  # of an instrument whose name begins with this one's
-        comparison = compare(lines, checkpoint)
-        continuity, why = comparison.continuity, f"{why}; {file.name}: {comparison.why}"
+    for file, comparison in witnessed(registry.folder, instrument, lambda: raw_lines(registry, instrument)):
+        continuity, why = comparison.continuity, f"{why}; {file}: {comparison.why}"
         if continuity != "continues":
             break
     return LedgerState(ledger=continuity, signature=signature, why=why)

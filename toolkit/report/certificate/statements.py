@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from toolkit.calibration.session.session_file import TEXTS, certificate_faults, rule_of
+from toolkit.days import parse_day
 from toolkit.declared import Fault
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
@@ -128,7 +129,7 @@ def _is_text(value: object) -> bool:
 
 
 def _date(table: Mapping[str, Any], key: str) -> dt.date | None:
-    return dt.date.fromisoformat(str(table[key])) if key in table else None
+    return parse_day(str(table[key])) if key in table else None
 
 
 # Decision rules of a conformity statement: ILAC-G8:09/2019, clauses 4.2.1 and 4.2.3.
