@@ -342,3 +342,51 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(tmp_path: Pat
     check_folder(tmp_path / "new" / "deep")
     check_file(tmp_path / "new" / "deep" / "file")
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+
+
+def home_of(base: Path) -> Path:
+    """Return a home with a registry, a log of people, and one folder that is nobody's."""
+    for folder in ("calibrations/press", "people", "results"):
+        (base / "home" / folder).mkdir(parents=True)
+    for name in ("ledger.jsonl", "head.json"):
+        for folder in ("calibrations/press", "people"):
+            (base / "home" / folder / name).write_text("{}")
+    return base / "home"
+
+
+@pytest.mark.parametrize(
+    "place",
+    ["calibrations", "calibrations/press", "calibrations/press/deep", "calibrations/new", "people"],
+)
+@pytest.mark.parametrize(
+    "write",
+    [
+        check_folder,
+        lambda folder: check_file(folder / "o.csv"),
+        publish,
+        lambda f: write_result(f / "o", b""),
+    ],
+    ids=["check_folder", "check_file", "publication", "write_result"],
+)
+def test_no_result_enters_a_place_of_records_and_ledgers(
+    tmp_path: Path, place: str, write: Callable[[Path], object]
+) -> None:
+    home = home_of(tmp_path)
+    before = contents(home)
+    with pytest.raises(OutputError) as caught:
+        write(home / place)
+    assert caught.value.rule == "guarded"
+    assert all((caught.value.where, caught.value.got, caught.value.expected, caught.value.next_step))
+    assert contents(home) == before
+
+
+def test_a_registry_of_any_name_is_known_by_what_it_holds_and_a_link_to_it_too(tmp_path: Path) -> None:
+    home = home_of(tmp_path)
+    (home / "calibrations").rename(home / "records")
+    (tmp_path / "elsewhere").symlink_to(home / "records")
+    for place in (home / "records", tmp_path / "elsewhere" / "press"):
+        with pytest.raises(OutputError, match="among records"):
+            check_folder(place)
+    # A home, a folder beside the registry, and one that holds a copy of an instrument among others are free.
+    for place in (home, home / "results", tmp_path):
+        check_folder(place)

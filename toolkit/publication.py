@@ -164,8 +164,8 @@ def check_unguarded(folder: Path) -> None:
     for place in (target, *target.parents):
         if _is_guarded(place):
             raise OutputError(
-                "results cannot be written among records and ledgers", where=folder, got=f"a place in {place}",
-                expected="a folder outside the registry and the log of people",
+                "results cannot be written among records and ledgers", where=folder,
+                got=f"a place in {place}", expected="a folder outside the registry and the log of people",
                 next_step="choose another place; nothing was written", rule="guarded",
             )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import subprocess
 import sys
@@ -53,3 +54,65 @@ def test_text_of_others_steers_no_terminal(
     assert printed.out == f"{shown}\n{shown}\n"
     assert shown.splitlines()[0] in printed.err
     assert "\x1b" not in printed.err
+
+
+# Each kind of what the parser may find wrong, with what was typed there and what may stand there.
+USAGE = {
+    "calibrate": ("toolkit calibrate: SESSION", "nothing", "SESSION.toml"),
+    "calibration approve x": ("toolkit calibration approve: --in-force-from", "nothing", "irst day"),
+    "calibrat": ("toolkit", "calibrat", "calibrate, calibration"),
+    "ledger prov": ("toolkit ledger", "prov", "check, prove, witness"),
+    "ledger prove m15 more words": ("toolkit ledger prove", "more words", "INSTRUMENT"),
+    "inspect --frob": ("toolkit inspect: --frob", "--frob", "--prove"),
+    "process x --draft=yes": ("toolkit process: --draft", "yes", "the option alone"),
+    "process x --known-at 2026-W14-5": ("toolkit process: --known-at", "2026-W14-5", "YYYY-MM-DD"),
+    "process x --reader foo": ("toolkit process: --reader", "foo", "calamine or both"),
+    "calibration budget x --digits 7": ("toolkit calibration budget: --digits", "7", "2"),
+    "calibration budget x --digits=two": ("toolkit calibration budget: --digits", "two", "integer"),
+    "person policy cook --role head --reason x": ("ACTION", "cook", "approve"),
+}
+
+
+@pytest.mark.parametrize("words", USAGE)
+def test_what_is_wrong_with_the_words_has_the_parts_of_every_error(
+    capsys: pytest.CaptureFixture[str], words: str
+) -> None:
+    from toolkit.cli.main import run
+
+    where, got, expected = USAGE[words]
+    with pytest.raises(SystemExit) as ended:
+        run([*words.split(), "--json"])
+    assert ended.value.code == 2
+    error = json.loads(capsys.readouterr().out)["error"]
+    assert error.keys() == {"rule", "what", "where", "got", "expected", "next_step"}
+    assert all(error.values())
+    assert (where in error["where"], error["rule"]) == (True, "usage")
+    assert got in error["got"]
+    assert expected in error["expected"]
+    with pytest.raises(SystemExit):
+        run(words.split())
+    text = capsys.readouterr().err
+    assert text.startswith("error: ")
+    for label, part in (("where:", where), ("got:", got), ("expected:", expected), ("next:", "--help")):
+        (line,) = [line for line in text.splitlines() if line.lstrip().startswith(label)]
+        assert part in line
+
+
+def test_an_option_without_its_value_is_named_with_its_command(capsys: pytest.CaptureFixture[str]) -> None:
+    from toolkit.cli.main import run
+
+    with pytest.raises(SystemExit):
+        run(["calibration", "list", "--known-at"])
+    text = capsys.readouterr().err
+    assert "where:    toolkit calibration list: --known-at\n  got:      nothing" in text
+
+
+def test_every_command_answers_in_json() -> None:
+    from toolkit.cli.groups import leaves
+    from toolkit.cli.main import command_tree
+
+    lacking = [
+        words for words, command in leaves(command_tree())
+        if not any("--json" in parameter.opts for parameter in command.params)
+    ]  # fmt: skip
+    assert lacking == []

@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import inspect
 import json
+import re
 import sys
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -210,15 +211,138 @@ def print_error(error: ToolkitError, *, as_json: bool) -> None:
     say(f"error: {error}", err=True)
 
 
+# The parser's own errors say what and, at most, of which option. What was typed and what may stand there is
+# taken from the words and from the command that they call: each usage error, of whatever kind, comes by here.
+
+
+_EXTRA = re.compile(r"unexpected extra arguments? *(?:\(s\) *)?\((?P<words>.*)\)", re.DOTALL)
+_COMMAND = re.compile(r"No such command '(?P<word>.*?)'", re.DOTALL)
+_QUOTED = re.compile(r"(?:Value )?'(?P<value>.*?)'", re.DOTALL)
+_EXPECTED = (
+    (re.compile(r"is not a valid (?P<rest>.+?)\.?\Z", re.DOTALL), "{rest}"),
+    (re.compile(r"is not in the range (?P<rest>.+?)\.?\Z", re.DOTALL), "{rest}"),
+    (re.compile(r"is not one of (?P<rest>.+?)\.?\Z", re.DOTALL), "one of {rest}"),
+)
+
+
 def print_usage_error(error: Exception, words: Sequence[str], *, as_json: bool) -> None:
     """Print what was wrong with the command's words."""
     message = str(getattr(error, "format_message", error.__str__)()).strip()
     if message.startswith("Usage:"):  # no words at all: the help is the answer
         typer.echo(message, err=not as_json)
         return
-    from toolkit.cli.usage import usage_error
+    print_error(_usage_error(error, words), as_json=as_json)
 
-    print_error(usage_error(error, words), as_json=as_json)
+
+def _usage_error(error: Exception, words: Sequence[str]) -> ToolkitError:
+    """Return a parser's error with all its parts; ``words`` are those that follow ``toolkit``."""
+    from toolkit.errors import ConfigError
+
+    message = str(getattr(error, "format_message", error.__str__)()).strip()
+    context = getattr(error, "ctx", None)
+    command = _called(words) if context is None else str(context.command_path)
+    place, got, expected = _parts(error, context, message, words)
+    return ConfigError(
+        message,
+        where=f"{command}: {place}" if place else command,
+        got=got,
+        expected=expected,
+        next_step=f"see '{command} --help'",
+        rule="usage",
+    )
+
+
+def _parts(error: Any, context: Any, message: str, words: Sequence[str]) -> tuple[str | None, str, str]:
+    """Return the option or argument of an error, what was typed there, and what may stand there."""
+    parameter = getattr(error, "param", None)
+    hint = getattr(error, "param_hint", None) or (
+        parameter and (parameter.opts[-1] if _is_option(parameter) else _metavar(parameter))
+    )
+    if type(error).__name__ == "MissingParameter":
+        meaning = getattr(parameter, "help", None)
+        return hint, "nothing", _clean(meaning) if meaning else f"a value of {hint}"
+    if hint:
+        return str(hint), _typed(error.message, parameter, str(hint), words), _wanted(error.message)
+    option = getattr(error, "option_name", None)
+    if option and "does not take a value" in message:
+        return option, _after(option, words) or option, "the option alone"
+    if option and "requires" in message:
+        return option, "nothing", f"{option} and its value"
+    if option:
+        near = getattr(error, "possibilities", None)
+        return option, option, ", ".join(sorted(near) if near else _options(context)) or "no option"
+    if match := _COMMAND.search(message):
+        return None, match["word"], ", ".join(_commands(context)) or "a command"
+    if match := _EXTRA.search(message):
+        names = [_metavar(part) for part in _parameters(context) if not _is_option(part)]
+        return None, match["words"], " ".join(names) or "no word besides options"
+    return None, " ".join(words) or "nothing", "words as its help has them"
+
+
+def _called(words: Sequence[str]) -> str:
+    """Return the command that words call, where the parser does not say it."""
+    from toolkit.cli.main import command_tree
+
+    command, called = command_tree(), ["toolkit"]
+    for word in words:
+        below = getattr(command, "commands", {})
+        if word not in below:
+            break
+        command = below[word]
+        called.append(word)
+    return " ".join(called)
+
+
+def _typed(message: str, parameter: Any, hint: str, words: Sequence[str]) -> str:
+    options = list(getattr(parameter, "opts", ())) if _is_option(parameter) else [hint]
+    for option in options:
+        if (value := _after(option, words)) is not None:
+            return value
+    match = _QUOTED.match(message)
+    return match["value"] if match else " ".join(words)
+
+
+def _after(option: str, words: Sequence[str]) -> str | None:
+    """Return what stands behind an option, the last time that it is named."""
+    value = None
+    for at, word in enumerate(words):
+        if word == option and at + 1 < len(words):
+            value = words[at + 1]
+        elif word.startswith(f"{option}="):
+            value = word.partition("=")[2]
+    return value
+
+
+def _wanted(message: str) -> str:
+    for pattern, form in _EXPECTED:
+        if match := pattern.search(message):
+            return form.format(rest=match["rest"])
+    return _clean(message)
+
+
+def _clean(text: str) -> str:
+    return " ".join(text.split()).rstrip(".")
+
+
+def _is_option(parameter: Any) -> bool:
+    return getattr(parameter, "param_type_name", None) == "option"
+
+
+def _metavar(parameter: Any) -> str:
+    return str(parameter.metavar or parameter.name.upper())
+
+
+def _parameters(context: Any) -> list[Any]:
+    return [] if context is None else list(context.command.get_params(context))
+
+
+def _options(context: Any) -> list[str]:
+    options = [part for part in _parameters(context) if _is_option(part)]
+    return [max(part.opts, key=len) for part in options]
+
+
+def _commands(context: Any) -> list[str]:
+    return [] if context is None else sorted(getattr(context.command, "commands", ()))
 
 
 @contextlib.contextmanager

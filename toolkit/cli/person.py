@@ -195,9 +195,8 @@ def prove(
         document = stamped(document, time_stamp)
     payload = json.loads(document)
     del payload["schema"]  # every answer has it
-    output.answer(
-        payload, document.rstrip("\n")
-    )  # with --json and without: the document is for `ledger check`
+    # The same with --json and without: it is what `ledger check` takes.
+    output.answer(payload, document.rstrip("\n"))
     return 0
 
 

@@ -131,16 +131,16 @@ def rewrite(registry: Registry, change: Callable[[int, dict[str, object]], None]
 
 
 @pytest.mark.parametrize(
-    ("line", "key", "value", "row", "words"),
+    ("line", "key", "value", "rule", "words"),
     [
-        (1, "time", "2999-01-01T00:00:00Z", LEDGER, "a clock was set back"),
-        (1, "time", "2025-03-09T09:59:59Z", "cell-r1", "lies after its entry"),
-        (2, "known_on", "2025-03-09", "cell-r1", "before its session"),
-        (2, "known_on", "2999-01-01", "cell-r1", "by a decision of 2999-01-01"),
+        (1, "time", "2999-01-01T00:00:00Z", "ledger", "a clock was set back"),
+        (1, "time", "2025-03-09T09:59:59Z", "time", "lies after its entry"),
+        (2, "known_on", "2025-03-09", "time", "before the session"),
+        (2, "known_on", "2999-01-01", "time", "by a decision of 2999-01-01"),
     ],
 )
 def test_verify_sees_what_was_written_so(
-    entered: Registry, line: int, key: str, value: str, row: str, words: str
+    entered: Registry, line: int, key: str, value: str, rule: str, words: str
 ) -> None:
     assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B").done
     assert all(one.ok for one in verify_registry(entered))
@@ -151,7 +151,7 @@ def test_verify_sees_what_was_written_so(
 
     rewrite(entered, change)
     (bad,) = [one for one in verify_registry(entered) if not one.ok]
-    assert (bad.id, (bad.reason or "").split(":")[0]) == (row, "time")
+    assert (bad.id, (bad.reason or "").split(":")[0]) == ("cell-r1", rule)
     assert words in (bad.reason or "")
 
 

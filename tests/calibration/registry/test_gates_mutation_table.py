@@ -208,28 +208,46 @@ def rewritten(folder: Path, record: CalibrationRecord) -> None:
     (folder / "head.json").write_bytes(head_bytes(len(lines), prev))
 
 
+def forged_source(place: Path, coefficient: str) -> Registry:
+    """Rewrite source, record and ledger of the project's legacy record with another third coefficient."""
+    shutil.copytree(PROJECT / "m15", place / "m15")
+    source = (place / "m15" / "m15-r2.source.toml").read_text().replace("E5 = 1.0228", f"E5 = {coefficient}")
+    (place / "changed.toml").write_text(source)
+    changed, _existing = import_legacy(place / "changed.toml", Registry(place / "aside"))
+    aside = place / "aside" / "m15" / "m15-r1.source.toml"
+    forged = dataclasses.replace(
+        changed, id="m15-r2", data=(dataclasses.replace(changed.data[0], file="m15-r2.source.toml"),)
+    )
+    shutil.copy(aside, place / "m15" / "m15-r2.source.toml")
+    shutil.rmtree(place / "aside")
+    (place / "changed.toml").unlink()
+    rewritten(place / "m15", sealed(forged))
+    return Registry(place)
+
+
 def test_what_no_gate_can_see_a_legacy_source_rewritten_with_everything(tmp_path: Path) -> None:
     # A legacy record has no data: its source file, its hash and the ledger are all that it is compared
     # with. Who rewrites all of them leaves no contradiction behind, save in a head that was printed.
-    shutil.copytree(PROJECT / "m15", tmp_path / "m15")
-    registry = Registry(tmp_path)
-    head, truth = registry.head("m15"), registry.load("m15-r2")
-    source = (tmp_path / "m15" / "m15-r2.source.toml").read_text().replace("E5 = 1.0228", "E5 = -1.0228")
-    (tmp_path / "flipped.toml").write_text(source)
-    flipped, _existing = import_legacy(tmp_path / "flipped.toml", Registry(tmp_path / "aside"))
-    aside = tmp_path / "aside" / "m15" / "m15-r1.source.toml"
-    forged = dataclasses.replace(
-        flipped, id="m15-r2", data=(dataclasses.replace(flipped.data[0], file="m15-r2.source.toml"),)
-    )
-    shutil.copy(aside, tmp_path / "m15" / "m15-r2.source.toml")
-    shutil.rmtree(tmp_path / "aside")
-    (tmp_path / "flipped.toml").unlink()
-    rewritten(tmp_path / "m15", sealed(forged))
-    assert registry.load("m15-r2").load("FY").coefficients[2] == -truth.load("FY").coefficients[2]
+    head = Registry(PROJECT).head("m15")
+    registry = forged_source(tmp_path, "1.1228")
+    assert registry.load("m15-r2").load("FY").coefficients[2] == 1.1228
     assert all(row.ok for row in verify_registry(registry))
     rows = verify_registry(registry, head)
     assert not any(row.ok for row in rows)
     assert all(head in (row.reason or "") for row in rows)
+
+
+def test_a_sign_that_the_machine_contradicts_is_seen_in_a_rewritten_legacy_record(tmp_path: Path) -> None:
+    # Thesis 4.1: the third coefficient of FY is positive, and was taken with the wrong sign for years.
+    registry = forged_source(tmp_path, "-1.0228")
+    with pytest.raises(RecordError, match="no command writes its line 5") as caught:
+        registry.load("m15-r2")
+    assert caught.value.rule == "approval"
+    assert "polarity (FY, E5" in str(caught.value.got)
+    (bad,) = [row for row in verify_registry(registry) if not row.ok]
+    assert bad.id == "m15-r2"
+    # The record of the accident itself was withdrawn on every day: it makes no number, and audits know it.
+    assert registry.load("m15-r1").load("FY").coefficients[2] < 0
 
 
 def test_what_no_gate_can_see_data_forged_with_the_record(registry: Registry, make_session: Any) -> None:

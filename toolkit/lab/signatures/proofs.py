@@ -230,28 +230,35 @@ def ledger_file_state(path: Path) -> LedgerState:
     from toolkit.calibration.registry.settled import damaged
 
     folder = path.absolute().parent
-    if folder.name == FOLDER and (folder / f"{FOLDER}-1.toml").is_file():
-        registry = Registry(folder.parent / "calibrations")
+    of_people = folder.name == FOLDER and (folder / f"{FOLDER}-1.toml").is_file()
+    registry = Registry(folder.parent / "calibrations" if of_people else folder.parent)
+    continuity, compared = _witnessed(registry, folder.name)
+    if continuity not in ("continues", "unknown"):
+        # What was cut off or rewritten is told as that, not as damage: its own chain may be in order.
+        return LedgerState(ledger=continuity, signature="untrusted", why=compared)
+    signature: Signature = "valid"
+    if of_people:
         why = f"{len(registry.people().history.versions)} versions, each signed"
-        return _witnessed(registry, FOLDER, "valid", why)
-    registry, instrument = Registry(folder.parent), folder.name
-    ledger = registry.ledger(instrument)
-    if ledger.damage is not None:
-        raise damaged(folder, ledger.damage)
-    signed = sum(bool(entry.signatures) for entry in ledger.entries)
-    why = f"{len(ledger.entries)} entries, {signed} of them signed by people who were enrolled then"
-    signature: Signature = "valid" if signed and registry.people().history.now else "unsigned"
-    return _witnessed(registry, instrument, signature, why)
+    else:
+        ledger = registry.ledger(folder.name)
+        if ledger.damage is not None:
+            raise damaged(folder, ledger.damage)
+        signed = sum(bool(entry.signatures) for entry in ledger.entries)
+        why = f"{len(ledger.entries)} entries, {signed} of them signed by people who were enrolled then"
+        signature = "valid" if signed and registry.people().history.now else "unsigned"
+    return LedgerState(ledger=continuity, signature=signature, why="; ".join(filter(None, (why, compared))))
 
 
-def _witnessed(registry: Registry, instrument: str, signature: Signature, why: str) -> LedgerState:
-    """Return the state of a ledger whose lines hold, held against what witnesses have signed of it."""
+def _witnessed(registry: Registry, name: str) -> tuple[Continuity, str]:
+    """Return how a ledger stands to what witnesses have signed of it, and by which files that is known."""
     continuity: Continuity = "unknown"
-    for file, comparison in witnessed(registry.folder, instrument, lambda: raw_lines(registry, instrument)):
-        continuity, why = comparison.continuity, f"{why}; {file}: {comparison.why}"
+    whys = []
+    for file, comparison in witnessed(registry.folder, name, lambda: raw_lines(registry, name)):
+        continuity = comparison.continuity
+        whys.append(f"{file}: {comparison.why}")
         if continuity != "continues":
             break
-    return LedgerState(ledger=continuity, signature=signature, why=why)
+    return continuity, "; ".join(whys)
 
 
 def _standing(registry: Registry, name: Named) -> LedgerState:
