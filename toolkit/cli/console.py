@@ -225,22 +225,22 @@ _EXPECTED = (
 )
 
 
-def print_usage_error(error: Exception, words: Sequence[str], *, as_json: bool) -> None:
-    """Print what was wrong with the command's words."""
+def print_usage_error(error: Exception, words: Sequence[str], tree: Any, *, as_json: bool) -> None:
+    """Print what was wrong with the command's words; ``tree`` is the group of all commands."""
     message = str(getattr(error, "format_message", error.__str__)()).strip()
     if message.startswith("Usage:"):  # no words at all: the help is the answer
         typer.echo(message, err=not as_json)
         return
-    print_error(_usage_error(error, words), as_json=as_json)
+    print_error(_usage_error(error, words, tree), as_json=as_json)
 
 
-def _usage_error(error: Exception, words: Sequence[str]) -> ToolkitError:
+def _usage_error(error: Exception, words: Sequence[str], tree: Any) -> ToolkitError:
     """Return a parser's error with all its parts; ``words`` are those that follow ``toolkit``."""
     from toolkit.errors import ConfigError
 
     message = str(getattr(error, "format_message", error.__str__)()).strip()
     context = getattr(error, "ctx", None)
-    command = _called(words) if context is None else str(context.command_path)
+    command = _called(words, tree) if context is None else str(context.command_path)
     place, got, expected = _parts(error, context, message, words)
     return ConfigError(
         message,
@@ -279,11 +279,9 @@ def _parts(error: Any, context: Any, message: str, words: Sequence[str]) -> tupl
     return None, " ".join(words) or "nothing", "words as its help has them"
 
 
-def _called(words: Sequence[str]) -> str:
+def _called(words: Sequence[str], tree: Any) -> str:
     """Return the command that words call, where the parser does not say it."""
-    from toolkit.cli.main import command_tree
-
-    command, called = command_tree(), ["toolkit"]
+    command, called = tree, ["toolkit"]
     for word in words:
         below = getattr(command, "commands", {})
         if word not in below:

@@ -151,7 +151,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
         print_error(error, as_json=as_json)
         code = error.exit_code
     except _UsageError as error:
-        print_usage_error(error, arguments, as_json=as_json)
+        print_usage_error(error, arguments, command_tree(), as_json=as_json)
         code = 2
     except (typer.Abort, KeyboardInterrupt):
         typer.echo("interrupted; nothing was left half-written", err=True)

@@ -185,8 +185,8 @@ def shown(stock: bench.Bench, folder: Path, name: str) -> Check:
         ("candidate", "check_begun", None, "session in the future"),
         ("store", "check_after", None, "ledger entry before the one before it"),
         ("standing", "_reasons", (), "candidate"),
-        ("registry", "check_reproduces", None, "coefficient negated, every hash computed anew"),
-        ("registry", "check_agrees", None, "date changed, every hash computed anew"),
+        ("loading", "check_reproduces", None, "coefficient negated, every hash computed anew"),
+        ("loading", "check_agrees", None, "date changed, every hash computed anew"),
     ],
 )
 def test_a_gate_that_is_switched_off_fails_its_row(

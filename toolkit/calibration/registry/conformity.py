@@ -114,9 +114,11 @@ def _failed(
         confirmed_before=history is None or any(line.event == "approved" for line in before),
         evidence=evidence,
     )
-    if judged.failed:
+    # Versions that did not state the clock asked for nothing: what blocks a record blocked it then, too.
+    failed = [result for result in judged.failed if entry.clock is not None or result.effect == "blocks"]
+    if failed:
         problem = "the record fails gates that an approval passes"
-        places = [f"{result.rule} ({result.where}: {result.message})" for result in judged.failed]
+        places = [f"{result.rule} ({result.where}: {result.message})" for result in failed]
         more = f" and {len(places) - _PLACES} more" if len(places) > _PLACES else ""
         return _unapprovable(record, problem, f"{'; '.join(places[:_PLACES])}{more}", "a record that passes")
     missing = [term for term in unverifiable(record, check, loads) if term not in entry.unverifiable]

@@ -42,7 +42,10 @@ def _decision(name: str, rule: str, day: dt.date = SECOND, **more: Any) -> Demon
 def _clock_set_back(bench: Bench) -> Act:
     record_id = bench.entered(Session())
     later = (dt.datetime.now(tz=dt.UTC) + _DAY).strftime("%Y-%m-%dT%H:%M:%SZ")
-    rewrite_ledger(bench.registry.folder / RIG, lambda event: {**event, "time": later})
+    rewrite_ledger(
+        bench.registry.folder / RIG,
+        lambda event: {**event, "time": later} if event["id"] == record_id else event,
+    )
     return bench.approval(record_id, SECOND)
 
 
