@@ -53,13 +53,8 @@ class Records(Protocol):
         """Return a record that passes the gates of its loading."""
 
 
-def approved_ids(ledger: Ledger, *, but: str = "", before: int | None = None) -> list[str]:
-    """Return the approved records that are not withdrawn, the newest first.
-
-    ``before``: those that were approved and not withdrawn before a line of the ledger.
-    """
-    if before is not None:
-        return _approved_before(ledger, but, before)
+def approved_ids(ledger: Ledger, *, but: str = "") -> list[str]:
+    """Return the approved records that are not withdrawn, the newest first."""
     ranks = []
     known_on = ledger.known_on()
     for record_id in ledger.entered():
@@ -70,28 +65,29 @@ def approved_ids(ledger: Ledger, *, but: str = "", before: int | None = None) ->
     return [record_id for _, _, record_id in sorted(ranks, reverse=True)]
 
 
-def _approved_before(ledger: Ledger, but: str, line: int) -> list[str]:
+def approved_before(ledger: Ledger, line: int, *, but: str) -> list[str]:
+    """Return the records that `approved_ids` returned when a line was written."""
     since: dict[str, date] = {}
+    ended = {but}
     for entry in ledger.decisions:
         if entry.seq >= line:
             break
         if entry.event != "approved":
+            ended.add(entry.id)
             since.pop(entry.id, None)
-        elif entry.since is not None and entry.id != but:
+        elif entry.since is not None and entry.id not in ended:
             since[entry.id] = min(entry.since, since.get(entry.id, entry.since))
-    newest = max(since.values(), default=None)
-    last = {
-        record_id: max(entry.seq for entry in ledger.of(record_id) if entry.seq < line)
+    ranks = [
+        (day, max(entry.seq for entry in ledger.of(record_id) if entry.seq < line), record_id)
         for record_id, day in since.items()
-        if day == newest
-    }
-    return sorted(since, key=lambda record_id: (since[record_id], last.get(record_id, 0)), reverse=True)
+    ]
+    return [record_id for _, _, record_id in sorted(ranks, reverse=True)]
 
 
 def history_of(
     registry: Records, record: CalibrationRecord, ledger: Ledger, *, but: str = "", before: int | None = None
 ) -> History:
-    """Return what a record's cells are compared with; ``before`` as of `approved_ids`.
+    """Return what a record's cells are compared with; ``before``: were, when its approval's line was written.
 
     Only where a cell is not that of the last record are older ones read.
 
@@ -100,7 +96,11 @@ def history_of(
     RecordError
         a record that is compared with fails a gate
     """
-    folder, ids = registry.folder / record.instrument, approved_ids(ledger, but=but, before=before)
+    folder, ids = registry.folder / record.instrument, list[str]()
+    if before is None:
+        ids = approved_ids(ledger, but=but)
+    elif (newest := ledger.newest_before.get(before)) is not None:
+        ids = [newest]
     if not ids:
         return NO_HISTORY
     last = registry.load_by(ledger, ids[0])
@@ -108,6 +108,8 @@ def history_of(
     # Without a serial nobody knows which cell it is.
     sought = {name for name in exchanged(record, last) if serials[name] is not None}
     returned: dict[str, CalibrationRecord] = {}
+    if sought and before is not None:
+        ids = approved_before(ledger, before, but=but)
     for record_id in ids[1:] if sought else ():
         path = folder / f"{record_id}.json"
         try:

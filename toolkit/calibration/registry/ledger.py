@@ -11,13 +11,14 @@ refuse the same lines.
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import gc
 import hashlib
 import json
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import date
 from functools import cached_property
@@ -274,6 +275,39 @@ class Ledger:
     def decisions(self) -> tuple[Entry, ...]:
         """The lines that put a record in force or end it, without those that decide nothing."""
         return tuple(e for e in self.entries if e.event in _DECIDING and e.seq not in self.void)
+
+    @cached_property
+    def newest_before(self) -> Mapping[int, str | None]:
+        """Of each approval's line the record that was in force last among the others, None where none was.
+
+        One pass for all lines: a registry of many records asks at each of them.
+        """
+        newest: dict[int, str | None] = {}
+        order: list[tuple[date, str]] = []
+        ended: set[str] = set()
+        since: dict[str, date] = {}
+        for entry in self.decisions:
+            before = since.pop(entry.id, None)
+            if before is not None:
+                del order[bisect.bisect_left(order, (before, entry.id))]
+            if entry.event != "approved":
+                ended.add(entry.id)
+            elif entry.since is not None:
+                newest[entry.seq] = self._last_of(order, entry.seq)
+            if entry.since is not None and entry.id not in ended:
+                since[entry.id] = entry.since if before is None else min(entry.since, before)
+                bisect.insort(order, (since[entry.id], entry.id))
+        return newest
+
+    def _last_of(self, order: Sequence[tuple[date, str]], line: int) -> str | None:
+        """Return the last record of an order by its day; among equals the one that a line was about last."""
+        last: tuple[int, str] | None = None
+        for day, record_id in reversed(order):
+            if day != order[-1][0]:
+                break
+            about = (max(entry.seq for entry in self.of(record_id) if entry.seq < line), record_id)
+            last = about if last is None else max(last, about)
+        return None if last is None else last[1]
 
     @cached_property
     def _events(self) -> dict[str, tuple[Entry, ...]]:
