@@ -105,14 +105,3 @@ def test_an_option_without_its_value_is_named_with_its_command(capsys: pytest.Ca
         run(["calibration", "list", "--known-at"])
     text = capsys.readouterr().err
     assert "where:    toolkit calibration list: --known-at\n  got:      nothing" in text
-
-
-def test_every_command_answers_in_json() -> None:
-    from toolkit.cli.groups import leaves
-    from toolkit.cli.main import command_tree
-
-    lacking = [
-        words for words, command in leaves(command_tree())
-        if not any("--json" in parameter.opts for parameter in command.params)
-    ]  # fmt: skip
-    assert lacking == []

@@ -56,7 +56,7 @@ def check_conforms(folder: Path, record: CalibrationRecord, ledger: Ledger) -> N
         where=folder / LEDGER,
         got=f"{objection.what}: {objection.got}",
         expected=objection.expected,
-        next_step="restore the ledger from a backup, or withdraw the record: 'toolkit calibration verify'",
+        next_step="restore the ledger from a backup, or withdraw the record: an earlier one is then in force",
         rule=objection.rule,
     ) from objection
 
