@@ -21,7 +21,13 @@ from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange
-from toolkit.diagnosis.simulators.states import declared_dimensions, dimensions, fitting, term_places
+from toolkit.diagnosis.simulators.states import (
+    declared_dimensions,
+    dimensions,
+    fitting,
+    is_speed,
+    term_places,
+)
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
@@ -166,7 +172,10 @@ class OdeModel:
             return implied if text == "1" else text
 
         speed, position = of(state, reduced(f"{rate}*s")), self.position_of(state)
-        return force, speed, speed if position is None else of(position, f"{speed}*s")
+        if position is not None:
+            return force, speed, of(position, reduced(f"{speed}*s"))
+        # A velocity has its way for a position, even where no state is one; any other state is its own.
+        return force, speed, reduced(f"{speed}*s") if is_speed(speed) else speed
 
     def _ranges(self) -> tuple[StateRange, ...]:
         """Return the states; one whose unit neither the recording nor a rate of it tells has none."""

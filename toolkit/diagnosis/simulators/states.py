@@ -51,6 +51,11 @@ def dimensions(
     return {i: meaning for i, meaning in meanings.items() if meaning not in _OPEN}
 
 
+def is_speed(text: str) -> bool:
+    """Tell whether a unit is that of a velocity or of a turning rate."""
+    return dimension(text) in _SPEEDS
+
+
 def declared_dimensions(force_units: Mapping[int, str]) -> dict[int, str]:
     """Return the dimension of every state of which the unit of a missing term is declared.
 

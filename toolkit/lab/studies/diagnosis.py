@@ -244,12 +244,12 @@ def _writable(out: Path) -> None:
 
 def diagnosis_text(answer: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
-    from toolkit.diagnosis.answer.answer import cut_short
+    from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
     from toolkit.report.diagnosis.numbers import chance, rounded
     from toolkit.report.diagnosis.page import cause, simulated
 
     cut = answer.verdict == "unknown" and cut_short(answer.skipped)
-    verdict = _CUT if cut else _VERDICTS[answer.verdict]
+    verdict = _CUT if cut else _RUNS_DIFFER if only_runs_differ(answer) else _VERDICTS[answer.verdict]
     if answer.verdict == "untestable" and answer.skipped:
         verdict = "the budget was spent before this recording could be judged"
     mark = simulated(answer)
@@ -332,6 +332,9 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
 
 
 _CUT = "something is missing; the budget was spent before every known effect was tried"
+_RUNS_DIFFER = (
+    "runs differ by more than their noise; within the runs nothing is missing that this recording could show"
+)
 _VERDICTS = {
     "named": "the missing physics has a name",
     "equivalent": "a class of effects explains it, which this recording cannot tell apart",
