@@ -173,9 +173,9 @@ class OdeModel:
 
         speed, position = of(state, reduced(f"{rate}*s")), self.position_of(state)
         if position is not None:
-            return force, speed, of(position, reduced(f"{speed}*s"))
+            return force, speed, of(position, f"{speed}*s")
         # A velocity has its way for a position, even where no state is one; any other state is its own.
-        return force, speed, reduced(f"{speed}*s") if is_speed(speed) else speed
+        return force, speed, f"{speed}*s" if is_speed(speed) else speed
 
     def _ranges(self) -> tuple[StateRange, ...]:
         """Return the states; one whose unit neither the recording nor a rate of it tells has none."""

@@ -265,9 +265,6 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
             value, interval = rounded(parameter.value, parameter.ci95)
             reach = f"  (95 %: {interval})" if interval else ""
             lines.append(f"  {parameter.name} = {value} {parameter.unit}{reach}")
-        runs = next((parameter.runs for parameter in effect.parameters if parameter.runs is not None), None)
-        if runs is not None:
-            lines.append(f"  in {', '.join(runs)} alone")
         if effect.equivalent_to:
             lines.append(f"  this recording cannot tell it from: {', '.join(effect.equivalent_to)}")
         lines.append(
