@@ -189,7 +189,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, old: str, new: str, rule: 
 
 def test_no_text_and_no_file(tmp_path: Path) -> None:
     path = tmp_path / "figures.csv"
-    path.write_bytes(b"FZ [N],conicity [N]\n1,\xff\n")
+    path.write_bytes(b"FZ [N],conicity [N]\n1,\x81\n")
     for one, rule in ((path, "encoding"), (tmp_path / "none.csv", "no-file")):
         with pytest.raises(ToolkitError) as caught:
             maker_characteristics(one, identity="f")

@@ -19,7 +19,7 @@ from toolkit.tires.fit import Curve, fit_curves, why_not
 from toolkit.tires.global_data import load_blocks, loaded_blocks
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit, Loss, TireModel
 from toolkit.tires.models import fit_model
-from toolkit.tires.plausibility import size_findings
+from toolkit.tires.plausibility import condition_findings, size_findings
 from toolkit.tires.quality import median, shares
 from toolkit.tires.table import TireTable
 from toolkit.units import in_both
@@ -214,15 +214,16 @@ def fit_findings(fits: list[CurveFit]) -> list[Finding]:
 
 
 def row_findings(table: TireTable) -> tuple[Finding, ...]:
-    """Return where the rows of a table hold forces or moments that no tire has at their loads and slips.
+    """Return where the rows of a table hold conditions, forces or moments that no tire has.
 
     Only sizes are judged, axes by `axes_findings`; a fiftieth of the rows may be
     gross outliers. A table may be of any tire: its trail is bounded by that of the largest.
     """
+    unusual = condition_findings(table)
     FZ = table["FZ"]
     rows = FZ >= LEAST_LOAD_N
     if not rows.any():
-        return ()
+        return unusual
 
     def column(symbol: str) -> NDArray[np.float64]:
         values = table.get(symbol)
@@ -234,7 +235,7 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
         IA=column("IA"), trail_m=LARGEST_TRAIL_M,
     )  # fmt: skip
     cause = "is a column in another unit than its header says?"
-    return tuple(
+    return unusual + tuple(
         departure.finding("warning", cause=cause) for departure in departures(readings, share=_OUTLIERS)
     )
 
