@@ -1,4 +1,3 @@
-# ruff: noqa: E501  lines of WordprocessingML read best whole
 """A tracked deletion that touches a tag: what it deletes would be printed, in the value or beside it."""
 
 from __future__ import annotations

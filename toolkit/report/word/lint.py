@@ -31,6 +31,7 @@ RULES = {
     "prototype": "a table has no prototype row, or more than one",
     "unknown-column": "a prototype row names a column that the table has not",
     "column-count": "a prototype row without tags has more or fewer cells than the table has columns",
+    "unreadable-tag": "a tag that must be read would be hidden, tiny, or of the colour behind it",
     "tracked-changes": "the template holds tracked changes",
     "comments": "the template holds comments",
     "date-field": "a DATE or TIME field becomes the day of printing",
