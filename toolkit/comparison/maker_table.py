@@ -40,7 +40,7 @@ from toolkit.reduction.model import Condition
 from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
-from toolkit.tires.plausibility import demand_possible
+from toolkit.tires.plausibility import condition_findings, demand_possible
 from toolkit.tires.table import TireTable, read_table
 from toolkit.tires.table_fit import axes_findings, fit_findings, repeat_findings, table_curves
 from toolkit.units import from_si, split_header, unit
@@ -255,8 +255,11 @@ def maker_rows(
     # Which parameters a curve leaves open is of no interest here: values and slopes are read off it.
     warnings = [finding for finding in fit_findings(list(fits)) if finding.level != "note"]
     findings += [
-        replace(finding, where=f"{path.name}, {finding.where}")
-        for finding in (*warnings, *axes_findings(sae, fits))
+        *condition_findings(table),
+        *(
+            replace(finding, where=f"{path.name}, {finding.where}")
+            for finding in (*warnings, *axes_findings(sae, fits))
+        ),
     ]
     findings += (*repeat_findings(table), *table.mark_findings)
     return tuple(rows), tuple(findings)
