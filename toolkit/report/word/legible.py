@@ -35,8 +35,10 @@ _NARROW = 0.15
 """Of their height, which letters have at least in width, on average: the narrowest fonts have 0.3."""
 _CONTRAST = 1.5
 """Of luminances, by WCAG 2: light grey on white has 1.7; it asks for 4.5 where reading is comfortable."""
-_SPREAD = 0.3
-"""Of the rows and of the columns of a word's place that have ink: a border or an underline has it in few."""
+_SPREAD = 0.2
+"""Of the rows and of the columns of a word's place that have ink, the strokes across it left out."""
+_STROKE = 0.95
+"""Of a row or column that has ink: a border, an underline, the edge of a shading, but no letters."""
 _DPI = 144
 
 
@@ -94,6 +96,8 @@ class Print:
 
     def _why(self, page: Page, words: Sequence[Word]) -> str:
         for text, left, top, right, bottom in words:
+            if not any(map(str.isalnum, text)):
+                continue  # a sign between words has little ink
             short, long = sorted((right - left, bottom - top))
             size = short if len(text) > 2 else long
             if size < _LEAST or long < _NARROW * len(text) * short:
@@ -157,6 +161,7 @@ def _inked(page: NDArray[np.float64], left: float, top: float, right: float, bot
     behind = levels[np.argmax(counts)]
     lighter, darker = np.maximum(place, behind), np.minimum(place, behind)
     ink = (lighter + 0.05) / (darker + 0.05) >= _CONTRAST
+    ink = ink & (ink.mean(axis=1, keepdims=True) < _STROKE) & (ink.mean(axis=0, keepdims=True) < _STROKE)
     return bool(min(ink.any(axis=1).mean(), ink.any(axis=0).mean()) >= _SPREAD)
 
 
