@@ -44,7 +44,7 @@ def style(kind: str, identity: str, look: str, more: str = "", ppr: str = "") ->
     ("body", "styles", "said"),
     [
         (looked(WHITE), "", "FFFFFF on FFFFFF"),
-        (looked('<w:sz w:val="2"/>'), "", "1 points"),
+        (looked('<w:sz w:val="2"/>'), "", "1 pt"),
         (looked("<w:vanish/>"), "", "hidden"),
         (looked("<w:webHidden/>"), "", "hidden"),
         (looked('<w:w w:val="1"/>'), "", "1 % wide"),
@@ -55,12 +55,12 @@ def style(kind: str, identity: str, look: str, more: str = "", ppr: str = "") ->
         (cell(looked('<w:color w:val="1F3864"/>'), "1F3864"), "", "1F3864 on 1F3864"),
         (looked('<w:rStyle w:val="Pale"/>'), style("character", "Pale", WHITE), "FFFFFF on"),
         (looked("", ppr='<w:pStyle w:val="Gone"/>'), style("paragraph", "Gone", "<w:vanish/>"), "hidden"),
-        (looked(""), style("paragraph", "Normal", '<w:sz w:val="4"/>', 'w:default="1"'), "2 points"),
+        (looked(""), style("paragraph", "Normal", '<w:sz w:val="4"/>', 'w:default="1"'), "2 pt"),
         (looked(""), f"<w:docDefaults><w:rPrDefault><w:rPr>{WHITE}</w:rPr></w:rPrDefault></w:docDefaults>", "FFFFFF on"),
         (
             looked("", ppr='<w:pStyle w:val="Thin"/>'),
             style("paragraph", "Thin", "", ppr='<w:spacing w:line="20" w:lineRule="exact"/>'),
-            "line is 1 points",
+            "line is 1 pt",
         ),
         (p(sdt("tk:calibration.hash", f"<w:r><w:rPr>{WHITE}</w:rPr><w:t>x</w:t></w:r>")), "", "FFFFFF on"),
         (looked(WHITE) + looked('<w:sz w:val="2"/>'), "", "FFFFFF on"),

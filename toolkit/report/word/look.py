@@ -81,14 +81,14 @@ class _Looks:
                 return f"its text is hidden ({name})"
         size = self._number("w:sz", properties, _DEFAULT_SIZE)
         if size < _LEAST_SIZE:
-            return f"it is {size / 2:g} points high"
+            return f"its letters are {size / 2:g} pt high"
         if (scale := self._number("w:w", properties, 100)) < _LEAST_SCALE:
             return f"its letters are {scale:g} % wide"
         spacing = self._first("w:spacing", styles)
         if spacing is not None and spacing.get(q("w:lineRule")) == "exact":
             line = _number(spacing.get(q("w:line")), 240)
             if line < _LEAST_LINE:
-                return f"its line is {line / 20:g} points high"
+                return f"its line is {line / 20:g} pt high"
         colour = self._colour(self._first("w:color", properties), "val")
         behind = self._behind(properties, styles, paragraph)
         if colour is not None and _ratio(colour, behind) < _CONTRAST:
