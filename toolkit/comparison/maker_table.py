@@ -40,9 +40,15 @@ from toolkit.reduction.model import Condition
 from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
-from toolkit.tires.plausibility import condition_findings, demand_possible
+from toolkit.tires.plausibility import demand_possible
 from toolkit.tires.table import TireTable, read_table
-from toolkit.tires.table_fit import axes_findings, fit_findings, repeat_findings, table_curves
+from toolkit.tires.table_fit import (
+    axes_findings,
+    condition_findings,
+    fit_findings,
+    repeat_findings,
+    table_curves,
+)
 from toolkit.units import from_si, split_header, unit
 
 if TYPE_CHECKING:

@@ -8,23 +8,19 @@ told, never refused, by the bounds that hold for every test (`toolkit.reduction.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.channels import channel_of
 from toolkit.errors import CellError
 from toolkit.findings import Finding
-from toolkit.reduction.conditions import CONDITIONS, condition_finding, farthest
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N, STIFFNESS
-from toolkit.units import split_header
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.tires.model import CurveFit
-    from toolkit.tires.table import TireTable
 
 # The largest size [SI] by dimension; of a slip or inclination angle any, of the two angles that turn on none.
 LARGEST = {
@@ -94,28 +90,6 @@ def load_of(
         next_step="correct those rows: no tire pulls at the road",
         rule="mixed-load-signs",
     )
-
-
-def condition_findings(table: TireTable, only: Collection[str] = CONDITIONS) -> tuple[Finding, ...]:
-    """Return the conditions of a table's rows that no tire is tested at, each by its farthest row."""
-    units = {
-        symbol: split_header(cell, lambda name: channel_of(name) is not None)[1]
-        for (symbol, _), cell in zip(table.columns, table.header, strict=False)
-    }
-    findings = []
-    for symbol, values in table.columns:
-        if symbol not in only:
-            continue
-        sizes = np.abs(values) if symbol == "V" else values
-        worst = farthest(symbol, (float(sizes.min()), float(sizes.max()))) if len(values) else None
-        if worst is not None:
-            row = int(np.argmin(np.abs(sizes - worst))) + 1
-            findings.append(
-                condition_finding(
-                    symbol, worst, where=f"{table.path.name}, {symbol}, row {row}", unit=units.get(symbol)
-                )
-            )
-    return tuple(filter(None, findings))
 
 
 def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:

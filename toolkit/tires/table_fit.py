@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.channels import Axes, signs
+from toolkit.channels import Axes, channel_of, signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
+from toolkit.reduction.conditions import CONDITIONS, condition_finding, farthest
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.reduction.physics import departures, of_sizes
 from toolkit.reduction.selection import Selection, of_one_condition
@@ -19,10 +20,10 @@ from toolkit.tires.fit import Curve, fit_curves, why_not
 from toolkit.tires.global_data import load_blocks, loaded_blocks
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit, Loss, TireModel
 from toolkit.tires.models import fit_model
-from toolkit.tires.plausibility import condition_findings, size_findings
+from toolkit.tires.plausibility import size_findings
 from toolkit.tires.quality import median, shares
 from toolkit.tires.table import TireTable
-from toolkit.units import in_both
+from toolkit.units import in_both, split_header
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -211,6 +212,28 @@ def fit_findings(fits: list[CurveFit]) -> list[Finding]:
         elif fit.not_determined:
             findings.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
     return findings
+
+
+def condition_findings(table: TireTable, only: Collection[str] = CONDITIONS) -> tuple[Finding, ...]:
+    """Return the conditions of a table's rows that no tire is tested at, each by its farthest row."""
+    units = {
+        symbol: split_header(cell, lambda name: channel_of(name) is not None)[1]
+        for (symbol, _), cell in zip(table.columns, table.header, strict=False)
+    }
+    findings = []
+    for symbol, values in table.columns:
+        if symbol not in only:
+            continue
+        sizes = np.abs(values) if symbol == "V" else values
+        worst = farthest(symbol, (float(sizes.min()), float(sizes.max()))) if len(values) else None
+        if worst is not None:
+            row = int(np.argmin(np.abs(sizes - worst))) + 1
+            findings.append(
+                condition_finding(
+                    symbol, worst, where=f"{table.path.name}, {symbol}, row {row}", unit=units.get(symbol)
+                )
+            )
+    return tuple(filter(None, findings))
 
 
 def row_findings(table: TireTable) -> tuple[Finding, ...]:

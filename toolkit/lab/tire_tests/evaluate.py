@@ -22,7 +22,7 @@ def evaluate_grid(
     from toolkit.calibration.records.use import DRAFT_MARK
     from toolkit.channels import signs
     from toolkit.findings import Finding
-    from toolkit.tires.plausibility import condition_findings
+    from toolkit.tires.table_fit import condition_findings
     from toolkit.tires.tir_evaluate import evaluate_tir
 
     mark = file.comment(DRAFT_MARK)
