@@ -12,6 +12,7 @@ from toolkit.characteristics.model import Characteristics
 from toolkit.errors import RecordingError
 from toolkit.findings import Finding
 from toolkit.machine import load_machine
+from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.read import read_recording
 from toolkit.reduction.corrections import tare_of_file
 from toolkit.reduction.model import ReducedTest, Tare
@@ -102,7 +103,8 @@ def process(
         [(*entry, speeds[entry[1].path]) for entry in named if entry[1].path in speeds],
         machine=machine, record=record, info=folder.info, tare=tare,
     )  # fmt: skip
-    reduced = dataclasses.replace(reduced, findings=(*reduced.findings, *findings))
+    hidden = [finding for name, one, _ in named for finding in hidden_findings(one.hidden, name)]
+    reduced = dataclasses.replace(reduced, findings=(*reduced.findings, *findings, *hidden))
     characteristics = characterise(reduced, machine=machine, record=record, sweeps=sweeps)
     return TestResult(reduced=reduced, characteristics=characteristics)
 

@@ -187,9 +187,20 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, old: str, new: str, rule: 
     assert caught.value.exit_code == 2
 
 
+def test_a_pressure_that_no_tire_has_is_told(tmp_path: Path) -> None:
+    header = "SA [deg],FZ [N],FY [N],MZ [N*m],P [{}]"
+    said = {}
+    for unit in ("bar", "psi"):
+        path = table(tmp_path / f"{unit}.csv", header=header.format(unit), more=",34")
+        _, findings = maker_rows(path, axes="SAE", angles_rad=DEFAULT_ANGLES, identity="m")
+        said[unit] = [finding.message for finding in findings if finding.rule == "unusual-condition"]
+    assert said["psi"] == []
+    assert [message.endswith("; 34 psi would be 234 kPa") for message in said["bar"]] == [True]
+
+
 def test_no_text_and_no_file(tmp_path: Path) -> None:
     path = tmp_path / "figures.csv"
-    path.write_bytes(b"FZ [N],conicity [N]\n1,\xff\n")
+    path.write_bytes(b"FZ [N],conicity [N]\n1,\x81\n")
     for one, rule in ((path, "encoding"), (tmp_path / "none.csv", "no-file")):
         with pytest.raises(ToolkitError) as caught:
             maker_characteristics(one, identity="f")

@@ -381,3 +381,21 @@ def test_a_load_where_the_reach_of_a_nominal_one_ends_is_one_load(
     assert len({condition.step_FZ for condition in reduced.conditions}) == 2
     assert len({condition.FZ_common for condition in reduced.conditions}) == 2
     assert "unplanned-load" in rules(reduced)
+
+
+@pytest.mark.parametrize(
+    ("toml", "said"),
+    [
+        ('pressure = { value = 34, unit = "bar" }', "inflation pressure 34 bar"),
+        ('rated_load = { value = 1.372, unit = "lbf" }', "rated load 1.37 lbf"),
+        ('speed = { value = 7.66, unit = "km/s" }', "speed 7.66 km/s"),
+        ('pressure = { value = 34, unit = "psi" }', ""),
+    ],
+)
+def test_a_stated_condition_at_which_no_tire_is_tested_is_told(
+    tmp_path: Path, published_record: CalibrationRecord, toml: str, said: str
+) -> None:
+    reduced = reduce_folder(folder_with(tmp_path, "a", toml=f"{toml}\n"), published_record)
+    told = [finding for finding in reduced.findings if finding.rule == "unusual-condition"]
+    assert [finding.where for finding in told] == ["test.toml"] * bool(said)
+    assert all(finding.message.startswith(said) for finding in told)

@@ -52,7 +52,7 @@ def split(folder: Path) -> Path:
         folder / "split.docx",
         story=p("A ", t("{{"), start, t("tk:"), wrong, t("tire"), right, t(".si"), end, t("ze}}"), " end")
         + p("B ", t("{{tk:"), _tracked("ins", t("test.")), t("name}}"), " end")
-        + p("C ", t("{{tk:test."), gone, t("operator}}"))
+        + p("C ", t("{{tk:test."), t("operator}}"), " end ", gone)
         + p("D ", _link(t("{{tk:tire")), _link(t(".DOT}}")), " end")
         + p("E ", _smart(t("{{tk:tire.") + _smart(t("rim}}"))), " end")
         + p("F ", '<w:commentRangeStart w:id="3"/>', t("{{tk:test.sur"), '<w:commentRangeEnd w:id="3"/>', t("face}}"), " end")

@@ -39,9 +39,8 @@ def test_a_stiffness_is_uncertain_by_what_was_held():
     assert dict(fit.fixed).keys() == {"C"}
     own = fit.parameters[0].standard_error
     assert own == pytest.approx(20.0 / np.sqrt(np.sum(data.rows.SA**2)), rel=0.2)
-    # A uniform spread over the bounds; the slope is taken over +-5e-4 rad.
-    share = np.exp(-((5e-4 / width) ** 2))
-    expected = np.hypot(own, share * 12_000 / np.sqrt(12))
+    # A uniform spread over the bounds; at zero slip C adds to the slope as it is.
+    expected = np.hypot(own, 12_000 / np.sqrt(12))
     assert fit.slope_at_zero.u == pytest.approx(expected, rel=0.01)
     assert "contain what the parameters held at their default may be" in fit.message
 

@@ -14,7 +14,7 @@ from toolkit.words.phrasebook import SOURCE, languages, phrasebook
 
 PACKAGE = FOLDER.parent / "toolkit"
 # The packages whose findings a table of a document lists: `finding_table`, and the report of a test.
-LISTED = ("reduction", "characteristics", "comparison", "diagnosis", "planning")
+LISTED = ("recording", "reduction", "characteristics", "comparison", "diagnosis", "planning")
 HOLE = "7"
 
 

@@ -22,6 +22,7 @@ from toolkit.audit.screen import Screen, Signature, layout, screen_of
 from toolkit.calibration.registry.clock import in_future
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
+from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.read import read_recording
 from toolkit.reduction.blocks import Block, block_means, find_blocks, is_tare
 from toolkit.reduction.hub import with_load
@@ -206,6 +207,7 @@ def inspect_file(
             *_impossible(path, blocks, corrector),
             *_findings(path, identification, choice),
             *_of_context(path, context, why),
+            *hidden_findings(recording.hidden, path.name),
         ),
     )
 

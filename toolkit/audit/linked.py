@@ -8,8 +8,6 @@ test's folder as whole words.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import os
 import re
@@ -19,10 +17,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, UnreadableError
 from toolkit.files import check_keys, real_path
 from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
 from toolkit.publication import ENTERING, PENDING, settle
+from toolkit.recording.csvfile import read_lines
 from toolkit.recording.marks import GENERATOR
 from toolkit.staging import PASSING
 
@@ -176,19 +175,16 @@ def _words(text: str) -> str:
 
 def _of_csv(source: Path) -> Iterator[PastReport]:
     try:
-        text = read_input(source, LIST_FILE).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise _bad(source, f"byte {error.start} is no UTF-8", "a CSV file in UTF-8") from error
-    try:
-        rows = list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
-        header = next(iter(csv.reader([text.splitlines()[0]]))) if text.strip() else []
-    except csv.Error as error:
-        raise _bad(source, str(error), "values separated by commas") from error
+        lines, _ = read_lines(read_input(source, LIST_FILE), _COLUMNS.__contains__, where=source)
+    except UnreadableError as error:
+        raise _bad(source, str(error.got), str(error.expected)) from error
+    header = [cell.strip() for cell in lines[0][1]] if lines else []
     check_keys(dict.fromkeys(header), _COLUMNS, where=source)
     if "report" not in header or len(header) < 2:
         raise _bad(source, ", ".join(header) or "nothing", "the columns report and test, sha256, or both")
     past_reports: dict[str, PastReport] = {}
-    for number, row in enumerate(rows, start=2):
+    for number, cells in lines[1:]:
+        row = dict(zip(header, cells, strict=False))
         name = (row.get("report") or "").strip()
         test, sha256 = ((row.get(key) or "").strip() for key in ("test", "sha256"))
         if not name or not (test or sha256):

@@ -30,6 +30,7 @@ from toolkit.inputs import RECORDING_FILE, limit_of, read_regular
 from toolkit.machine import load_machine
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
+from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
 from toolkit.reduction.hub import with_load
@@ -247,6 +248,7 @@ class Auditor:
             notes=(
                 *_impossible(name, changed, in_force.id if in_force is not None else None),
                 *quality(recording, name),
+                *hidden_findings(recording.hidden, name),
             ),
         )
 

@@ -10,8 +10,6 @@ is 2 where it is not stated. Between semicolons the numbers may have decimal com
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +19,7 @@ from typing import TYPE_CHECKING, NoReturn
 from toolkit.comparison.laboratories import K, Results
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.inputs import TABLE_FILE, read_input
-from toolkit.recording.csvfile import decimal_sign, number_or_text
+from toolkit.recording.csvfile import decimal_sign, number_or_text, read_lines
 from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
@@ -46,16 +44,15 @@ def read_laboratories(path: Path) -> tuple[dict[str, Sequence[Results]], str]:
     CellError
         a cell that is no finite number or empty, a negative U, a k of 0, two statements of one U
     """
-    (head, *lines), separator = _lines(path)
+    table, separator = read_lines(read_input(path, TABLE_FILE), _is_column, where=path)
+    head, lines = (table[0][1] if table else []), table[1:]
     names, text, U_scale = _columns(path, head)
     numbers = [place for place, name in enumerate(names) if name in _NUMBERS]
     decimal = decimal_sign(
-        (cells[place] for cells in lines for place in numbers if place < len(cells)), separator, where=path
+        (cells[place] for _, cells in lines for place in numbers if place < len(cells)), separator, where=path
     )
     reported: dict[str, dict[str, list[tuple[float, float | None, float]]]] = {}
-    for number, cells in enumerate(lines, start=2):
-        if not any(cell.strip() for cell in cells):
-            continue
+    for number, cells in lines:
         if len(cells) != len(head):
             _refuse_cell(path, number, "", len(cells), f"{len(head)} cells, as the header has", "ragged-row")
         row = dict(zip(names, (cell.strip() for cell in cells), strict=True))
@@ -79,6 +76,10 @@ def read_laboratories(path: Path) -> tuple[dict[str, Sequence[Results]], str]:
     }, text
 
 
+def _is_column(header: str) -> bool:
+    return split_header(header, _COLUMNS.__contains__)[0] in _COLUMNS
+
+
 def _results(
     path: Path, measurand: str, laboratory: str, rows: list[tuple[float, float | None, float]]
 ) -> Results:
@@ -91,21 +92,6 @@ def _results(
         )  # fmt: skip
     U, k = next(iter(stated), (None, K))
     return Results(laboratory=laboratory, values=tuple(value for value, _, _ in rows), U=U, k=k)
-
-
-def _lines(path: Path) -> tuple[list[list[str]], str]:
-    """Return the cells of each line, and what parts them."""
-    try:
-        text = read_input(path, TABLE_FILE).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise UnreadableError(
-            "the comparison is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",
-            expected="CSV in UTF-8", next_step="save it as 'CSV UTF-8'", rule="encoding",
-        ) from error  # fmt: skip
-    first = text.partition("\n")[0]
-    separator = max(",;", key=first.count)
-    lines = list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
-    return lines or [[]], separator
 
 
 def _columns(path: Path, head: list[str]) -> tuple[list[str], str, float]:

@@ -13,9 +13,7 @@ uncertainty (k = 2) as ``U_<name>``. SAE axes that follow the travel; conicity a
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,13 +35,20 @@ from toolkit.errors import CellError, ColumnError, FitError, UnreadableError
 from toolkit.findings import Finding
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.machine import TypeB
+from toolkit.recording.csvfile import Line, pointed, read_lines
 from toolkit.reduction.model import Condition
 from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
 from toolkit.tires.plausibility import demand_possible
 from toolkit.tires.table import TireTable, read_table
-from toolkit.tires.table_fit import axes_findings, fit_findings, repeat_findings, table_curves
+from toolkit.tires.table_fit import (
+    axes_findings,
+    condition_findings,
+    fit_findings,
+    repeat_findings,
+    table_curves,
+)
 from toolkit.units import from_si, split_header, unit
 
 if TYPE_CHECKING:
@@ -56,7 +61,8 @@ _NAMES = {name: declared.unit for name, declared in _STATED.items()}
 
 def is_characteristics_table(path: Path) -> bool:
     """Tell whether a CSV file's header has FZ and a characteristic, and no slip angle."""
-    names = {split_header(cell, _is_name)[0] for cell in _header(_text(path))}
+    head = next(iter(_lines(path)), (0, []))[1]
+    names = {split_header(cell, _is_name)[0] for cell in head}
     # A misspelt name still tells which kind of table was meant, and the error then names the right columns.
     near = any(difflib.get_close_matches(name, _NAMES, n=1, cutoff=0.8) for name in names)
     return "SA" not in names and near
@@ -75,8 +81,8 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
         a cell that is no finite number, a negative uncertainty, a value that no tire has; an empty one is a
         value that the maker does not give
     """
-    text = _text(path)
-    head = _header(text)
+    lines = _lines(path)
+    head = lines[0][1] if lines else []
     columns = [_column(cell, path) for cell in head]
     names = [name for name, _ in columns]
     for name in names:
@@ -92,9 +98,7 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
         _refuse(path, "missing-column", "the table has no column FZ", ", ".join(head), "FZ [N]")
     rows: list[Row] = []
     loads: set[float] = set()
-    for number, cells in enumerate(_lines(text)[1:], start=2):
-        if not any(cell.strip() for cell in cells):
-            continue
+    for number, cells in lines[1:]:
         if len(cells) != len(head):
             raise CellError(
                 f"row {number} has another number of cells than the header", where=f"{path}, row {number}",
@@ -150,24 +154,13 @@ def _rows_of(values: dict[str, float | None], load: float, identity: str) -> lis
     return rows
 
 
-def _text(path: Path) -> str:
-    try:
-        return read_input(path, TABLE_FILE).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise UnreadableError(
-            "the table is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",
-            expected="CSV in UTF-8", next_step="save it as 'CSV UTF-8'", rule="encoding",
-        ) from error  # fmt: skip
+def _lines(path: Path) -> list[Line]:
+    lines, separator = read_lines(read_input(path, TABLE_FILE), _is_header, where=path)
+    return [*lines[:1], *pointed(lines[1:], separator, where=path)]
 
 
-def _header(text: str) -> list[str]:
-    return next(iter(_lines(text)), [])
-
-
-def _lines(text: str) -> list[list[str]]:
-    # As tables of forces are read: a semicolon separates where decimals could take a comma.
-    first = text.partition("\n")[0]
-    return list(csv.reader(io.StringIO(text, newline=""), delimiter=max(",;", key=first.count)))
+def _is_header(header: str) -> bool:
+    return _is_name(split_header(header, _is_name)[0])
 
 
 def _is_name(name: str) -> bool:
@@ -268,8 +261,11 @@ def maker_rows(
     # Which parameters a curve leaves open is of no interest here: values and slopes are read off it.
     warnings = [finding for finding in fit_findings(list(fits)) if finding.level != "note"]
     findings += [
-        replace(finding, where=f"{path.name}, {finding.where}")
-        for finding in (*warnings, *axes_findings(sae, fits))
+        *condition_findings(table),
+        *(
+            replace(finding, where=f"{path.name}, {finding.where}")
+            for finding in (*warnings, *axes_findings(sae, fits))
+        ),
     ]
     findings += (*repeat_findings(table), *table.mark_findings)
     return tuple(rows), tuple(findings)

@@ -146,6 +146,7 @@ class _Scatter:
 
     fewest: int = _set(2, "runs held out", "one alone has no scatter that could be told from a mismatch")
     least: float = _set(0.3, "sd of what a run shows of its own zero", "a smaller scatter changes no score")
+    intervals: int = _set(3, "runs", "whose zeros and gains enter values and intervals; two tell no scatter")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -274,7 +275,14 @@ class _Following:
         0.03, "of what the terms before leave", "a second term beside a large one is fitted with it"
     )
     together: int = _set(2, "terms", "are fitted at once; a third is looked for beside them")
+    steadier: tuple[int, ...] = _set(
+        (3, 10, 30, 100),
+        "times less process noise",
+        "where the likeliest shows nothing: it has in it what is missing, and what acts slowly hides there",
+    )
     near: float = _set(0.5, "of the best gain", "what takes less than half of what another does is not it")
+    alike: float = _set(0.5, "of its response squared", "what is fitted in the place of one of several terms")
+    in_place: int = _set(5, "candidates", "are fitted in the place of one of several terms")
     hopeless: float = _set(
         0.05, "of the best gain", "what takes as little is not simulated beside one that takes all of it"
     )
@@ -354,6 +362,9 @@ class _Laws:
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
     same: float = _set(
         0.95, "of what laws take of the held-out mean square", "by effects: the laws are their own formulas"
+    )
+    kept: float = _set(
+        0.5, "of its size", "by which an effect may be smaller or larger beside laws and be the same effect"
     )
     moved: float = _set(1.0, "prior sd", "a parameter that goes farther is what the law may be taken for")
     points: int = _set(41, "points of a curve", "that is drawn of a law over what was recorded")

@@ -125,6 +125,45 @@ def decimal_sign(cells: Iterable[str], separator: str, *, where: Path) -> str:
     return "," if count else "."
 
 
+Line = tuple[int, list[str]]
+
+
+def read_lines(data: bytes, is_header: Callable[[str], bool], *, where: Path) -> tuple[list[Line], str]:
+    """Return (line number, cells) of every line of a text table that is not blank, and what parts the cells.
+
+    It is the reader of every table that people bring: decoded as recordings are, parted by what splits the
+    header row into the most headers that are known, else into the most cells.
+
+    Raises
+    ------
+    UnreadableError
+        rule ``encoding ambiguous-text unreadable``
+    """
+    text = decode(data, where=where)
+    head = first_line(text)
+    separator = separator_of(head, is_header, where=where) or max(SEPARATORS, key=head.count)
+    lines = csv.reader((line[0] for line in _LINE.finditer(text)), delimiter=separator, strict=True)
+    try:
+        return [(lines.line_num, cells) for cells in lines if any(map(str.strip, cells))], separator
+    except csv.Error as error:
+        raise _no_csv(error, separator, f"{where}, line {lines.line_num}") from error
+
+
+def pointed(lines: Iterable[Line], separator: str, *, where: Path) -> list[Line]:
+    """Return lines of numbers with points for decimal commas; see `decimal_sign`. Other cells stay.
+
+    >>> pointed([(2, ["-1,5", "a, b"])], ";", where=Path("table.csv"))
+    [(2, ['-1.5', 'a, b'])]
+    """
+    rows = list(lines)
+    if decimal_sign((cell for _, cells in rows for cell in cells), separator, where=where) == ".":
+        return rows
+    return [
+        (row, [cell.replace(",", ".") if _NUMBER[","].fullmatch(cell.strip()) else cell for cell in cells])
+        for row, cells in rows
+    ]
+
+
 def number_or_text(cell: str, decimal: str = ".") -> float | str:
     """Return a cell as a number where it is one in plain digits or a word such as ``nan``, else as text.
 
@@ -309,11 +348,15 @@ def _iterate_rows(text: str, separator: str, *, where: Path) -> Iterator[list[st
     try:
         yield from csv.reader(lines, delimiter=separator, strict=True)
     except csv.Error as error:
-        raise UnreadableError(
-            "the CSV file cannot be read",
-            where=where,
-            got=error,
-            expected=f"values separated by {SEPARATORS[separator]}",
-            next_step="mend the quotation marks in a copy of the file",
-            rule="unreadable",
-        ) from error
+        raise _no_csv(error, separator, where) from error
+
+
+def _no_csv(error: csv.Error, separator: str, where: object) -> UnreadableError:
+    return UnreadableError(
+        "the CSV file cannot be read",
+        where=where,
+        got=error,
+        expected=f"values separated by {SEPARATORS[separator]}",
+        next_step="mend the quotation marks in a copy of the file",
+        rule="unreadable",
+    )

@@ -51,6 +51,7 @@ class Recording:
     """One file of a test. Rows count from 1 at the first data row.
 
     ``saved`` is the day on which the file, by its own properties, was last written; None where it is silent.
+    ``hidden`` are the worksheet's numbers of rows of data that the workbook hides.
     """
 
     path: Path
@@ -60,6 +61,7 @@ class Recording:
     simulated: bool
     format: str
     saved: dt.date | None = None
+    hidden: tuple[int, ...] = ()
 
     @property
     def rows(self) -> int:

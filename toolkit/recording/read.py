@@ -85,6 +85,7 @@ def read_recording(
         simulated=machine.simulated or SIMULATED in keywords,
         format="xlsx",
         saved=saved_on(properties),
+        hidden=table.hidden_data,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -30,19 +30,32 @@ class Table:
 
     ``errors``: (reference, text) of cells with an error value, which readers return as empty. ``numbers``
     (rows, columns): what stands below ``rows``, where that is nothing but finite numbers; as wide as the last
-    of ``rows``.
+    of ``rows``. ``hidden`` are the numbers of rows that the workbook hides.
     """
 
     where: str
     rows: Sequence[Sequence[Any]]
     errors: tuple[tuple[str, str], ...] = ()
     numbers: NDArray[np.float64] | None = None
+    hidden: tuple[int, ...] = ()
 
     def in_rows(self) -> Table:
         """Return the same table with all of its cells in ``rows``."""
         if self.numbers is None:
             return self
-        return Table(where=self.where, rows=[*self.rows, *self.numbers.tolist()], errors=self.errors)
+        return replace(self, rows=[*self.rows, *self.numbers.tolist()], numbers=None)
+
+    @property
+    def hidden_data(self) -> tuple[int, ...]:
+        """The hidden rows below the header that hold anything."""
+        above = len(self.rows)
+        first = next((i for i, row in enumerate(self.rows) if not _blank(row)), above)
+        below = above + (0 if self.numbers is None else len(self.numbers))
+        return tuple(
+            row
+            for row in self.hidden
+            if first + 1 < row <= below and (row > above or not _blank(self.rows[row - 1]))
+        )
 
 
 def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:

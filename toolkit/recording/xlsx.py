@@ -6,12 +6,15 @@ import io
 import posixpath
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
 from toolkit.errors import CellError, RecordingError, ToolkitError, UnreadableError
 from toolkit.recording.archive import stored_archive
 from toolkit.recording.cells import error_cells
+from toolkit.recording.hidden import hidden_rows
 from toolkit.recording.safe_open import Gated
 from toolkit.recording.table import Table
 
@@ -64,7 +67,17 @@ def read_sheet(gated: Gated, is_header: Callable[[str], bool], *, grids: bool = 
             next_step="save each worksheet as a file of its own",
             rule="several-sheets",
         )
-    return fitting[0]
+    name, table = fitting[0]
+    return name, replace(table, hidden=_hidden(gated.members, name))
+
+
+def _hidden(members: Mapping[str, bytes], sheet: str) -> tuple[int, ...]:
+    parts = {name: hidden_rows(xml) for name, xml in members.items() if b"sheetData" in xml}
+    if not any(parts.values()):
+        return ()
+    part = _sheet_parts(members).get(sheet)
+    # Where the package does not say which part the sheet is, every one may be.
+    return parts.get(part, ()) if part else tuple(sorted(set(chain.from_iterable(parts.values()))))
 
 
 def _around_grid(gated: Gated, errors: _Errors) -> list[tuple[str, Table]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.channels import CHANNELS
 from toolkit.findings import Finding
+from toolkit.reduction.conditions import CONDITIONS, condition_finding, farthest
 from toolkit.units import from_si, in_both, unit
 
 if TYPE_CHECKING:
@@ -22,13 +23,42 @@ if TYPE_CHECKING:
 
 # A cell may leave the range of the reference loads by this part of it before it is said aloud.
 _BEYOND = 0.05
+_SIZES = ("FZ", "V")  # axes give them a sign
 
 
 def machine_findings(info: TestInfo, machine: Machine) -> list[Finding]:
-    """Return what the test declares against what the protocol, or else the machine, asks for."""
-    if info.speed_m_s is None:
-        return []
-    return _speed([info.speed_m_s], "test.toml", machine)
+    """Return what the test declares against what tires are tested at, and against protocol or machine."""
+    stated = {"P": info.pressure_Pa, "V": info.speed_m_s, "rated_load": info.rated_load_N}
+    unusual = [
+        condition_finding(name, value, where="test.toml")
+        for name, value in stated.items()
+        if value is not None
+    ]
+    asked = [] if info.speed_m_s is None else _speed([info.speed_m_s], "test.toml", machine)
+    return [*filter(None, unusual), *asked]
+
+
+def condition_findings(files: Sequence[OpenedFile]) -> list[Finding]:
+    """Return the measured conditions that no tire is tested at, by the means of the load blocks."""
+    outside: dict[str, dict[str, float]] = {}
+    units: dict[str, str] = {}
+    for file in files:
+        for name in CONDITIONS:
+            if not file.recording.has(name):
+                continue
+            series = file.recording[name]
+            means = [float(np.mean(series.si_of(window.rows))) for window in file.windows]
+            means = [abs(mean) for mean in means] if name in _SIZES else means
+            if (worst := farthest(name, means)) is not None:
+                outside.setdefault(name, {})[file.name] = worst
+                units.setdefault(name, series.unit)
+    findings = (
+        condition_finding(
+            name, max(by_file.values(), key=abs), where=_first_names(list(by_file)), unit=units[name]
+        )
+        for name, by_file in outside.items()
+    )
+    return [*filter(None, findings)]
 
 
 def pressure_findings(info: TestInfo, machine: Machine) -> list[Finding]:

@@ -11,6 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from toolkit.channels import Rotation
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
 from toolkit.simulation.plan import Plan
@@ -18,11 +20,12 @@ from toolkit.simulation.run import VirtualTest
 from toolkit.simulation.steady import settled
 from toolkit.simulation.steps import Motion
 from toolkit.simulation.tire import TireTruth, forces, pseudo_camber
+from toolkit.tires.slopes import limit_slope
 
 if TYPE_CHECKING:
-    from toolkit.simulation.steady import Answer
+    from numpy.typing import NDArray
 
-_SMALL = math.radians(1e-3)
+    from toolkit.simulation.steady import Answer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,8 +57,13 @@ def true_stiffness(tire: TireTruth | Answer, *, load_N: float, rotation: Rotatio
     """Return the stiffness of a tire at a load [N]: the published one's, or that of an answer."""
     one_degree = math.radians(1.0)
     answer = _answer(tire)
-    slope_FY, slope_MZ = _difference(answer, load_N, rotation, _SMALL)
-    secant_FY, secant_MZ = _difference(answer, load_N, rotation, one_degree)
+
+    def curves(SA: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array([_sae(answer, float(angle), load_N, rotation) for angle in SA]).T
+
+    slope_FY, slope_MZ = (float(slope) for slope in limit_slope(curves))
+    low, high = curves(np.array([-one_degree, one_degree])).T
+    secant_FY, secant_MZ = ((high - low) / (2 * one_degree)).tolist()
     return TrueStiffness(
         rotation=rotation,
         slope_cornering=-slope_FY,
@@ -183,11 +191,6 @@ def _answer(tire: TireTruth | Answer) -> Answer:
 def _sae(answer: Answer, SA: float, load: float, rotation: Rotation) -> tuple[float, float]:
     FY, MZ = answer(SA, load, rotation)
     return (1.0 if rotation == "forward" else -1.0) * FY, MZ
-
-
-def _difference(answer: Answer, load: float, rotation: Rotation, step: float) -> tuple[float, float]:
-    up, down = _sae(answer, step, load, rotation), _sae(answer, -step, load, rotation)
-    return (up[0] - down[0]) / (2 * step), (up[1] - down[1]) / (2 * step)
 
 
 def _angle_of_no_force(answer: Answer, load: float, rotation: Rotation) -> float:

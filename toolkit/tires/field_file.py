@@ -23,7 +23,7 @@ from toolkit.channels import CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.files import reads_as_number
 from toolkit.inputs import TABLE_FILE, read_input
-from toolkit.recording.csvfile import decimal_sign
+from toolkit.recording.csvfile import decimal_sign, decode
 from toolkit.recording.safe_open import gate
 from toolkit.recording.sniff import sniff
 from toolkit.units import split_header, unit
@@ -69,7 +69,9 @@ def is_field_file(path: Path) -> bool:
         return False
     data = read_input(path, TABLE_FILE)
     kind = sniff(data).id
-    return kind == "mat" or (kind == "text" and _header(data.decode("latin-1").splitlines()) is not None)
+    return kind == "mat" or (
+        kind in ("text", "utf-16") and _header(_text(data, path).splitlines()) is not None
+    )
 
 
 def read_field_file(path: Path) -> FieldFile:
@@ -164,8 +166,15 @@ def _cells(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in line.rstrip(separator).split(separator)]
 
 
+def _text(data: bytes, path: Path) -> str:
+    try:
+        return decode(data, where=path)
+    except UnreadableError:
+        return data.decode("latin-1")  # a title in another code page: names and numbers are the same bytes
+
+
 def _of_text(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
-    lines = data.decode("latin-1").splitlines()
+    lines = _text(data, path).splitlines()
     header = _header(lines)
     if header is None:
         raise UnreadableError(

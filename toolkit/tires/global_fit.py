@@ -24,18 +24,17 @@ from toolkit.tires.global_model import (
     ModelFit,
     Rows,
     Seeds,
-    make_rows,
     pooled_percent,
 )
 from toolkit.tires.global_seeds import LACKS, seeds_of, why_not_global
 from toolkit.tires.global_stage import StageFit, Task, refit, run
 from toolkit.tires.model import LOSSES, Loss, Parameter
 from toolkit.tires.quality import scatter_floor_percent
+from toolkit.tires.slopes import stiffness
 
 if TYPE_CHECKING:
     from toolkit.tires.global_model import Array
 
-_H = 5e-4  # rad: half the step of a stiffness
 _NEAR = np.radians(3.0)  # rows must come as near to SA = 0 for a slope there
 _SLIP = frozenset({"kappa", "both_kappas", "alpha_and_kappa"})
 _UNIT = {"FX": "N", "FY": "N", "MZ": "N*m"}
@@ -136,11 +135,6 @@ class Report:
         # The slope at SA = 0, upright, free rolling, at nominal pressure and speed; delta method.
         if channel == "FX" or np.abs(self.data.rows.SA).min() > _NEAR:
             return None
-        r = self.data.rows
-        rows = make_rows(
-            [-_H, _H], load, FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL,
-            UNLOADED_RADIUS=r.UNLOADED_RADIUS,
-        )  # fmt: skip
         free = [*stage.free, *stage.held]
         size = np.array([self.model.parameters[place].size for place in free])
         step = 1e-4 * size
@@ -152,11 +146,9 @@ class Report:
                 column[1 + i, 0] += step[i]
                 column[1 + len(free) + i, 0] -= step[i]
             copies.append(column)
-        with np.errstate(all="ignore"):
-            predicted = self.model.forces(copies, rows)[channel]
-        y = np.broadcast_to(predicted, (2 * len(free) + 1, 2))
+        at_zero = stiffness(self.model, copies, load=load, like=self.data.rows, channel=channel)
         flip = signs(self.model.axes, self.given.axes)
-        slopes = (y[:, 1] - y[:, 0]) / (2 * _H) * flip["SA"] * flip[channel]
+        slopes = np.broadcast_to(at_zero, (2 * len(free) + 1,)) * flip["SA"] * flip[channel]
         gradient = (slopes[1 : len(free) + 1] - slopes[len(free) + 1 :]) / (2 * step)
         variance = float(gradient @ stage.spread @ gradient) if free else 0.0
         return Estimate(

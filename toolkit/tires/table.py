@@ -2,7 +2,8 @@
 
     SA [deg],FZ [N],FY [N],MZ [N*m]        optional: IA [deg], P [kPa], V [km/h], FX [N], KAPPA [1], t [s]
 
-Where semicolons or tabs stand between the cells, numbers may have decimal commas. A column is called by its
+Where semicolons or tabs stand between the cells, numbers may have decimal commas; the text may be in UTF-8,
+UTF-16 or Windows-1252, as a recording may (`toolkit.recording.csvfile`). A column is called by its
 channel's symbol, name or alias, in any case. FZ may have either sign, one in all rows, and is the load. The
 axis system is declared, never guessed. A column of text, named `calibration` and without a unit, may say how
 the record stands that the numbers rest on: `convert` writes it.
@@ -10,8 +11,6 @@ the record stands that the numbers rest on: `convert` writes it.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from dataclasses import dataclass
@@ -26,7 +25,7 @@ from toolkit.declared import nearest
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
 from toolkit.inputs import TABLE_FILE, read_input
-from toolkit.recording.csvfile import decimal_sign, first_line
+from toolkit.recording.csvfile import Line, pointed, read_lines
 from toolkit.tires.plausibility import LARGEST, load_of
 from toolkit.units import split_header, unit
 
@@ -176,8 +175,8 @@ def read_table(
 
 
 def _without_marks(
-    lines: list[tuple[int, list[str]]],
-) -> tuple[list[tuple[int, list[str]]], tuple[str, ...]]:
+    lines: list[Line],
+) -> tuple[list[Line], tuple[str, ...]]:
     # The lines without the column of marks, and its texts.
     header = lines[0][1]
     at = [i for i, cell in enumerate(header) if cell.strip().lower() == MARKS]
@@ -188,38 +187,18 @@ def _without_marks(
     return unmarked, tuple(dict.fromkeys(mark for mark in texts if mark))
 
 
-def _cells(path: Path) -> list[tuple[int, list[str]]]:
-    # (line number, cells) of every line that is not blank.
-    try:
-        text = read_input(path, TABLE_FILE).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise UnreadableError(
-            "the table is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",
-            expected=_SHAPE, next_step="save it as 'CSV UTF-8'", rule="encoding",
-        ) from error  # fmt: skip
-    separator = max(",;\t", key=first_line(text).count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
-    try:
-        lines = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
-    except csv.Error as error:
-        raise UnreadableError(
-            "the table is not CSV", where=f"{path}, line {reader.line_num}", got=error, expected=_SHAPE,
-            next_step="mend the quotation marks", rule="unreadable",
-        ) from error  # fmt: skip
+def _cells(path: Path) -> list[Line]:
+    lines, separator = read_lines(read_input(path, TABLE_FILE), _is_channel, where=path)
     if not lines:
         raise UnreadableError(
             "the table is empty", where=path, got="no text", expected=_SHAPE, next_step="check the path",
             rule="no-data",
         )  # fmt: skip
-    if decimal_sign((cell for _, cells in lines[1:] for cell in cells), separator, where=path) == ",":
-        lines[1:] = [(row, [_pointed(cell) for cell in cells]) for row, cells in lines[1:]]
-    return lines
+    return [lines[0], *pointed(lines[1:], separator, where=path)]
 
 
-def _pointed(cell: str) -> str:
-    """Return a number with a decimal comma as one with a point; anything else as it is written."""
-    pointed = cell.replace(",", ".")
-    return pointed if "." not in cell and _NUMBER.fullmatch(pointed.strip()) else cell
+def _is_channel(header: str) -> bool:
+    return channel_of(split_header(header, lambda name: channel_of(name) is not None)[0]) is not None
 
 
 def _symbol(cell: str, path: Path) -> tuple[str, float, float]:

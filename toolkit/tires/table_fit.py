@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.channels import Axes, signs
+from toolkit.channels import Axes, channel_of, signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
+from toolkit.reduction.conditions import CONDITIONS, condition_finding, farthest
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.reduction.physics import departures, of_sizes
 from toolkit.reduction.selection import Selection, of_one_condition
@@ -22,7 +23,7 @@ from toolkit.tires.models import fit_model
 from toolkit.tires.plausibility import size_findings
 from toolkit.tires.quality import median, shares
 from toolkit.tires.table import TireTable
-from toolkit.units import in_both
+from toolkit.units import in_both, split_header
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -213,16 +214,39 @@ def fit_findings(fits: list[CurveFit]) -> list[Finding]:
     return findings
 
 
+def condition_findings(table: TireTable, only: Collection[str] = CONDITIONS) -> tuple[Finding, ...]:
+    """Return the conditions of a table's rows that no tire is tested at, each by its farthest row."""
+    units = {
+        symbol: split_header(cell, lambda name: channel_of(name) is not None)[1]
+        for (symbol, _), cell in zip(table.columns, table.header, strict=False)
+    }
+    findings = []
+    for symbol, values in table.columns:
+        if symbol not in only:
+            continue
+        sizes = np.abs(values) if symbol == "V" else values
+        worst = farthest(symbol, (float(sizes.min()), float(sizes.max()))) if len(values) else None
+        if worst is not None:
+            row = int(np.argmin(np.abs(sizes - worst))) + 1
+            findings.append(
+                condition_finding(
+                    symbol, worst, where=f"{table.path.name}, {symbol}, row {row}", unit=units.get(symbol)
+                )
+            )
+    return tuple(filter(None, findings))
+
+
 def row_findings(table: TireTable) -> tuple[Finding, ...]:
-    """Return where the rows of a table hold forces or moments that no tire has at their loads and slips.
+    """Return where the rows of a table hold conditions, forces or moments that no tire has.
 
     Only sizes are judged, axes by `axes_findings`; a fiftieth of the rows may be
     gross outliers. A table may be of any tire: its trail is bounded by that of the largest.
     """
+    unusual = condition_findings(table)
     FZ = table["FZ"]
     rows = FZ >= LEAST_LOAD_N
     if not rows.any():
-        return ()
+        return unusual
 
     def column(symbol: str) -> NDArray[np.float64]:
         values = table.get(symbol)
@@ -234,7 +258,7 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
         IA=column("IA"), trail_m=LARGEST_TRAIL_M,
     )  # fmt: skip
     cause = "is a column in another unit than its header says?"
-    return tuple(
+    return unusual + tuple(
         departure.finding("warning", cause=cause) for departure in departures(readings, share=_OUTLIERS)
     )
 

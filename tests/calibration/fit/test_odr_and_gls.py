@@ -365,9 +365,8 @@ def test_a_shared_error_widens_the_scale_of_a_session(make_session: Callable[...
     tail = GLS.replace('"run"', '"one standard"')
     told = fit_session(read_session(make_session(name="told", method='"gls"', tail=tail)))
     other, load = told.loads[0].fit, plain.session.table.column("FY")
-    cells = plain.session.table.columns(plain.session.indications)
-    # Rows independent but for the standard that they share.
-    one = fit_terms(terms=plain.session.terms, columns=cells, load=load)
+    # The runs' scatter as of plain least squares, and the standard that all of them share.
+    one = plain.loads[0].fit
     largest = np.abs(load).max()
     share = 0.4 / 2 / 4.4482216152605 / largest
     c = np.asarray(one.coefficients)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from toolkit.diagnosis.simulators.simulator import Output
-from toolkit.diagnosis.simulators.states import dimensions, fitting
+from toolkit.diagnosis.simulators.states import declared_dimensions, dimensions, fitting
 from toolkit.effects.catalogue import effects
 
 FRICTION = ("coulomb_friction", "viscous_damping", "quadratic_drag")
@@ -53,3 +53,31 @@ def test_a_ripple_needs_a_place_behind_the_velocity_and_a_constant_flow_nothing(
     assert fitting(effects()["periodic_ripple"].term, [1, 2], {1: 0}, {}) == [1]
     assert fitting(effects()["periodic_ripple"].term, [1, 2], {}, {1: "length"}) == []
     assert fitting(effects()["constant_force"].term, [1, 2], {}, {1: "temperature"}) == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("unit", "friction", "stiffness"),
+    [
+        ("N/kg", True, False),
+        ("m/s^2", True, False),
+        ("rad/s^2", True, False),
+        ("1/s^2", True, False),
+        ("N", True, False),
+        ("lbf*ft", True, False),
+        ("K/s", False, False),
+        ("V/s", False, False),
+        ("m^3/s", False, False),
+        ("mm/s", False, True),
+        ("rad/s", False, True),
+    ],
+)
+def test_the_unit_of_a_missing_term_tells_what_its_state_is(unit, friction, stiffness):
+    meanings = declared_dimensions({0: unit})
+    assert bool(fitting(effects()["quadratic_drag"].term, [0], {}, meanings)) is friction
+    assert bool(fitting(effects()["coulomb_friction"].term, [0], {}, meanings)) is friction
+    assert bool(fitting(effects()["cubic_stiffness"].term, [0], {}, meanings)) is stiffness
+    assert fitting(effects()["constant_force"].term, [0], {}, meanings) == [0]
+
+
+def test_a_term_of_a_bare_number_may_be_of_anything():
+    assert declared_dimensions({0: "1/s"}) == {}

@@ -18,12 +18,19 @@ from toolkit.calibration.fit.printed_digits import copies, own_scatter
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import contradicting, deviating
 from toolkit.calibration.fit.run_scale import RunScale, run_scales
+from toolkit.calibration.fit.scatter_findings import (
+    method_findings,
+    run_findings,
+    scatter_findings,
+    stated_findings,
+)
 from toolkit.calibration.fit.session_fit import fit_session, session_statements
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
 from toolkit.errors import SessionError
 from toolkit.findings import Finding
+from toolkit.recording.hidden import hidden_findings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,6 +46,8 @@ FEW_POINTS = 30
 REPEATED = 0.1
 COARSE_REFERENCE = 0.05
 MOST_NAMED = 10
+# A standard uncertainty itself, and Student's t for 95.45 % at one degree of freedom (13.97).
+_LEAST_K, _MOST_K = 1.0, 14.0
 _RISK = 0.01
 _MOST_ROWS = 20
 
@@ -59,8 +68,9 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         findings.append(Finding(rule="collinear", where=session.path.name, message=message))
     for load, judged in zip(fit.loads, sound.loads, strict=True):
         findings += _load_findings(load, wrong[load.setting.name])
-        findings += _method_findings(session, judged)
-        findings += _scatter_findings(judged)
+        findings += method_findings(session, judged)
+        findings += stated_findings(load)
+        findings += scatter_findings(judged)
     findings += _robust_findings(fit, wrong)
     findings += [
         finding for load in fit.loads for finding in _scale_findings(load, scales[load.setting.name])
@@ -79,16 +89,14 @@ def contradicting_rows(session: Session, load: LoadResult) -> tuple[int, ...]:
         return ()
     reference = session.table.column(load.setting.name)
     design = build_basis(load.fit.terms, session.table.columns(session.indications)).design
-    if load.fit.weights is not None:
-        root = np.sqrt(load.fit.weights)
-        return contradicting(design * root[:, None], reference * root)
     within = reference - load.of_runs
-    wrong = contradicting(design, reference)
+    root = np.ones(len(reference)) if load.fit.weights is None else np.sqrt(load.fit.weights)
+    wrong = contradicting(design * root[:, None], reference * root)
     if wrong and load.of_runs.any():
-        apart = contradicting(design, within)
+        apart = contradicting(design * root[:, None], within * root)
         wrong = tuple(row for row in wrong if row in apart)
-    if not wrong:
-        return ()
+    if not wrong or load.fit.weights is not None:
+        return wrong
     fitted = reference - load.fit.residuals
     mean = mean_of(design, fitted / float(np.abs(fitted).max()), session.table.up).columns
     return deviating(mean, within, wrong)
@@ -164,14 +172,10 @@ def _data_findings(fit: SessionFit) -> list[Finding]:
     names = [*session.indications, *(load.name for load in session.loads)]
     rows = table.matrix(names)
     findings += _repeated(rows, where)
-    factor, group = groups_of(table)
-    if session.method == "ols" and not group.any() and not session_statements(session).between_runs:
-        message = (
-            f"one {factor}: how {factor}s differ in zero and gain is unknown, and no uncertainty holds it; "
-            f"a second {factor} of the same loads would tell, a third and more tell it better; what is known "
-            "from elsewhere goes into [between_runs]"
-        )
-        findings.append(Finding(rule="one-run", where=where, message=message, level="note"))
+    findings += hidden_findings(table.hidden, where)
+    if session.check is not None:
+        findings += hidden_findings(session.check.hidden, f"{where}, check loads")
+    findings += run_findings(fit)
     if session.check is None:
         message = "no check loads: no term can be verified on approval"
         findings.append(Finding(rule="no-check", where=where, message=message, level="note"))
@@ -195,6 +199,12 @@ def _data_findings(fit: SessionFit) -> list[Finding]:
                 "with such a standard nothing is calibrated; is its unit right?"
             )
             findings.append(Finding(rule="coarse-reference", where=load.name, message=message))
+        if (part := stated.of(load.name)) is not None and not _LEAST_K <= part.k <= _MOST_K:
+            message = (
+                f"coverage factor k = {part.k:g}, where certificates state {_LEAST_K:g} to {_MOST_K:g}: the "
+                f"standard uncertainty would be U/k = {part.u:.3g} {load.unit}; are U and k as certified?"
+            )
+            findings.append(Finding(rule="reference-k", where=load.name, message=message))
     if session.method == "gls":
         name = undeclared_standard(session_statements(session).reference, table)
         if name is not None:
@@ -230,31 +240,6 @@ def _load_findings(load: LoadResult, wrong: tuple[int, ...]) -> list[Finding]:
 def _named(load: LoadResult, wrong: tuple[int, ...]) -> tuple[int, ...]:
     """Return the outliers by their own residuals, but for sound rows beside which others are wrong."""
     return tuple(row for row in load.diagnostics.outliers if not wrong or row in wrong)
-
-
-def _method_findings(session: Session, load: LoadResult) -> list[Finding]:
-    spread = load.diagnostics.heteroscedasticity
-    if spread is None or spread >= _RISK / len(session.loads) or session.method != "ols":
-        return []
-    message = 'the scatter grows or shrinks with the load; consider method = "wls" with u_ columns'
-    return [Finding(rule="method", where=load.setting.name, message=message, level="note")]
-
-
-def _scatter_findings(load: LoadResult) -> list[Finding]:
-    """Return that the rows lie further from their own equation than a check load may lie from it."""
-    unit, tolerance = load.setting.unit, load.setting.tolerance
-    if load.fit.residual_sd <= tolerance:
-        return []
-    message = (
-        f"the rows lie {load.fit.residual_sd:.4g} {unit} from their own equation (residual standard "
-        f"deviation), and a check load may lie {tolerance:.4g} {unit} from it"
-    )
-    if load.scatter is not None:
-        message += (
-            f"; within a {load.scatter.factor} {load.scatter.within:.3g}, between {load.scatter.factor}s "
-            f"zero {load.scatter.zero:.3g} and gain {load.scatter.gain:.3g} {unit} at full scale"
-        )
-    return [Finding(rule="scatter", where=load.setting.name, message=message)]
 
 
 def _model_findings(fit: SessionFit) -> list[Finding]:
@@ -347,7 +332,7 @@ def _scale_findings(load: LoadResult, scales: tuple[RunScale, ...]) -> list[Find
 
 def _of_runs(session: Session, rows: list[int]) -> str:
     """Return of which runs more than half stand among rows, in words; empty where of none."""
-    factor, group = groups_of(session.table)
+    factor, group = groups_of(session.table, session.zero)
     count = np.bincount(group)
     among = np.bincount(group[np.array(rows) - 1], minlength=len(count))
     if len(count) == 1:

@@ -45,7 +45,7 @@ class RunScale:
 
 def run_scales(session: Session, load: LoadResult) -> tuple[RunScale, ...]:
     """Return the runs of a load that have another scale than the others."""
-    factor, group = groups_of(session.table)
+    factor, group = groups_of(session.table, session.zero)
     if load.fit.weights is not None or not group.any() or load.fit.residual_sd <= load.setting.tolerance:
         return ()
     reference = session.table.column(load.setting.name)

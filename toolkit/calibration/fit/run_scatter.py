@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.records.scatter import RunScatter
+from toolkit.calibration.records.scatter import MODEL, UNTOLD, WEIGHTED, RunScatter
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,6 +59,7 @@ def estimate(rows: SessionRows) -> RunScatter | None:
     return RunScatter(
         factor=rows.factor, groups=groups, within=within, zero=within * zero, gain=within * gain,
         correlation=correlation ** (1 / rows.stride), dof=dof,
+        model=MODEL if rows.noise is None else WEIGHTED,
     )  # fmt: skip
 
 
@@ -77,6 +78,27 @@ def stated_scatter(
         correlation=0.0,
         dof=dof,
     )
+
+
+def untold_scatter(
+    factor: str, relative: NDArray[np.float64], residuals: NDArray[np.float64], *, within: float, dof: int
+) -> RunScatter:
+    """Return the scatter of runs of so few rows that nothing tells their zeros and gains from noise.
+
+    What cannot be told apart is taken whole for each: all of the scatter is noise, and zero^2 + gain^2
+    relative^2 is fitted to the squares of the residuals (rows,), as if none of it were. How many runs there
+    were is unknown as well: all rows are taken to share one zero and one gain, as those of a single run.
+    """
+    squares, rates = residuals**2 * (len(residuals) / dof), relative**2
+    matrix = np.column_stack([np.ones_like(rates), rates])
+    candidates = [matrix * chosen for chosen in ([1.0, 1.0], [1.0, 0.0], [0.0, 1.0])]
+    solved = [np.linalg.lstsq(candidate, squares, rcond=None)[0] for candidate in candidates]
+    sound = [variances for variances in solved if (variances >= 0).all()]
+    zero, gain = min(sound, key=lambda variances: float(np.sum((squares - matrix @ variances) ** 2))).tolist()
+    return RunScatter(
+        factor=factor, groups=1, within=within, zero=math.sqrt(zero), gain=math.sqrt(gain), correlation=0.0,
+        dof=dof, model=UNTOLD,
+    )  # fmt: skip
 
 
 def is_lowest(rows: SessionRows, scatter: RunScatter) -> bool:
@@ -109,8 +131,11 @@ def spread(rows: SessionRows, scatter: RunScatter) -> NDArray[np.float64]:
     together = group[:, None] == group
     lag = np.abs(place[:, None] - place) * step
     phi = scatter.correlation
-    R = np.where(together, phi**lag, 0.0)
-    slope = np.where(together & (lag > 0), lag * phi ** np.maximum(lag - 1, 0), 0.0) * scatter.within**2
+    sizes = 1.0 if rows.noise is None else np.outer(rows.noise[order], rows.noise[order])
+    R = np.where(together, phi**lag, 0.0) * sizes
+    slope = (
+        np.where(together & (lag > 0), lag * phi ** np.maximum(lag - 1, 0), 0.0) * scatter.within**2 * sizes
+    )
     between = together.astype(np.float64)
     gains = between * np.outer(relative, relative)
     within, zero, gain = scatter.variances
@@ -131,10 +156,14 @@ def spread(rows: SessionRows, scatter: RunScatter) -> NDArray[np.float64]:
 
 def _problem(rows: SessionRows) -> tuple[_Problem, float]:
     """Return the products of the rows at unit scatter, and that scatter [the load's unit]."""
-    columns, load = rows.mean.columns, rows.load
+    columns, load, constant, relative = rows.mean.columns, rows.load, np.ones(len(rows.load)), rows.relative
+    if rows.noise is not None:
+        # Brought to one spread, rows are as those of a plain fit.
+        constant, relative, load = constant / rows.noise, relative / rows.noise, load / rows.noise
+        columns = np.linalg.qr(columns / rows.noise[:, None])[0]
     residual = load - columns @ (columns.T @ load)
     size = math.sqrt(float(residual @ residual) / len(residual))
-    return _Problem.of(columns, rows.relative, residual / (size or 1.0), rows.group), size
+    return _Problem.of(columns, constant, relative, residual / (size or 1.0), rows.group), size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,13 +186,14 @@ class _Problem:
     def of(
         cls,
         mean: NDArray[np.float64],
+        constant: NDArray[np.float64],
         relative: NDArray[np.float64],
         load: NDArray[np.float64],
         group: NDArray[np.int64],
     ) -> _Problem:
         order = np.argsort(group, kind="stable")
         # Orthonormal columns of unit mean square: products of one size.
-        columns = np.column_stack([mean * math.sqrt(len(load)), np.ones(len(load)), relative, load])[order]
+        columns = np.column_stack([mean * math.sqrt(len(load)), constant, relative, load])[order]
         counts = np.bincount(group)
         starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
         # Of the first row of a run nothing stands before.

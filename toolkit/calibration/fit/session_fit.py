@@ -23,9 +23,10 @@ from toolkit.calibration.fit.regression import (
     fit_terms,
     raw_coefficients,
 )
-from toolkit.calibration.fit.run_scatter import estimate, stated_scatter
-from toolkit.calibration.fit.session_rows import SessionRows, groups_of
-from toolkit.calibration.records.scatter import RunScatter, rows_of
+from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
+from toolkit.calibration.fit.session_rows import groups_of
+from toolkit.calibration.fit.session_scatter import scatter_of_rows
+from toolkit.calibration.records.scatter import RunScatter
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.session.settings import wrong
 from toolkit.calibration.session.statements import Statements, parse_statements
@@ -111,6 +112,9 @@ class LoadResult:
     ``of_runs`` (rows,) is what of the residuals the runs' zeros and gains make; rows are judged without it.
     ``exact``: the rows lie on the equation as far as their printed digits tell, so that nothing scatters.
 
+    ``stated`` is the root mean square of the rows' stated uncertainties by which the fit weighs, in the
+    load's unit; ``chi2_within`` the weighted sum of squares that is not ``of_runs``. None: none is stated.
+
     ``llf`` and ``check_residuals`` (fitted - reference, check rows,) in the load's unit.
 
     ``check_max_percent_fs`` is None where the session has no check loads.
@@ -121,6 +125,8 @@ class LoadResult:
     scatter: RunScatter | None
     of_runs: NDArray[np.float64]
     exact: bool
+    chi2_within: float | None
+    stated: float | None
     diagnostics: Diagnostics
     llf: float
     check_residuals: NDArray[np.float64] | None
@@ -211,21 +217,20 @@ def _result(
 ) -> LoadResult:
     table = session.table
     load = table.column(setting.name)
-    scatter = None
+    design = term_matrix(session.terms, table.columns(session.indications))
+    noise = noise_of(
+        session.method, session_statements(session), table, setting.name, terms=fit.terms,
+        coefficients=fit.coefficients, indications=session.indications, where=session.path,
+    )  # fmt: skip
+    scatter = scatter_of_rows(
+        design, load, table, zero=session.zero, noise=noise, residuals=fit.residuals, dof=fit.dof,
+        residual_sd=fit.residual_sd, between=session_statements(session).between(setting.name),
+    )  # fmt: skip
     of_runs = np.zeros_like(load)
-    if session.method == "ols":
-        # Other methods are given by the session what every row's uncertainty is, and what rows share.
-        design = term_matrix(session.terms, table.columns(session.indications))
-        factor, group = groups_of(table)
-        if group.any():
-            scatter = estimate(SessionRows.of(design, load, table, session.zero))
-        else:
-            stated = session_statements(session).between(setting.name)
-            scatter = stated_scatter(factor, stated, residual_sd=fit.residual_sd, dof=fit.dof)
-        if scatter is not None:
-            rows = rows_of(design, load, group)
-            of_runs = rows.of_runs(scatter, fit.residuals)
-            fit = dataclasses.replace(fit, covariance=rows.covariance(scatter))
+    if scatter is not None:
+        rows = weighed_rows(design, load, groups_of(table, session.zero)[1], noise)
+        of_runs = rows.of_runs(scatter, fit.residuals)
+        fit = dataclasses.replace(fit, covariance=rows.covariance(scatter))
     exact = rounding_alone(fit, table.columns(session.indications), load, setting.tolerance)
     residuals, percent = None, None
     if session.check is not None:
@@ -239,25 +244,36 @@ def _result(
         scatter=scatter,
         of_runs=of_runs,
         exact=exact,
-        diagnostics=_diagnosed(fit, of_runs, cells=cells, load=load, up=table.up, groups=groups, exact=exact),
+        chi2_within=None if noise is None or not noise.stated else noise.chi2(fit.residuals - of_runs),
+        stated=None if noise is None or not noise.stated else noise.size,
+        diagnostics=_diagnosed(
+            fit, of_runs, noise, cells=cells, load=load, up=table.up, groups=groups, exact=exact
+        ),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
         check_residuals=residuals,
         check_max_percent_fs=percent,
     )
 
 
-def within_runs(fit: TermFit, of_runs: NDArray[np.float64]) -> TermFit:
+def within_runs(fit: TermFit, of_runs: NDArray[np.float64], noise: RowNoise | None) -> TermFit:
     """Return a fit with the residuals that it has within its runs."""
     if not of_runs.any():
         return fit
     residuals = fit.residuals - of_runs
     sd = float(np.sqrt(np.sum(residuals**2) / fit.dof))
-    return dataclasses.replace(fit, residuals=residuals, scaled=residuals, residual_sd=sd)
+    return dataclasses.replace(
+        fit,
+        residuals=residuals,
+        scaled=residuals if noise is None else noise.scaled(residuals),
+        residual_sd=sd,
+        chi2=None if noise is None else noise.chi2(residuals),
+    )
 
 
 def _diagnosed(
     fit: TermFit,
     of_runs: NDArray[np.float64],
+    noise: RowNoise | None,
     *,
     cells: NDArray[np.float64],
     load: NDArray[np.float64],
@@ -270,7 +286,7 @@ def _diagnosed(
         return dataclasses.replace(diagnostics, outliers=(), lack_of_fit=None, heteroscedasticity=None)
     if not of_runs.any():
         return diagnostics
-    within = diagnose(within_runs(fit, of_runs), cells=cells, load=load, up=up, replicates=groups)
+    within = diagnose(within_runs(fit, of_runs, noise), cells=cells, load=load, up=up, replicates=groups)
     return dataclasses.replace(
         diagnostics,
         apart=within.external,

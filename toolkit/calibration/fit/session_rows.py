@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 ENOUGH_DOF = 20
 HIGHEST_POWER = 4
 MOST_GROUPS = 60
+# Rows of a run on average, beyond its zero and its gain: with fewer, both take up what is noise.
+SPARE_ROWS = 0.5
 MOST_ROWS = 2000
 # Beyond it products of zeros leave nothing of the scatter within runs in double precision.
 _LARGEST_RATIO = 1e4
@@ -47,6 +49,7 @@ class SessionRows:
     (``factor``: run or mounting); ``own_zeros``: the mean holds a zero of every run, so that differences of
     zeros are no scatter. Of long sessions a sample stands for all: `MOST_GROUPS` runs, and of each every
     ``stride``-th row, so that rows are `MOST_ROWS` at most; more would narrow estimates that are narrow.
+    ``noise`` (rows,) is the size of each row's scatter by their root mean square, None where they are alike.
     """
 
     load: NDArray[np.float64]
@@ -56,13 +59,24 @@ class SessionRows:
     group: NDArray[np.int64]
     own_zeros: bool
     stride: int = 1
+    noise: NDArray[np.float64] | None = None
 
     @classmethod
     def of(
-        cls, design: NDArray[np.float64], load: NDArray[np.float64], table: Table, zero: str
+        cls,
+        design: NDArray[np.float64],
+        load: NDArray[np.float64],
+        table: Table,
+        zero: str,
+        *,
+        noise: NDArray[np.float64] | None = None,
+        every: bool = False,
     ) -> SessionRows:
-        """Return the rows of a load (rows,) with the terms of its equation (rows, terms)."""
-        factor, group = groups_of(table)
+        """Return the rows of a load (rows,) with the terms of its equation (rows, terms).
+
+        ``noise`` (rows,) and ``every`` (see `groups_of`) as the method and the record have them.
+        """
+        factor, group = groups_of(table, zero, every=every)
         sample, stride = _sample(group)
         group = _numbered(group[sample])
         design, load = design[sample], load[sample]
@@ -76,7 +90,7 @@ class SessionRows:
         mean = mean_of(np.column_stack([design, zeros]), relative, up)
         return cls(
             load=load, relative=relative, mean=mean, factor=factor, group=group,
-            own_zeros=bool(zeros.size), stride=stride,
+            own_zeros=bool(zeros.size), stride=stride, noise=None if noise is None else noise[sample],
         )  # fmt: skip
 
     @property
@@ -110,16 +124,31 @@ class SessionRows:
         ]
 
 
-def groups_of(table: Table) -> tuple[str, NDArray[np.int64]]:
+def groups_of(table: Table, zero: str, *, every: bool = False) -> tuple[str, NDArray[np.int64]]:
     """Return what tells a session's rows apart, and each row's group from 0 (rows,).
 
     Mountings take the place of runs where the session has more than one rotation: ISO 376 takes
-    reproducibility between rotated mountings, repeatability within one.
+    reproducibility between rotated mountings, repeatability within one. Where fewer than two of them
+    have two rows, or all of them hardly more than their own zero and gain take (the gain alone where ``zero``
+    is "run": it is read), they tell nothing of each other: all rows are one group, but for ``every``, which
+    numbers them as they stand (as records made before did).
     """
+    factor, group = "run", np.zeros(table.rows, dtype=np.int64)
     if table.rotation is not None and len(np.unique(table.rotation)) > 1:
-        return "mounting", _numbered(table.rotation)
-    run = np.zeros(table.rows) if table.run is None else table.run
-    return "run", _numbered(run)
+        factor, group = "mounting", _numbered(table.rotation)
+    elif table.run is not None:
+        group = _numbered(table.run)
+    counts = np.bincount(group)
+    if not every and (
+        np.count_nonzero(counts > 1) < 2 or counts.mean() < (1 if zero == "run" else 2) + SPARE_ROWS
+    ):
+        group = np.zeros_like(group)
+    return factor, group
+
+
+def are_untold(table: Table, zero: str) -> bool:
+    """Tell whether rows are numbered as of several runs, of too few to show zeros and gains."""
+    return bool(groups_of(table, zero, every=True)[1].any()) and not groups_of(table, zero)[1].any()
 
 
 def mean_of(design: NDArray[np.float64], relative: NDArray[np.float64], up: NDArray[np.bool_] | None) -> Mean:

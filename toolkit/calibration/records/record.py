@@ -12,7 +12,7 @@ import re
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, cast
 
-from toolkit.calibration.records.scatter import MODEL, RunScatter
+from toolkit.calibration.records.scatter import MODELS, UNTOLD, RunScatter
 from toolkit.errors import RecordError
 from toolkit.files import sha256_bytes
 
@@ -106,6 +106,10 @@ class LoadFit:
         if s is None:
             return None
         between = f"between {s.groups} {s.factor}s" if s.groups > 1 else f"of another {s.factor}, as stated:"
+        if s.model == UNTOLD:
+            between = f"of another {s.factor}, at most:"
+        elif s.groups < 2 and not (s.zero or s.gain):
+            return f"scatter within a {s.factor} {s.within:.3g} {self.unit}; one tells nothing of the next"
         text = f"scatter within a {s.factor} {s.within:.3g}, {between} zero {s.zero:.3g}, gain {s.gain:.3g}"
         correlated = f", correlated by {s.correlation:.2f} from row to row" if s.correlation else ""
         return f"{text} {self.unit} at full scale{correlated}"
@@ -242,7 +246,7 @@ def _scatter(entry: Any) -> RunScatter | None:
         return None
     scatter = RunScatter(**entry)
     _floats((scatter.within, scatter.zero, scatter.gain, scatter.correlation))
-    if scatter.model != MODEL:
+    if scatter.model not in MODELS:
         raise ValueError(f"the scatter's model is not known: {scatter.model}")
     for count in (scatter.groups, scatter.dof):
         _optional(count, int)

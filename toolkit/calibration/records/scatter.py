@@ -5,16 +5,22 @@ Reference loads y of a session against its terms X:
     y_i = X_i c + z_r + g_r l_i + e_i,   l_i = (X c)_i / largest load,   r the run (or mounting) of row i
 
 with a zero z_r ~ N(0, zero^2) and a gain g_r ~ N(0, gain^2) of every run, both in the unit of the load (the
-gain at the largest load), and e_i ~ N(0, within^2), correlated with the row before it in its run by
-``correlation``. The coefficients are those of the session's fit, a linear map A of the loads: their
-covariance is A V A^T with V that of the rows (JCGM 100:2008, 5.2; Searle, Casella and McCulloch, Variance
+gain at the largest load), and e_i ~ N(0, (within s_i)^2), correlated with the row before it in its run by
+``correlation``. s_i is 1 where all rows weigh alike, else the row's stated uncertainty by their root mean
+square. The coefficients are those of the session's fit, whatever its method, a linear map A of the loads
+(of errors in both variables: to first order, at the solution): their covariance is A V A^T with V that of
+the rows (JCGM 100:2008, 5.2; Searle, Casella and McCulloch, Variance
 Components, 1992). `fit.run_scatter` estimates the components; what is computed from them stands here, in
 numpy alone, because every command that loads a record computes it again.
+
+What a session states of its rows stands in V in place of what they show, unless chi-square contradicts it
+at 95 % (ISO/TS 28037:2010, 6.2.2): then what they show takes its place, as the scale factor of weighted means
+does (Particle Data Group, Review of Particle Physics, section 5.2.2).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,11 +28,18 @@ import numpy as np
 from toolkit.estimate import coverage_factor
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 MODEL = "run-effects-1"
+WEIGHTED = "weighted-run-effects-1"  # rows of unlike stated uncertainty, and what is stated as a floor
+UNTOLD = "untold-runs-1"  # runs of so few rows that nothing tells their effects from noise
+UNTOLD_DOF = 2.0  # as three runs tell, the fewest that ASTM E74 accepts
+MODELS = (MODEL, WEIGHTED, UNTOLD)
 _NEGLIGIBLE = 1e-18
 _STEP = 1e-4
+_NORMAL_95 = 1.6448536269514722
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +49,7 @@ class RunScatter:
     ``factor`` is what tells the groups of rows apart, run or mounting; ``groups`` their number; ``within``,
     ``zero``, ``gain`` and ``correlation`` as above; ``dof`` the degrees of freedom that are left for
     ``within`` by the mean and the runs. ``zero`` is 0 by definition where each run has its own zero. Of one
-    group alone ``zero`` and ``gain`` are what the session stated.
+    group alone ``zero`` and ``gain`` are what the session stated; of the model `UNTOLD`, all that rows allow.
     """
 
     factor: str
@@ -59,12 +72,17 @@ class Rows:
     """What of a session's rows decides how scatter reaches its coefficients.
 
     ``operator`` (terms, rows) is A; ``relative`` (rows,) the loads l; ``group`` (rows,) the run of each row,
-    whole numbers from 0.
+    whole numbers from 0; ``noise`` (rows,) is s, None where it is 1. ``stated`` (3,) are variances
+    within runs, of zeros and of gains that the session states, and ``shared`` (terms, terms) the covariance
+    by stated errors that no difference of runs can show.
     """
 
     operator: NDArray[np.float64]
     relative: NDArray[np.float64]
     group: NDArray[np.int64]
+    noise: NDArray[np.float64] | None = None
+    stated: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    shared: NDArray[np.float64] | None = None
 
     def parts(self, correlation: float) -> NDArray[np.float64]:
         """Return A V_k A^T of a unit of within^2, zero^2 and gain^2 (3, terms, terms)."""
@@ -73,7 +91,8 @@ class Rows:
         runs = int(group[-1]) + 1
         zero = np.stack([np.bincount(group, weights=row, minlength=runs) for row in A])
         gain = np.stack([np.bincount(group, weights=row * relative, minlength=runs) for row in A])
-        return np.stack([_within(A, group, correlation), zero @ zero.T, gain @ gain.T])
+        noisy = A if self.noise is None else A * self.noise[order]
+        return np.stack([_within(noisy, group, correlation), zero @ zero.T, gain @ gain.T])
 
     def covariance(self, scatter: RunScatter) -> NDArray[np.float64]:
         """Return the covariance of the coefficients (terms, terms) that a normal interval may be built on.
@@ -83,14 +102,33 @@ class Rows:
         freedom only. The within part counts rows that correlation leaves independent,
         (1 - phi^2) / (1 + phi^2) of them (Bayley and Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184).
         """
+        if scatter.model == UNTOLD:
+            widening = [1.0, _expansion(UNTOLD_DOF), _expansion(UNTOLD_DOF)]
+            return self._total(scatter, self.parts(0.0), widening)
         if scatter.groups < 2:  # as for independent rows; what was stated is known
-            return np.asarray(np.einsum("k,kij->ij", scatter.variances, self.parts(0.0)))
+            return self._total(scatter, self.parts(0.0))
         phi2 = scatter.correlation**2
         within = max(scatter.dof * (1 - phi2) / (1 + phi2), 1.0)
         between = float(max(scatter.groups - 1, 1))
-        factor = np.array([within, between, between])
-        widened = scatter.variances * [_expansion(dof) for dof in factor.tolist()]
-        total = np.einsum("k,kij->ij", widened, self.parts(scatter.correlation))
+        widening = [_expansion(dof) for dof in (within, between, between)]
+        return self._total(scatter, self.parts(scatter.correlation), widening)
+
+    def estimated(self, scatter: RunScatter) -> NDArray[np.float64]:
+        """Return the covariance of the coefficients (terms, terms) by the components as estimated."""
+        return self._total(scatter, self.parts(scatter.correlation))
+
+    def shows_more(self, scatter: RunScatter) -> NDArray[np.bool_]:
+        """Tell which of within, zero and gain (3,) the rows show, since nothing stated holds them."""
+        stated = np.array(self.stated)
+        limits = stated * np.array([chi2_limit(scatter.dof) / scatter.dof, 1.0, 1.0])
+        return np.asarray((stated == 0) | (scatter.variances > limits))
+
+    def _total(
+        self, scatter: RunScatter, parts: NDArray[np.float64], widening: Sequence[float] = (1.0, 1.0, 1.0)
+    ) -> NDArray[np.float64]:
+        shown = scatter.variances * np.array(widening)
+        total = np.einsum("k,kij->ij", np.where(self.shows_more(scatter), shown, self.stated), parts)
+        total = total if self.shared is None else total + self.shared
         return np.asarray((total + total.T) / 2)
 
     def of_runs(self, scatter: RunScatter, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,27 +140,36 @@ class Rows:
         root = np.array([scatter.zero, scatter.gain])
         if scatter.groups < 2 or not root.any() or not scatter.within:
             return np.zeros_like(residuals)
-        constant, relative = np.ones_like(residuals), self.relative
-        products = [constant, relative, relative * relative, residuals, residuals * relative]
+        scale = np.ones_like(residuals) if self.noise is None else 1 / self.noise
+        constant, relative, residuals = scale, self.relative * scale, residuals * scale
+        products = [
+            constant * constant, constant * relative, relative * relative, constant * residuals,
+            residuals * relative,
+        ]  # fmt: skip
         counts, first, second, zero, gain = (np.bincount(self.group, weights=values) for values in products)
         inner = np.array([[counts, first], [first, second]]).transpose(2, 0, 1) * np.outer(root, root)
         inner = inner + scatter.within**2 * np.eye(2)
         solved = np.linalg.solve(inner, (np.stack([zero, gain], axis=1) * root)[:, :, None])[:, :, 0] * root
         effects = solved[self.group]
-        return np.asarray(effects[:, 0] + effects[:, 1] * relative)
+        return np.asarray(effects[:, 0] + effects[:, 1] * self.relative)
 
     def variance(self, scatter: RunScatter, J: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """Return J C J^T, unexpanded, of one vector J (terms,), and its gradient (4,).
 
         The gradient is by within^2, zero^2, gain^2 and the correlation.
         """
-        alone = Rows(operator=(J @ self.operator)[None, :], relative=self.relative, group=self.group)
+        alone = replace(self, operator=(J @ self.operator)[None, :], shared=None)
         share = alone.parts(scatter.correlation)[:, 0, 0]
         phi = scatter.correlation
         near = [max(phi - _STEP, 0.0), phi + _STEP]
         moved = [float(alone.parts(value)[0, 0, 0]) for value in near]
-        turned = scatter.within**2 * (moved[1] - moved[0]) / (near[1] - near[0])
-        return float(scatter.variances @ share), np.append(share, turned)
+        more = self.shows_more(scatter)
+        variances = np.where(more, scatter.variances, self.stated)
+        turned = variances[0] * (moved[1] - moved[0]) / (near[1] - near[0])
+        shared = 0.0 if self.shared is None else float(J @ self.shared @ J)
+        # What is stated is known: it moves with no estimate.
+        estimated = np.where(more, share, 0.0)
+        return float(variances @ share) + shared, np.append(estimated, turned)
 
 
 def rows_of(
@@ -131,7 +178,7 @@ def rows_of(
     group: NDArray[np.int64],
     operator: NDArray[np.float64] | None = None,
 ) -> Rows:
-    """Return the rows of a least-squares fit of a load (rows,) on a design (rows, terms).
+    """Return the rows of a plain least-squares fit of a load (rows,) on a design (rows, terms).
 
     ``operator`` (terms, rows) is what makes the coefficients, where it is known.
     """
@@ -160,6 +207,16 @@ def _within(A: NDArray[np.float64], group: NDArray[np.int64], correlation: float
         lag, weight = 2 * lag, weight * weight
     half = filtered @ A.T
     return np.asarray(half + half.T - product)
+
+
+def chi2_limit(dof: int) -> float:
+    """Return the 95 % quantile of chi-square (Wilson and Hilferty, PNAS 17 (1931) 684).
+
+    >>> round(chi2_limit(72), 1)  # 92.8 in the tables
+    92.8
+    """
+    part = 2 / (9 * dof)
+    return float(dof * (1 - part + _NORMAL_95 * part**0.5) ** 3)
 
 
 def _expansion(dof: float) -> float:

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.run_scatter import is_lowest, stated_scatter
-from toolkit.calibration.fit.session_rows import SessionRows, groups_of
-from toolkit.calibration.records.scatter import rows_of
+from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
+from toolkit.calibration.fit.session_rows import groups_of
+from toolkit.calibration.fit.session_scatter import is_of_rows
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
@@ -288,13 +288,13 @@ def _covariance(
     record: CalibrationRecord, load: LoadFit, solver: _Solver, table: Table
 ) -> NDArray[np.float64]:
     """Return the covariance by the model that the record names (terms, terms)."""
-    if solver.known:
+    if load.scatter is None and solver.known:
         return solver.inverse
     if load.scatter is None:
         # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
         # rounding, and the covariance is that rounding squared.
         return (load.residual_sd or 0.0) ** 2 * solver.inverse
-    covariance = scatter_covariance(record, load, solver.back @ solver.pseudo @ solver.left.T, table)
+    covariance = scatter_covariance(record, load, solver.operator, table)
     if covariance is None:
         raise _refused(
             record, f"{load.load}, scatter", "another scatter in the record", "the likeliest", "refit"
@@ -303,26 +303,30 @@ def _covariance(
 
 
 def scatter_covariance(
-    record: CalibrationRecord, fit: LoadFit, operator: NDArray[np.float64], table: Table
+    record: CalibrationRecord, fit: LoadFit, operator: NDArray[np.float64] | None, table: Table
 ) -> NDArray[np.float64] | None:
     """Return the covariance (terms, terms) that a record's scatter makes; None where it is not its rows'.
 
-    ``operator`` (terms, rows) is what made the coefficients of the loads.
+    ``operator`` (terms, rows) is what made the coefficients of the loads, where it is known.
     """
     design = term_matrix(fit.terms, table.columns(record.indications))
-    load = table.column(fit.load)
-    factor, group = groups_of(table)
-    if group.any():
-        sound = fit.scatter is not None and is_lowest(
-            SessionRows.of(design, load, table, record.zero), fit.scatter
-        )
-    else:
-        stated = statements_of(record).between(fit.load)
-        expected = stated_scatter(factor, stated, residual_sd=fit.residual_sd or 0.0, dof=fit.dof or 0)
-        sound = fit.scatter == expected
-    if fit.scatter is None or not sound:
+    load, noise = table.column(fit.load), row_noise(record, fit, table)
+    if fit.scatter is None or not is_of_rows(
+        fit.scatter, design, load, table, zero=record.zero, noise=noise,
+        residuals=load - design @ np.asarray(fit.coefficients), residual_sd=fit.residual_sd or 0.0,
+        dof=fit.dof or 0, between=statements_of(record).between(fit.load),
+    ):  # fmt: skip
         return None
-    return rows_of(design, load, group, operator).covariance(fit.scatter)
+    group = groups_of(table, record.zero, every=fit.scatter.groups > 1)[1]
+    return weighed_rows(design, load, group, noise, operator).covariance(fit.scatter)
+
+
+def row_noise(record: CalibrationRecord, fit: LoadFit, table: Table) -> RowNoise | None:
+    """Return what the method of a record's load takes its rows for."""
+    return noise_of(
+        fit.method, statements_of(record), table, fit.load, terms=fit.terms, coefficients=fit.coefficients,
+        indications=record.indications, where=record.id,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -354,6 +358,14 @@ class _Solver:
     def known(self) -> bool:
         """Whether the errors are known: the covariance then follows from them, not from the residuals."""
         return self.weights is not None or self.whiten is not None
+
+    @property
+    def operator(self) -> NDArray[np.float64] | None:
+        """What makes coefficients of loads (terms, rows); None where rows share errors."""
+        if self.whiten is not None:
+            return None
+        operator = self.back @ self.pseudo @ self.left.T
+        return operator if self.weights is None else operator * self.weights
 
     def solve(self, loads: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Return the solution in the design's columns, and the residual standard deviation."""

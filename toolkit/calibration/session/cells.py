@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ class Cells:
 
     ``columns`` (one a header, rows): texts, or what a worksheet's cells hold; ``lines`` (rows,) are the
     numbers of the rows in the file. ``separator`` of a text; "" of a worksheet, whose cells are ``merged``
-    in places where it says so.
+    in places where it says so, and which hides some of the ``lines`` (``hidden``).
     """
 
     where: str
@@ -33,6 +33,7 @@ class Cells:
     lines: Sequence[int]
     separator: str
     merged: bool = False
+    hidden: tuple[int, ...] = ()
 
     def name(self, column: int) -> str:
         """Return a column's header without its unit."""
@@ -123,7 +124,8 @@ def _sheet(gated: Any, known: Callable[[str], bool]) -> Cells:
             "cell", "correct the cell, or remove the whole row with a reason in the laboratory's notes",
         )  # fmt: skip
     merged = any(b"<mergeCell " in xml for xml in gated.members.values())
-    return _cells(table.in_rows().rows, where=table.where, separator="", merged=merged)
+    cells = _cells(table.in_rows().rows, where=table.where, separator="", merged=merged)
+    return replace(cells, hidden=table.hidden_data)
 
 
 def _cells(rows: Sequence[Sequence[Any]], *, where: str, separator: str, merged: bool = False) -> Cells:

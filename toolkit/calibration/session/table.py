@@ -53,7 +53,8 @@ class Table:
 
     ``run`` (rows,), ``up`` (rows,), True where the load was increased, and ``rotation`` [deg] are None where
     the file has no such column; ``labels`` are columns of names (name, a text a row), see `known_errors`.
-    ``lines`` (rows,) are the numbers of the rows in the file, for messages.
+    ``lines`` (rows,) are the numbers of the rows in the file, for messages; ``hidden`` those of them that a
+    workbook hides.
     """
 
     names: tuple[str, ...]
@@ -64,6 +65,7 @@ class Table:
     rotation: NDArray[np.float64] | None
     labels: tuple[tuple[str, tuple[str, ...]], ...] = ()
     lines: Sequence[int] = ()
+    hidden: tuple[int, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -198,6 +200,7 @@ def read_table(
         rotation=extra.get("rotation"),
         labels=tuple((name, _texts(cells, head.columns[name])) for name in head.labels),
         lines=cells.lines,
+        hidden=tuple(sorted({*cells.lines} & {*cells.hidden})),
     )
 
 

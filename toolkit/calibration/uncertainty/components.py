@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.records.scatter import UNTOLD
 from toolkit.calibration.session.known_errors import row_uncertainty
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.common_errors import (
@@ -55,8 +56,8 @@ def components_of(
     share = abs(value) / load.largest
     curve = _curve(record, load, scatter, point)
     new = _new_run(scatter, share)
-    total = (curve.variance if load.method == "ols" else 0.0) + scatter.runs.within**2
-    total += new.variance if scatter.runs.groups > 1 else 0.0
+    total = (0.0 if _from_stated(load, curve) else curve.variance) + scatter.runs.within**2
+    total += new.variance if _estimated(scatter) else 0.0
     dof = scatter.dof(curve.gradient + _READING + new.gradient, total)
     return (
         _reference(statements, load, value, loads),
@@ -86,7 +87,7 @@ def _curve(record: CalibrationRecord, load: LoadFit, s: Scatter, point: NDArray[
     """Return the variance of the curve at a point, J C J^T (JCGM 100 eq. 13, H.3.4)."""
     J = term_matrix(load.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
     stored = max(float(J @ np.asarray(load.covariance) @ J), 0.0)
-    if load.method != "ols":  # it follows from stated uncertainties alone
+    if load.scatter is None and s.runs.groups < 2 and load.method != "ols":
         return _Variance(variance=stored, gradient=np.zeros(4), dof=math.inf)
     if load.scatter is None and s.runs.groups < 2:
         share = stored / (load.residual_sd or 1.0) ** 2
@@ -94,6 +95,16 @@ def _curve(record: CalibrationRecord, load: LoadFit, s: Scatter, point: NDArray[
         return _Variance(variance=stored, gradient=np.array([share, 0.0, 0.0, 0.0]), dof=dof)
     variance, gradient = s.rows.variance(s.runs, J)
     return _Variance(variance=variance, gradient=gradient, dof=s.dof(gradient, variance))
+
+
+def _estimated(s: Scatter) -> bool:
+    """Tell whether zeros and gains of runs are of the rows, and not stated."""
+    return s.runs.groups > 1 or s.runs.model == UNTOLD
+
+
+def _from_stated(load: LoadFit, curve: _Variance) -> bool:
+    """Tell whether the covariance follows from stated uncertainties alone: no scatter is above them."""
+    return load.method != "ols" and math.isinf(curve.dof)
 
 
 def _new_run(s: Scatter, share: float) -> _Variance:
@@ -139,7 +150,7 @@ def _of_rows_around(loads: Table, load: LoadFit, value: float) -> float:
 
 
 def _fit(record: CalibrationRecord, load: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:
-    from_stated = load.method != "ols"  # the covariance follows from stated uncertainties alone
+    from_stated = _from_stated(load, curve)
     text = f"J V J^T of the {len(load.terms)} coefficients at {_point(record, point)}"
     return _part(
         "fit", text, "B" if from_stated else "A", "normal" if from_stated else "student",
@@ -166,6 +177,12 @@ def _reproducibility(s: Scatter, new: _Variance) -> Component:
             why = f"so few rows, or one {runs.factor}, tell nothing of the next"
             return _absent("reproducibility", why, "data")
         text = f"stated of another {runs.factor}: zero {runs.zero:.3g}, gain {runs.gain:.3g} at full scale"
+        if runs.model == UNTOLD:
+            text = (
+                f"at most between {runs.factor}s, whose rows are too few to tell: "
+                f"zero {runs.zero:.3g}, gain {runs.gain:.3g} at full scale"
+            )
+            return _part("reproducibility", text, "A", "student", u, new.dof, "data", joint=True)
         return _part("reproducibility", text, "B", "normal", u, math.inf, "session")
     text = (
         f"between {runs.groups} {runs.factor}s, free of the scatter within: zero {runs.zero:.3g}, "

@@ -190,9 +190,10 @@ def _refits(record: CalibrationRecord, loads: Table, budget: Budget) -> Refit:
     coefficients = np.asarray(fitted.coefficients)
     part = budget.component("fit")
     scatter = scatter_of(record, loads, fitted)
-    spread = scatter.rows.parts(scatter.runs.correlation)
-    covariance = np.einsum("k,kij->ij", scatter.runs.variances, spread)
-    root = _root(covariance if part.joint and fitted.scatter is not None else np.asarray(fitted.covariance))
+    estimated = fitted.scatter is not None or fitted.method != "ols"
+    root = _root(
+        scatter.rows.estimated(scatter.runs) if part.joint and estimated else np.asarray(fitted.covariance)
+    )
 
     def refit(generator: np.random.Generator, size: int, scale: NDArray[np.float64]) -> NDArray[np.float64]:
         moved = generator.standard_normal((size, len(coefficients))) @ root.T

@@ -1,21 +1,24 @@
 """What a session's rows tell of one load: scatter within and between runs, misfit of the curve, reversal.
 
-The scatter is that of the record (`records.scatter`); of records made before it was kept there, and of other
-methods than ordinary least squares, it is estimated from their rows here. Misfit and reversal are the parts
+The scatter is that of the record (`records.scatter`); of records made before it was kept there, it is
+estimated from their rows here. Misfit and reversal are the parts
 of the mean beside the equation's terms (`fit.session_rows`): what the columns explain, less what the scatter
 alone would give them.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.row_noise import noise_of, weighed_rows
 from toolkit.calibration.fit.run_scatter import estimate, spread
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
-from toolkit.calibration.records.scatter import Rows, RunScatter, rows_of
+from toolkit.calibration.records.scatter import UNTOLD, UNTOLD_DOF, Rows, RunScatter
+from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 
 if TYPE_CHECKING:
@@ -57,17 +60,26 @@ def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scat
     """Return the scatter of a record's load from its reference loads."""
     design = term_matrix(fitted.terms, loads.columns(record.indications))
     load = loads.column(fitted.load)
-    rows = SessionRows.of(design, load, loads, record.zero)
-    runs = fitted.scatter or estimate(rows) or _one_run(rows)
-    covariance = (
-        spread(rows, runs) if runs.groups > 1 else np.diag([2 * runs.within**4 / runs.dof, 0.0, 0.0, 0.0])
+    every = fitted.scatter is not None and fitted.scatter.groups > 1
+    noise = noise_of(
+        fitted.method, statements_of(record), loads, fitted.load, terms=fitted.terms,
+        coefficients=fitted.coefficients, indications=record.indications, where=record.id,
+    )  # fmt: skip
+    rows = SessionRows.of(
+        design, load, loads, record.zero, noise=None if noise is None else noise.profile, every=every
     )
+    runs = fitted.scatter or estimate(rows) or _one_run(rows)
+    if runs.groups > 1:
+        covariance = spread(rows, runs)
+    else:
+        between = UNTOLD_DOF if runs.model == UNTOLD else math.inf
+        covariance = np.diag([*(2 * runs.variances**2 / [runs.dof, between, between]), 0.0])
     misfit = _explained(rows, runs, rows.mean.misfit)
     reversal = _explained(rows, runs, rows.mean.direction)
     return Scatter(
         runs=runs,
         spread=covariance,
-        rows=rows_of(design, load, groups_of(loads)[1]),
+        rows=weighed_rows(design, load, groups_of(loads, record.zero, every=every)[1], noise),
         misfit=misfit[0],
         misfit_dof=misfit[1],
         reversal=reversal[0],
@@ -96,6 +108,6 @@ def _explained(rows: SessionRows, runs: RunScatter, part: slice) -> tuple[float,
     if not count:
         return 0.0, 0
     squares = float(np.sum((columns.T @ rows.load) ** 2))
-    alone = Rows(operator=columns.T, relative=rows.relative, group=rows.group)
+    alone = Rows(operator=columns.T, relative=rows.relative, group=rows.group, noise=rows.noise)
     noise = np.einsum("k,kii->", runs.variances, alone.parts(runs.correlation))
     return float(np.sqrt(max(squares - noise, 0.0) / len(rows.load))), count

@@ -224,6 +224,12 @@ def cut_short(skipped: Sequence[str]) -> bool:
     return any(step not in ("swaps", "predictions", LAWS_STEP) for step in skipped)
 
 
+def only_runs_differ(diagnosis: Diagnosis) -> bool:
+    """Tell whether all that is left without a name are zeros and gains of the runs."""
+    bare = diagnosis.verdict == "unknown" and not diagnosis.laws and not diagnosis.skipped
+    return bare and bool(diagnosis.depends_on) and all(by == ("run",) for _, by in diagnosis.depends_on)
+
+
 def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:
     """Return what an answer says of the recordings of a case."""
     return tuple(Recorded(name=run.name, sha256=run.sha256, own=run.own) for run in runs)

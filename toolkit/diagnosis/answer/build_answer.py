@@ -264,7 +264,7 @@ def _effect(search: Search, step: Step) -> FoundEffect:
     return FoundEffect(
         key=active.key,
         stage=active.effect.stage,
-        statement=active.effect.statement,
+        statement=active.effect.statement + ("" if runs is None else f" In {_listed(runs)} alone."),
         equation=active.effect.equation,
         reference=active.effect.reference,
         parameters=(*_parameters(search, active, runs), *_named(active, runs)),
@@ -273,6 +273,10 @@ def _effect(search: Search, step: Step) -> FoundEffect:
         held_out_log_score_gain=step.held_out_gain,
         p_value=step.p_value,
     )
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _parameters(

@@ -14,6 +14,7 @@ from toolkit.diagnosis.simulators.cells import record_of
 from toolkit.errors import RegistryError
 from toolkit.findings import Finding
 from toolkit.inputs import is_regular
+from toolkit.recording.hidden import hidden_findings
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
@@ -41,6 +42,7 @@ def case_findings(problem: Problem) -> tuple[Finding, ...]:
             )
         )
     for run in (*case.runs, *case.predict):
+        findings += hidden_findings(run.hidden, run.name)
         if run.filled:
             counts = ", ".join(f"{count} of {name}" for name, count in run.filled)
             findings.append(

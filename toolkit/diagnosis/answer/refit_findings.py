@@ -1,4 +1,4 @@
-"""What a reader must know of the refit: parameters at their bounds, rows that it makes worse."""
+"""What a reader must know of the refit: parameters at bounds, runs that differ, rows that it makes worse."""
 
 from __future__ import annotations
 
@@ -15,8 +15,22 @@ if TYPE_CHECKING:
 
 
 def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
-    """Return what is told of parameters at the end of their priors, and of a refit that does harm."""
-    return (*_at_bounds(case, search), *_worse(case, search))
+    """Return what is told of parameters at their bounds, runs that differ, and a refit that does harm."""
+    return (*_at_bounds(case, search), *_scatter(case, search), *_worse(case, search))
+
+
+def _scatter(case: Case, search: Search) -> tuple[Finding, ...]:
+    units = {output.name: output.unit for output in search.problem.model.outputs}
+    return tuple(
+        Finding(
+            rule="runs-scatter",
+            where=f"{case.path.name}: {each.output}",
+            level="note",
+            message=f"zeros of the runs scatter by {each.zero_sd:.2g} {units[each.output]}, gains by "
+            f"{100 * each.gain_sd:.2g} %, both standard deviations: values and intervals have it in them",
+        )
+        for each in search.scatter
+    )
 
 
 def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:

@@ -40,7 +40,7 @@ class Run:
     ``t`` is the time [s]; without a time channel the row's number. ``simulated`` has the other program's
     output of a case of kind ``columns``; ``declared`` the run's table as written; ``filled`` how many
     missing samples of which input were interpolated; ``sha256`` is the file's; ``own`` tells that
-    the machine's acquisition program wrote it.
+    the machine's acquisition program wrote it; ``hidden`` are the rows of a worksheet that it hides.
     """
 
     name: str
@@ -52,6 +52,7 @@ class Run:
     filled: tuple[tuple[str, int], ...] = ()
     sha256: str = ""
     own: bool = False
+    hidden: tuple[int, ...] = ()
 
     @property
     def rows(self) -> int:

@@ -62,7 +62,7 @@ def read_run(
     units = {channel.name: channel.unit for channel in channels}
     # Another program's output stands in the unit of the channel that it is held against.
     units = {column: units.get(output, "") for output, column in simulated.items()} | units
-    table, present, own_names = _read(path, data, machine=machine, units=units)
+    table, present, own_names, hidden = _read(path, data, machine=machine, units=units)
     columns: dict[str, NDArray[np.float64]] = {}
     for channel in channels:
         if channel.name in table:
@@ -90,7 +90,7 @@ def read_run(
             columns[channel.name] = _filled(path, channel.name, t, columns[channel.name])
     return Run(
         name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared,
-        simulated=further, filled=tuple(filled), sha256=sha256_bytes(data), own=own_names,
+        simulated=further, filled=tuple(filled), sha256=sha256_bytes(data), own=own_names, hidden=hidden,
     )  # fmt: skip
 
 
@@ -107,18 +107,21 @@ def conditions(declared: Mapping[str, Any]) -> dict[str, str]:
 
 def _read(
     path: Path, data: bytes, *, machine: str, units: Mapping[str, str]
-) -> tuple[dict[str, NDArray[np.float64]], list[str], bool]:
-    """Return the wanted columns that a file has, the names of all, and whether it is the machine's own."""
+) -> tuple[dict[str, NDArray[np.float64]], list[str], bool, tuple[int, ...]]:
+    """Return the wanted columns that a file has and the names of all.
+
+    And whether it is the machine's own, and the rows of a worksheet that it hides.
+    """
     is_text = sniff(data).id in _TEXT
     header = header_of(data, units, where=path) if is_text else []
     # The acquisition program's own headers, in a workbook or as text.
     if machine and (not is_text or (not units.keys() & set(header) and _is_of_machine(header, machine))):
-        columns = _read_recording(path, data, load_machine(machine), units)
-        return columns, list(columns), True
+        columns, hidden = _read_recording(path, data, load_machine(machine), units)
+        return columns, list(columns), True, hidden
     if is_text:
-        return read_csv(data, units, where=path), header, False
-    columns = _read_recording(path, data, rig("the case", units), units)
-    return columns, list(columns), False
+        return read_csv(data, units, where=path), header, False, ()
+    columns, hidden = _read_recording(path, data, rig("the case", units), units)
+    return columns, list(columns), False, hidden
 
 
 def _is_of_machine(header: Collection[str], machine: str) -> bool:
@@ -128,8 +131,8 @@ def _is_of_machine(header: Collection[str], machine: str) -> bool:
 
 def _read_recording(
     path: Path, data: bytes, machine: Machine, units: Mapping[str, str]
-) -> dict[str, NDArray[np.float64]]:
-    """Return a file's columns by symbol, each in the unit that the case states for it.
+) -> tuple[dict[str, NDArray[np.float64]], tuple[int, ...]]:
+    """Return a file's columns by symbol, each in the unit that the case states for it; and its hidden rows.
 
     Raises
     ------
@@ -137,7 +140,8 @@ def _read_recording(
         it is no recording of the machine; UnitError: a stated unit is of another dimension
     """
     columns = {}
-    for series in read_recording(path, machine, data=data).series:
+    recording = read_recording(path, machine, data=data)
+    for series in recording.series:
         if series.symbol not in units:
             continue
         stated = unit(units[series.symbol])
@@ -151,7 +155,7 @@ def _read_recording(
                 rule="case",
             )
         columns[series.symbol] = (series.si - stated.offset) / stated.factor
-    return columns
+    return columns, recording.hidden
 
 
 def _check_time(path: Path, name: str, t: NDArray[np.float64]) -> None:

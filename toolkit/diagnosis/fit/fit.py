@@ -179,7 +179,7 @@ def fit(
         return fitted
     moved = iter(values)
     effects = tuple(applied if applied.effect.from_digits else next(moved) for applied in active)
-    return _resimulated(problem, fitted, effects)
+    return resimulated(problem, fitted, effects)
 
 
 def _coloured(
@@ -259,10 +259,11 @@ def replace_effects(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...
     positions = [i for i, applied in enumerate(after) if applied in before]
     places = [before.index(after[i]) for i in positions]
     covariance[np.ix_(positions, positions)] = fit.covariance[np.ix_(places, places)]
-    return replace(_resimulated(problem, fit, active), covariance=covariance)
+    return replace(resimulated(problem, fit, active), covariance=covariance)
 
 
-def _resimulated(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
+def resimulated(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
+    """Return a fit with what its parameters and other effects simulate, and what that leaves."""
     simulated = problem.simulate(fit.p, active)
     residual = {name: problem.observed[name] - column for name, column in simulated.items()}
     return replace(fit, active=active, simulated=simulated, residual=residual)

@@ -37,7 +37,7 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
     stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
     there rings, coloured noise takes it up, and no structure shows. What has a name keeps it against a
-    formula that says the same.
+    formula that says the same, and loses it where all that is named has another size beside the laws.
     """
     predicting = any(law.predicts for law in laws.listed)
     is_asked = predicting or _leaves_process_noise(search)
@@ -45,18 +45,42 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
     if not beside or not is_asked or not laws.complete:
         return search, laws
     alone = learned(search, withdrawn=True, budget=budget)
-    if not any(law.predicts for law in alone.listed) or _parameters(alone.fit) >= _parameters(laws.fit):
+    if not any(law.predicts for law in alone.listed):
         return search, laws
-    beside_laws = laws.held_out if predicting else search.held_augmented
-    if alone.held_out.total - beside_laws.total < -STEP.least_gain:
-        return search, laws
-    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
+    if any(_holds_beside(laws, step) for step in search.steps):
+        if _parameters(alone.fit) >= _parameters(laws.fit):
+            return search, laws
+        beside_laws = laws.held_out if predicting else search.held_augmented
+        if alone.held_out.total - beside_laws.total < -STEP.least_gain:
+            return search, laws
+        if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
+            return search, laws
+    elif alone.held_out.total - search.held_augmented.total < STEP.least_gain:
         return search, laws
     bare = replace(
         search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
         structure=search.structure_before,
     )  # fmt: skip
     return bare, alone
+
+
+def _holds_beside(laws: Laws, step: Step) -> bool:
+    """Tell whether some size of an effect stays, by and large, what it was before laws stood beside it.
+
+    What is there keeps its size when more of the rest is explained. One that only imitates gives way to what
+    it imitates: it is another effect then, or has the other sign.
+    """
+    beside = next((applied for applied in laws.fit.active if applied.key == step.active.key), None)
+    if beside is None:
+        return False
+    sizes = [parameter for parameter in step.active.searched if parameter.off is not None]
+    before, after = (
+        [applied.values[each.name] - (each.off or 0.0) for each in sizes] for applied in (step.active, beside)
+    )
+    return not sizes or any(
+        before[i] * after[i] > 0 and LAWS.kept < abs(after[i] / before[i]) < 1 / LAWS.kept
+        for i in range(len(sizes))
+    )
 
 
 def _leaves_process_noise(search: Search) -> bool:

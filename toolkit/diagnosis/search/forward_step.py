@@ -200,6 +200,14 @@ def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Riv
     )
 
 
+def score_in_place(problem: Problem, made: Fit, active: AppliedEffect) -> float:
+    """Return by what effects are compared in one place: the log-posterior less the cost of their sizes.
+
+    Parameters that only shape an effect make it no less able to imitate another.
+    """
+    return made.log_posterior - cost(problem, (active,)) + _weight(problem) * _shapes(active)
+
+
 def _weight(problem: Problem) -> float:
     """Return what a parameter costs of the log-likelihood (BIC)."""
     return 0.5 * math.log(sum(int(rows.sum()) for rows in problem.kept.values()))

@@ -72,7 +72,8 @@ NONE = Proposals((), (), {}, frozenset())
 def proposals(problem: Problem, base: Fit) -> Proposals:
     """Return what the prediction errors of a fit propose; nothing where its equation cannot be followed."""
     moving = problem.model.capability.motion
-    if moving is None or moving.followed is None or not problem.names:
+    led_along = None if moving is None else moving.followed
+    if led_along is None or not problem.names:
         return NONE
     p = dict(problem.known) | {
         parameter.name: value for parameter, value in zip(problem.free, base.p, strict=True)
@@ -85,17 +86,38 @@ def proposals(problem: Problem, base: Fit) -> Proposals:
             for name, kept in problem.kept.items()
         },
     )
-    try:
-        followed, answers = moving.followed(problem.runs, p, base.active, asked)
-    except FitError:
+
+    def errors_along(steadier: float) -> _PredictionErrors | None:
+        try:
+            followed, answers = led_along(problem.runs, p, base.active, replace(asked, steadier=steadier))
+        except FitError:
+            return None
+        return _PredictionErrors(problem, base, followed, answers / PARAMETER_STEP)
+
+    usual = errors_along(1.0)
+    if usual is None:
         return NONE
-    errors = _PredictionErrors(problem, base, followed, answers / PARAMETER_STEP)
-    present = {applied.key for applied in base.active}
-    listed = [
-        candidate
-        for candidate in candidates(problem, view=lambda *place: _FollowedView(followed, *place))
-        if candidate.active.effect.term is not None and candidate.key not in present
-    ]
+    found = _shown(usual)
+    if found.scored:
+        return found
+    likeliest, plain = -np.inf, usual.likelihood
+    steadiest = found
+    for steadier in FOLLOWING.steadier:
+        errors = errors_along(steadier)
+        if errors is None:
+            break
+        plain = max(plain, errors.likelihood)
+        made = _shown(errors)
+        if made.scored:
+            likelihood = errors.beside(made.together or made.scored[:1]).likelihood
+            if likelihood > likeliest:
+                steadiest, likeliest = made, likelihood
+    return steadiest if likeliest > plain else found
+
+
+def _shown(errors: _PredictionErrors) -> Proposals:
+    """Return the terms that take a good part of prediction errors."""
+    listed = errors.listed()
     tests = sum(len(candidate.starts) for candidate in listed)
     seen = errors.ranked(listed)
     p_of = {id(scored): errors.p_value(scored, tests) for scored in seen}
@@ -215,6 +237,22 @@ class _PredictionErrors:
     def n(self) -> int:
         """Number of prediction errors."""
         return int(self._read.sum())
+
+    @property
+    def likelihood(self) -> float:
+        """Log-likelihood of the recording with the process noise of this following, but for a constant."""
+        return self._followed.log_scale - 0.5 * self._rest
+
+    def listed(self) -> list[CandidateEffect]:
+        """Return the terms of an equation that are not in it."""
+        present = {applied.key for applied in self._base.active}
+        return [
+            candidate
+            for candidate in candidates(
+                self._problem, view=lambda *place: _FollowedView(self._followed, *place)
+            )
+            if candidate.active.effect.term is not None and candidate.key not in present
+        ]
 
     def share(self, scored: Scored) -> float:
         """Return the share of the prediction errors' square that a candidate takes."""

@@ -12,7 +12,6 @@ from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import FOLLOWING, PAIRS, STEP
 from toolkit.diagnosis.search.forward_step import (
     Joint,
-    Rival,
     Step,
     at_bound,
     best_step,
@@ -21,11 +20,13 @@ from toolkit.diagnosis.search.forward_step import (
     joint_fits,
     ranked,
 )
+from toolkit.diagnosis.search.in_place import best_in_place
 from toolkit.diagnosis.search.proposals import Proposals
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
+    from toolkit.diagnosis.search.candidates import CandidateEffect
     from toolkit.diagnosis.search.screen_step import Look
 
     Outcome = tuple[Fit, HeldOut, tuple[Step, ...]]
@@ -49,6 +50,7 @@ def proposed_step(
     *,
     least: float,
     refitted: HeldOut,
+    listed: Sequence[CandidateEffect],
     tell: Callable[[Sequence[Scored]], None],
 ) -> ProposedStep | None:
     """Return the step that the recording proposes, None where it proposes none that stands.
@@ -56,6 +58,7 @@ def proposed_step(
     Parameters
     ----------
     proposed : what the prediction errors of the base propose
+    listed : candidates that may stand in the place of one of several
     least : share of an output's held-out mean square that it must take away
     refitted : the held-out rows without any effect
     tell : is told what is fitted
@@ -64,7 +67,7 @@ def proposed_step(
         return None
     for count in range(len(proposed.together), 1, -1):
         tell(proposed.together[:count])
-        outcome = _joined(problem, folds, base, held_base, proposed, count, least)
+        outcome = _joined(problem, folds, base, held_base, proposed, listed, count, least)
         if outcome is not None:
             return ProposedStep(outcome, (), proposed)
     promising = proposed.scored[: STEP.refined]
@@ -80,12 +83,14 @@ def _joined(
     base: Fit,
     held_base: HeldOut,
     proposed: Proposals,
+    listed: Sequence[CandidateEffect],
     count: int,
     least: float,
 ) -> Outcome | None:
     """Return several terms fitted at once, None where they do not stand; the steps end on the largest.
 
-    Whether each of them is needed beside the others is asked of every step at the end of the search.
+    Whether each of them is needed beside the others is asked of every step at the end of the search. What
+    does better in the place of one of them takes it, where unseen rows allow it.
     """
     members = proposed.together[:count]
     joint = joint_fit(problem, base, [scored.active for scored in members], begin=members[0].p)
@@ -98,24 +103,24 @@ def _joined(
     gained = held_out.total - held_base.total
     if gained < count * STEP.least_gain or not matters(problem, held_base, held_out, max(least, PAIRS.least)):
         return None
-    # What would take as much of the prediction errors as the largest is fitted in its place.
-    rivals = []
-    for scored in proposed.scored:
-        if scored.candidate.key in {member.candidate.key for member in members}:
-            continue
-        others = [scored.active, *(member.active for member in members[1:])]
-        instead = joint_fit(problem, base, others, begin=members[0].p)
-        if instead is not None:
-            difference = instead.log_posterior - joint.log_posterior
-            rivals.append(Rival(active=instead.active[-count], difference=difference))
-    steps = [
-        Step(
-            active=active, p_value=proposed.p_of[id(scored)], held_out_gain=gained,
-            gain=joint.log_posterior - base.log_posterior,
-            rivals=tuple(rivals) if scored is members[0] else (),
-        )
-        for scored, active in zip(members, joint.active[-count:], strict=True)
-    ]  # fmt: skip
+    steps = []
+    for scored, member in zip(members, joint.active[-count:], strict=True):
+        instead, active, rivals = best_in_place(problem, joint, member, listed)
+        if instead is not joint:
+            try:
+                scores = hold_out(problem, folds, instead.active, instead)
+            except FitError:
+                scores = None
+            if scores is None or scores.total < held_out.total - STEP.least_gain:
+                active = member
+            else:
+                joint, held_out = instead, scores
+        steps.append(
+            Step(
+                active=active, p_value=proposed.p_of[id(scored)], held_out_gain=gained,
+                gain=joint.log_posterior - base.log_posterior, rivals=rivals,
+            )
+        )  # fmt: skip
     return joint, held_out, tuple(reversed(steps))
 
 

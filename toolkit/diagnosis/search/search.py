@@ -14,6 +14,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
+from toolkit.diagnosis.fit.run_scatter import RunScatter, with_run_scatter
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
@@ -127,6 +128,7 @@ class Search:
     screen: LinearisedFit
     scored: tuple[Scored, ...]
     skipped: tuple[str, ...]
+    scatter: tuple[RunScatter, ...] = ()
 
     def variance(self, at: int) -> float:
         """Return the variance of a parameter of the augmented fit, by its place among them.
@@ -175,7 +177,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 proposed = proposals(problem, base)
                 led = proposed_step(
                     problem, folds, base, held_base, proposed,
-                    least=share, refitted=held_refitted, tell=fitting,
+                    least=share, refitted=held_refitted, listed=listed, tell=fitting,
                 )  # fmt: skip
                 if led is not None:
                     sought = tuple(candidate for candidate in listed if proposed.is_worth(candidate))
@@ -238,6 +240,10 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     base, steps = _with_a_size(problem, base, steps)
     with contextlib.suppress(BudgetSpentError):
         base, held_base, steps = _told_from_none(problem, folds, base, held_base, steps)
+    scatter: tuple[RunScatter, ...] = ()
+    if steps:
+        with contextlib.suppress(BudgetSpentError):
+            base, held_base, steps, scatter = _beside_scatter(problem, folds, base, held_base, steps)
     # Every effect with its values of the last joint fit, not of the step that found it.
     values = {applied.key: applied for applied in base.active}
     steps = [replace(step, active=values[step.active.key]) for step in steps]
@@ -255,6 +261,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         screen=screen,
         scored=scored,
         skipped=tuple(skipped),
+        scatter=scatter,
     )
 
 
@@ -403,6 +410,40 @@ def _told_from_none(
             continue
         return _told_from_none(problem, folds, bare, scores, listed)
     return base, held_base, steps
+
+
+def _beside_scatter(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+) -> tuple[Fit, HeldOut, list[Step], tuple[RunScatter, ...]]:
+    """Return a hypothesis beside zeros and gains that move from run to run.
+
+    An effect of one size of which they leave nothing certain goes: a common zero of runs that each have
+    another.
+    """
+    from scipy.stats import norm
+
+    reach = float(norm.ppf((1 + VERDICT.interval) / 2))
+    scattered, scatter = with_run_scatter(problem, base)
+    at = len(problem.free)
+    for applied in scattered.active if scatter else ():
+        own, at = at, at + len(applied.searched)
+        sizes = [(i, each) for i, each in enumerate(applied.searched) if each.off is not None]
+        listed = [step for step in steps if step.active.key != applied.key]
+        if len(sizes) != 1 or applied.runs is not None or len(listed) == len(steps):
+            continue
+        (i, size) = sizes[0]
+        sd = math.sqrt(max(float(scattered.covariance[own + i, own + i]), 0.0))
+        if abs(applied.values[size.name] - (size.off or 0.0)) >= reach * sd:
+            continue
+        try:
+            bare = fit(problem, without(base.active, applied), start=base.p)
+            scores = hold_out(problem, folds, bare.active, bare)
+        except FitError:  # the simulation needs it
+            continue
+        if not listed:
+            return bare, scores, [], scatter
+        return _beside_scatter(problem, folds, bare, scores, listed)
+    return scattered, held_base, steps, scatter
 
 
 def _as_declared(problem: Problem) -> Fit:

@@ -191,7 +191,10 @@ def _reach(count: int) -> int:
 
 
 def _count(case: Case, run: Run, rows: int) -> int:
-    return max(1, round(rows * min(usual_step(each) for each in case.runs) / usual_step(run)))
+    step = usual_step(run)
+    if not math.isfinite(step):  # of one row there is no window
+        return rows
+    return max(1, round(rows * min(usual_step(each) for each in case.runs) / step))
 
 
 def _pieces(run: Run) -> list[slice]:

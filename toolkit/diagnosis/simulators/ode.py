@@ -21,7 +21,13 @@ from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange
-from toolkit.diagnosis.simulators.states import dimensions, fitting, term_places
+from toolkit.diagnosis.simulators.states import (
+    declared_dimensions,
+    dimensions,
+    fitting,
+    is_speed,
+    term_places,
+)
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
@@ -166,7 +172,10 @@ class OdeModel:
             return implied if text == "1" else text
 
         speed, position = of(state, reduced(f"{rate}*s")), self.position_of(state)
-        return force, speed, speed if position is None else of(position, f"{speed}*s")
+        if position is not None:
+            return force, speed, of(position, f"{speed}*s")
+        # A velocity has its way for a position, even where no state is one; any other state is its own.
+        return force, speed, f"{speed}*s" if is_speed(speed) else speed
 
     def _ranges(self) -> tuple[StateRange, ...]:
         """Return the states; one whose unit neither the recording nor a rate of it tells has none."""
@@ -422,8 +431,9 @@ class OdeModel:
             if effect.term.of == "state":
                 return [(name, None) for i, name in enumerate(self.states) if i not in self.derivative_of]
             at = [self.states.index(name) for name in self.force_units]
-            dimensions = {} if self.case.simulation.force_terms else self._dimensions
-            return [(self.states[i], None) for i in fitting(effect.term, at, self.derivative_of, dimensions)]
+            listed = {self.states.index(name): text for name, text in self.case.simulation.force_terms}
+            meanings = declared_dimensions(listed) | self._dimensions
+            return [(self.states[i], None) for i in fitting(effect.term, at, self.derivative_of, meanings)]
         others = [(driver.name, driver.unit) for driver in self.case.drivers]
         return channel_places(
             effect, [(output.name, output.unit) for output in self.outputs], others, drivers

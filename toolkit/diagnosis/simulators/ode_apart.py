@@ -155,7 +155,10 @@ class OdeApart:
         shapes[_ANSWERS] = (rows, outputs, len(asked.steps))
         made = self._code.arrays(
             "followed", runs[0], p, shapes, _crossing(active), [self._code.number(run) for run in runs],
-            [dict(asked.steps), dict(asked.sensor), {name: list(at) for name, at in asked.unread.items()}],
+            [
+                dict(asked.steps), dict(asked.sensor),
+                {name: list(at) for name, at in asked.unread.items()}, asked.steadier,
+            ],
         )  # fmt: skip
         return Followed(**{name: made[name] for name in shapes if name != _ANSWERS}), made[_ANSWERS]
 
@@ -218,8 +221,9 @@ def handlers_of(case: Case, model: Model) -> Handlers:
     def followed(
         _: int, p: Mapping[str, float], active: Crossing, numbers: Sequence[int], question: Sequence[Any]
     ) -> Any:
-        steps, sensor, unread = question
-        asked = Following(steps=steps, sensor=sensor, unread={name: tuple(at) for name, at in unread.items()})
+        steps, sensor, unread, steadier = question
+        rows = {name: tuple(at) for name, at in unread.items()}
+        asked = Following(steps=steps, sensor=sensor, unread=rows, steadier=steadier)
         chosen = [runs[number] for number in numbers]
         assert moving.followed is not None  # noqa: S101  of every equation
         made, answers = moving.followed(chosen, p, _crossed(active), asked)

@@ -103,7 +103,7 @@ def followed(
             guess = np.concatenate([model.integrated(run, p, forces) for run in runs], axis=1)
             made = follow(
                 linear_about, guess, recorded, rows.slices, spread=spread, fastest=fastest,
-                sensor=np.array([asked.sensor[name] for name in names]),
+                sensor=np.array([asked.sensor[name] for name in names]), steadier=asked.steadier,
             )  # fmt: skip
             moved = [{**p, name: p[name] + step} for name, step in asked.steps.items()]
             answers = np.zeros((len(rows.t), len(names), len(moved)))

@@ -89,12 +89,13 @@ class Following:
 
     ``steps`` are the steps of parameters to which prediction errors are to answer; ``sensor`` is the largest
     that the noise of each output's sensor can be; ``unread`` are rows of an output that do not count, over
-    all runs.
+    all runs; ``steadier`` is by what its process noise is less than that which makes the recording likeliest.
     """
 
     steps: Mapping[str, float]
     sensor: Mapping[str, float]
     unread: Mapping[str, tuple[int, ...]]
+    steadier: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.setting import dimension
 from toolkit.effects.catalogue import effects
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from toolkit.effects.facts import Term
 
 _SPEEDS = frozenset({"speed", "frequency"})
+_FORCES = frozenset({"force", "moment"})
 _PLACES = frozenset({"length", "angle"})
 _OPEN = frozenset({"ratio"})  # a number without unit may be anything
 
@@ -49,6 +51,27 @@ def dimensions(
     return {i: meaning for i, meaning in meanings.items() if meaning not in _OPEN}
 
 
+def is_speed(text: str) -> bool:
+    """Tell whether a unit is that of a velocity or of a turning rate."""
+    return dimension(text) in _SPEEDS
+
+
+def declared_dimensions(force_units: Mapping[int, str]) -> dict[int, str]:
+    """Return the dimension of every state of which the unit of a missing term is declared.
+
+    A force or a moment enters the equation of something that moves; any other term is a rate of its state.
+
+    Parameters
+    ----------
+    force_units : state -> unit of a term in its equation
+    """
+    meanings = {}
+    for i, text in force_units.items():
+        rate = "m/s^2" if text == "N/kg" else text
+        meanings[i] = "speed" if dimension(rate) in _FORCES else dimension(reduced(f"{rate}*s"))
+    return {i: meaning for i, meaning in meanings.items() if meaning not in _OPEN}
+
+
 def term_places(places: Callable[[Effect], Sequence[tuple[str | None, str | None]]]) -> dict[str, str]:
     """Return the states whose equation a law may enter, and whether each is a velocity or another state.
 
@@ -70,7 +93,7 @@ def fitting(
     Parameters
     ----------
     velocities : velocity -> position, of states of which one is the other's rate
-    known : state -> dimension, where the recording tells it; nothing where a case lists the states itself
+    meanings : state -> dimension, where the recording or the declared unit of a term tells it
     """
     pairs = [i for i in states if i in velocities]
     if term.of == "velocity":

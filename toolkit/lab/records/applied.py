@@ -7,6 +7,7 @@ every row and in the file's own properties.
 
 from __future__ import annotations
 
+import dataclasses
 import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -16,13 +17,14 @@ import numpy as np
 
 from toolkit.calibration.records.use import UsedRecord
 from toolkit.errors import ConfigError, OutputError, UnreadableError
-from toolkit.findings import FindingEntry
+from toolkit.findings import Finding, FindingEntry
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.recording.columns import rig
 from toolkit.recording.extras import needed
 from toolkit.recording.formats.mdf import mdf_bytes
 from toolkit.recording.formats.tdms import tdms_bytes
 from toolkit.recording.formats.vectors import Vector, Vectors, Written, series_of
+from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, STAMP
 from toolkit.recording.model import Series
 from toolkit.recording.read import read_recording
@@ -58,8 +60,8 @@ class ApplyAnswer(TypedDict):
 Table = Mapping[str, "NDArray[Any]"]
 
 
-def read_indications(path: Path, record: Record) -> tuple[Series, ...]:
-    """Return the columns of a file that holds the indications of a record: each with its unit.
+def read_indications(path: Path, record: Record) -> tuple[tuple[Series, ...], list[Finding]]:
+    """Return the columns of a file that holds the indications of a record, each with its unit; and findings.
 
     Raises
     ------
@@ -71,8 +73,9 @@ def read_indications(path: Path, record: Record) -> tuple[Series, ...]:
     machine = rig(record.result.instrument, record.indications)
     data = read_input(path, RECORDING_FILE)
     if sniff(data).id == "parquet":
-        return series_of(_parquet(data, path), machine)
-    return read_recording(path, machine, data=data).series
+        return series_of(_parquet(data, path), machine), []
+    recording = read_recording(path, machine, data=data)
+    return recording.series, hidden_findings(recording.hidden, path.name)
 
 
 def _parquet(data: bytes, path: Path) -> Vectors:
@@ -225,11 +228,12 @@ def apply_answer(
     from toolkit.lab.answers import finding_lines
 
     check_output(out)
-    series = read_indications(source, record)
+    series, of_file = read_indications(source, record)
     by_name = {column.symbol: column for column in series}
     units = {name: by_name[name].unit for name in record.indications}
     values = {name: by_name[name].values for name in record.indications}  # noqa: PD011  a Series of ours
     loads = record.apply(values, units=units, tare=tare, draft=draft)
+    loads = dataclasses.replace(loads, findings=(*loads.findings, *of_file))
     write_applied(out, applied_columns(series, loads), loads.use)
     ranges = {name: _range(loads, name) for name in loads.value}
     rows = len(series[0].values)

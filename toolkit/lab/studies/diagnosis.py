@@ -244,12 +244,12 @@ def _writable(out: Path) -> None:
 
 def diagnosis_text(answer: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
-    from toolkit.diagnosis.answer.answer import cut_short
+    from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
     from toolkit.report.diagnosis.numbers import chance, rounded
     from toolkit.report.diagnosis.page import cause, simulated
 
     cut = answer.verdict == "unknown" and cut_short(answer.skipped)
-    verdict = _CUT if cut else _VERDICTS[answer.verdict]
+    verdict = _CUT if cut else _RUNS_DIFFER if only_runs_differ(answer) else _VERDICTS[answer.verdict]
     if answer.verdict == "untestable" and answer.skipped:
         verdict = "the budget was spent before this recording could be judged"
     mark = simulated(answer)
@@ -265,9 +265,6 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
             value, interval = rounded(parameter.value, parameter.ci95)
             reach = f"  (95 %: {interval})" if interval else ""
             lines.append(f"  {parameter.name} = {value} {parameter.unit}{reach}")
-        runs = next((parameter.runs for parameter in effect.parameters if parameter.runs is not None), None)
-        if runs is not None:
-            lines.append(f"  in {', '.join(runs)} alone")
         if effect.equivalent_to:
             lines.append(f"  this recording cannot tell it from: {', '.join(effect.equivalent_to)}")
         lines.append(
@@ -332,6 +329,9 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
 
 
 _CUT = "something is missing; the budget was spent before every known effect was tried"
+_RUNS_DIFFER = (
+    "runs differ by more than their noise; within the runs nothing is missing that this recording could show"
+)
 _VERDICTS = {
     "named": "the missing physics has a name",
     "equivalent": "a class of effects explains it, which this recording cannot tell apart",

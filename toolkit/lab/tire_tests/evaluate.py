@@ -22,6 +22,7 @@ def evaluate_grid(
     from toolkit.calibration.records.use import DRAFT_MARK
     from toolkit.channels import signs
     from toolkit.findings import Finding
+    from toolkit.tires.table_fit import condition_findings
     from toolkit.tires.tir_evaluate import evaluate_tir
 
     mark = file.comment(DRAFT_MARK)
@@ -30,6 +31,8 @@ def evaluate_grid(
     forces, findings = evaluate_tir(
         file, SA=turn["SA"] * table["SA"], FZ=table["FZ"], angles=angles, **optional
     )
+    # A grid may ask for any slip, load and speed; a pressure in another unit is no question.
+    findings = (*findings, *condition_findings(table, only=("P",)))
     turned = forces.in_axes(table.axes)
     if mark is not None:
         findings = (*findings, Finding(rule="draft", where=file.where, message=mark, level="error"))

@@ -30,6 +30,9 @@ HEADLINES = {
     "nothing": "Nothing is missing that this recording could show.",
     "untestable": "This recording cannot tell.",
 }
+RUNS_DIFFER = (
+    "Runs differ by more than their noise; within the runs nothing is missing that this recording could show."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,12 +65,14 @@ class _Law:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict as a sentence; a search that was cut off has not tried every effect."""
-    from toolkit.diagnosis.answer.answer import cut_short
+    from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
 
     if diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped):
         return "Something is missing; the budget was spent before every known effect was tried."
     if diagnosis.verdict == "untestable" and diagnosis.skipped:
         return "The budget was spent before this recording could be judged."
+    if only_runs_differ(diagnosis):
+        return RUNS_DIFFER
     if diagnosis.laws and not diagnosis.effects:
         return f"{HEADLINES[diagnosis.verdict]} Its law was learned: {diagnosis.laws[0].sentence}."
     if diagnosis.effects and diagnosis.remaining == "unknown" and diagnosis.laws:

@@ -15,6 +15,7 @@ from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
 from toolkit.report.word.lint import RULES, LintFinding, at_element, missing_fonts, surroundings
+from toolkit.report.word.look import must_be_read, unreadable
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import (
     LITERAL,
@@ -82,6 +83,7 @@ def check_stories(
         *_broken(parts, words),
         *surroundings(package, parts, style),
         *placeholders(parts, style),
+        *unreadable(package, sites, must_be_read(words, style)),
     ]
     if fonts:
         findings += [

@@ -14,8 +14,9 @@ from lxml import etree
 
 from toolkit.errors import RenderError
 from toolkit.report.content import ReportContent
+from toolkit.report.word.own import element, own_paragraph
 from toolkit.report.word.toc_pages import poppler
-from toolkit.report.word.xml import W_P, W_SDT, W_T, Element, new_run, q
+from toolkit.report.word.xml import W_P, W_SDT, W_T, Element, q
 from toolkit.trust.seal.qr import Place
 
 LABEL = "Signature"
@@ -89,13 +90,8 @@ def _words(element: Element) -> str:
 
 
 def _paragraph(text: str) -> Element:
-    paragraph = etree.Element(W_P)
-    properties = etree.SubElement(paragraph, q("w:pPr"))
-    for name in ("w:keepNext", "w:keepLines", "w:suppressAutoHyphens"):
-        etree.SubElement(properties, q(name))
-    etree.SubElement(properties, q("w:spacing")).set(q("w:before"), str(round(20 * _SPACE)))
-    paragraph.append(new_run(text, None))
-    return paragraph
+    together = (element("w:keepNext"), element("w:keepLines"))
+    return own_paragraph(text, before=round(20 * _SPACE), first=together)
 
 
 def _space() -> Element:

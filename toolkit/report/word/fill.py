@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-from lxml import etree
-
 from toolkit.errors import TemplateError
 from toolkit.files import sha256_bytes
 from toolkit.report.content import SIGNATURE, ReportContent, Table
@@ -31,7 +29,9 @@ from toolkit.report.word.controls import (
     settle,
 )
 from toolkit.report.word.filled import Entry, Filled
+from toolkit.report.word.look import must_be_read
 from toolkit.report.word.numbering import levelled, number_captions
+from toolkit.report.word.own import RED, own_paragraph
 from toolkit.report.word.package import Template, open_package, undated
 from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark_pages, set_properties
 from toolkit.report.word.pictures import Ids, chart_run, free_height, insert_at_mark, picture_run
@@ -201,6 +201,8 @@ class _Filler:
             of_the_run=frozenset(self.log.of_the_run),
             rows_of_the_run=frozenset(self.log.rows_of_the_run),
             charts=tuple(self.log.charts),
+            to_be_read=must_be_read(self.content.vocabulary, self.content.style)
+            | {entry.tag for entry in self.log.manifest if not entry.tag.startswith("tk:")},
             in_margins=frozenset(self.log.in_margins - self.log.elsewhere),
         )
 
@@ -364,11 +366,7 @@ class _Filler:
         for name, text in reversed(self.content.marks):
             if paths & places[name]:
                 continue
-            bold = etree.Element(q("w:rPr"))
-            etree.SubElement(bold, q("w:b"))
-            paragraph = etree.Element(W_P)
-            paragraph.append(new_run(text, bold))
-            body.insert(0, paragraph)
+            body.insert(0, own_paragraph(text, bold=True, colour=RED))
             self.log.manifest.append(Entry(tag=f"mark:{name}", text=text, part=self.parts[0].name))
             added.append(name)
         return tuple(added)

@@ -39,7 +39,8 @@ class Filled:
     page can show, ``perhaps_shown`` those that depend on the number of pages, with their own words;
     ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them;
     ``in_margins`` the figures that stand in headers and footers alone; ``page_mark`` the line that every page
-    carries; ``charts`` those of the figures that are charts of Word's own, in their order.
+    carries; ``charts`` those of the figures that are charts of Word's own, in their order; ``to_be_read`` the
+    tags of the manifest whose text people must be able to read in the PDF.
     """
 
     docx: bytes
@@ -59,6 +60,7 @@ class Filled:
     in_margins: frozenset[str] = frozenset()
     page_mark: str | None = None
     charts: tuple[Chart, ...] = ()
+    to_be_read: frozenset[str] = frozenset()
 
 
 # A Word file as it was written, read back piece by piece: its tables may be of any length.

@@ -13,9 +13,9 @@ from urllib.parse import unquote
 from lxml import etree
 
 from toolkit.report.style import Style
-from toolkit.report.word.scan import place_of
+from toolkit.report.word.scan import LITERAL, control_tag, place_of
 from toolkit.report.word.toc import can_update, contents_fields
-from toolkit.report.word.xml import NS, Element, Story, parser, q, walk_fields
+from toolkit.report.word.xml import NS, W_P, W_SDT, Element, Story, ancestor, parser, q, walk_fields
 
 RULES = {
     "no-tags": "the template has no tag of the toolkit",
@@ -31,6 +31,7 @@ RULES = {
     "prototype": "a table has no prototype row, or more than one",
     "unknown-column": "a prototype row names a column that the table has not",
     "column-count": "a prototype row without tags has more or fewer cells than the table has columns",
+    "unreadable-tag": "a tag that must be read would be hidden, tiny, or of the colour behind it",
     "tracked-changes": "the template holds tracked changes",
     "comments": "the template holds comments",
     "date-field": "a DATE or TIME field becomes the day of printing",
@@ -97,10 +98,7 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
                 "tracked-changes", story, element, "tracked changes: accept or reject them before use"
             )
             break
-        for element in story.root.iter(q("w:del"), q("w:moveFrom")):
-            if _TAG.search("".join(one.text or "" for one in element.iter(q("w:delText"), q("w:t")))):
-                message = "a tag stands in a tracked deletion and would be printed: accept the deletion"
-                yield at_element("tracked-changes", story, element, message, "error")
+        yield from _deleted_tags(story)
         for element in story.root.iter(q("w:commentReference")):
             yield at_element("comments", story, element, "a comment will stand in the report")
             break
@@ -137,6 +135,52 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
             )
 
 
+_DELETIONS = (q("w:del"), q("w:moveFrom"))
+
+
+def _deleted_tags(story: Story) -> Iterator[LintFinding]:
+    """Find tags that a tracked deletion touches: what it deletes would be printed, inside the value too."""
+    for control in story.root.iter(W_SDT):
+        if control_tag(control) is not None and _is_deleted(control):
+            message = "a tag stands in a tracked deletion and would be printed: accept the deletion"
+            yield at_element("tracked-changes", story, control, message, "error")
+    for paragraph in story.root.iter(W_P):
+        pieces = [
+            (piece.text or "", _is_deleted(piece))
+            for piece in paragraph.iter(q("w:t"), q("w:delText"))
+            if ancestor(piece, W_P) is paragraph
+        ]
+        if any(deleted for _, deleted in pieces) and _touches_a_tag(pieces):
+            message = (
+                "a tracked deletion takes a tag or a part of it, and would be printed: accept or reject it"
+            )
+            yield at_element("tracked-changes", story, paragraph, message, "error")
+
+
+def _is_deleted(element: Element) -> bool:
+    """Tell whether a text or control is deleted: by itself, with its row or with its cell."""
+    return any(
+        outer.tag in _DELETIONS
+        or outer.find(f"{q('w:trPr')}/{q('w:del')}") is not None
+        or outer.find(f"{q('w:tcPr')}/{q('w:cellDel')}") is not None
+        for outer in element.iterancestors()
+    )
+
+
+def _touches_a_tag(pieces: list[tuple[str, bool]]) -> bool:
+    """Tell whether a deletion lies in a tag, in the text as it stands or as it is once accepted."""
+    whole = "".join(text for text, _ in pieces)
+    marks = [deleted for text, deleted in pieces for _ in text]
+    if any(any(marks[tag.start() : tag.end()]) for tag in _WHOLE_TAG.finditer(whole)):
+        return True
+    remains = "".join(text for text, deleted in pieces if not deleted)
+    places, at = [], 0
+    for text, deleted in pieces:
+        places += [at] if deleted else []
+        at += 0 if deleted else len(text)
+    return any(tag.start() < place < tag.end() for tag in LITERAL.finditer(remains) for place in places)
+
+
 def _style_names(package: object) -> set[str]:
     main = package.main_document_part  # type: ignore[attr-defined]
     return {
@@ -147,6 +191,7 @@ def _style_names(package: object) -> set[str]:
 
 
 _TAG = re.compile(r"\{\{\s*tk:")
+_WHOLE_TAG = re.compile(rf"{LITERAL.pattern}|{_TAG.pattern}")
 _TEXTS = ("t", "v")  # a:t of drawings and diagrams, m:t of formulas, c:v of charts
 _WORDS = q("w:t")[: -len("t")]
 

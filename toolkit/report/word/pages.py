@@ -11,8 +11,9 @@ from lxml import etree
 from toolkit.calibration.records.use import DRAFT
 from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
+from toolkit.report.word.own import RED, element, own_paragraph
 from toolkit.report.word.scan import LITERAL, visible_texts
-from toolkit.report.word.xml import W_P, Element, Story, clean, in_fallback, new_run, q
+from toolkit.report.word.xml import W_P, Element, Story, clean, in_fallback, q
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
@@ -120,7 +121,6 @@ _TOP = 300  # twips from the edge of the page: what most printers can print, abo
 _SIDES = 1100  # twips of the page's width that the frame leaves free
 _LETTER = 12240  # twips, where a section states no width
 _HALF_POINTS = 16
-_RED = "B00000"
 
 
 def mark_pages(package: Any, text: str) -> None:
@@ -184,38 +184,18 @@ def _width(section: Element) -> int:
 
 def _frame(text: str, width: int) -> Element:
     """Return the frame: a paragraph of its own look, whatever the styles of the template say."""
-    paragraph = etree.Element(W_P)
-    properties = etree.SubElement(paragraph, q("w:pPr"))
-
-    def add(parent: Element, name: str, **values: str | int) -> Element:
-        element = etree.SubElement(parent, q(name))
-        for key, value in values.items():
-            element.set(q(f"w:{key}"), str(value))
-        return element
-
-    add(
-        properties, "w:framePr", w=width, hSpace=0, wrap="around", vAnchor="page", hAnchor="page",
-        xAlign="center", y=_TOP,
+    borders = element("w:pBdr")
+    borders.extend(
+        element(f"w:{side}", val="single", sz=4, space=1, color=RED)
+        for side in ("top", "left", "bottom", "right")
+    )
+    place = element(
+        "w:framePr", w=width, hSpace=0, wrap="around", vAnchor="page", hAnchor="page", xAlign="center", y=_TOP
+    )
+    return own_paragraph(
+        text, bold=True, colour=RED, half_points=_HALF_POINTS, first=(place, borders),
+        last=(element("w:jc", val="center"),),
     )  # fmt: skip
-    add(properties, "w:pBdr")
-    for side in ("top", "left", "bottom", "right"):
-        add(properties[-1], f"w:{side}", val="single", sz=4, space=1, color=_RED)
-    add(properties, "w:shd", val="clear", color="auto", fill="FFFFFF")
-    add(properties, "w:suppressAutoHyphens")
-    add(properties, "w:bidi", val=0)
-    add(properties, "w:spacing", before=0, after=0, line=240, lineRule="auto")
-    add(properties, "w:ind", left=0, right=0, firstLine=0)
-    add(properties, "w:jc", val="center")
-    look = etree.Element(q("w:rPr"))
-    add(look, "w:b")
-    for off in ("i", "caps", "smallCaps", "strike", "vanish"):
-        add(look, f"w:{off}", val=0)
-    add(look, "w:color", val=_RED)
-    add(look, "w:spacing", val=0)
-    add(look, "w:sz", val=_HALF_POINTS)
-    add(look, "w:u", val="none")
-    paragraph.append(new_run(text, look))
-    return paragraph
 
 
 def _insert(header: Element, frame: Element) -> None:

@@ -50,15 +50,15 @@ def pages_of(pdf: Path, mark: str) -> tuple[SeenPage, ...]:
     )
 
 
-def words_of(pdf: Path) -> list[tuple[float, float, list[Word]]]:
-    """Return the pages of a PDF: width, height [pt] and words.
+def words_of(pdf: Path, *, raw: bool = False) -> list[tuple[float, float, list[Word]]]:
+    """Return the pages of a PDF: width, height [pt] and words; ``raw``: in the order of the print.
 
     Raises
     ------
     RenderError
         poppler is not installed, or does not end
     """
-    listing = poppler(["pdftotext", "-bbox", str(pdf), "-"])
+    listing = poppler(["pdftotext", *(["-raw"] if raw else []), "-bbox", str(pdf), "-"])
     return [
         (
             float(width),

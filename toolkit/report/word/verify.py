@@ -15,6 +15,8 @@ from pathlib import Path
 
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.filled import Filled, text_elements
+from toolkit.report.word.legible import seen
+from toolkit.report.word.pages import PAGE_MARK
 from toolkit.report.word.scan import BROKEN, LITERAL, control_tag
 from toolkit.report.word.toc_pages import pdf_outline, pdf_text, poppler, printed_pages, squeeze, titles_of
 from toolkit.report.word.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
@@ -235,6 +237,7 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
             *_contents(pdf, text, filled),
             *_margins(filled),
             *_charts(text, filled),
+            _legible(pdf, filled),
             _fonts(listing),
             Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
             Check(
@@ -252,6 +255,20 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
         ),
         pages,
     )
+
+
+def _legible(pdf: Path, filled: Filled) -> Check:
+    texts = {
+        entry.text: entry.tag
+        for entry in filled.manifest
+        if entry.tag in filled.to_be_read and entry.text != filled.page_mark
+    }
+    unreadable = [
+        f"{texts.get(text, PAGE_MARK)} {text[:40]!r} cannot be read: {why}"
+        for text, why in seen(pdf, tuple(texts), filled.page_mark)
+    ]
+    message = "; ".join(unreadable[:5]) or f"{len(texts)} texts that must be read are large and dark enough"
+    return Check(name="legible", ok=not unreadable, message=message)
 
 
 def _margins(filled: Filled) -> list[Check]:

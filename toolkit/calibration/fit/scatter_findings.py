@@ -1,0 +1,124 @@
+"""Findings of how a session's rows scatter: what runs tell of each other, what stated uncertainties hold."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from toolkit.calibration.fit.run_scatter import FEWEST_DOF
+from toolkit.calibration.fit.session_fit import session_statements
+from toolkit.calibration.fit.session_rows import are_untold, groups_of
+from toolkit.calibration.records.scatter import chi2_limit
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
+    from toolkit.calibration.session.read import Session
+
+_RISK = 0.01
+_GROSS = 1e-3  # chance of a chi-square that asks for a look before approval
+
+
+def run_findings(fit: SessionFit) -> list[Finding]:
+    """Return that the rows tell nothing of how runs differ."""
+    session = fit.session
+    factor, group = groups_of(session.table, session.zero)
+    if session_statements(session).between_runs:
+        return []
+    cure = (
+        f"a second {factor} of the same loads would tell, a third and more tell it better; what is known "
+        "from elsewhere goes into [between_runs]"
+    )
+    if are_untold(session.table, session.zero):
+        count = len(np.unique(groups_of(session.table, session.zero, every=True)[1]))
+        message = (
+            f"{session.table.rows} rows in {count} {factor}s: so few rows show no zero and no gain of a "
+            f"{factor}, so that nothing tells how {factor}s differ, nor how many there were; all rows count "
+            f"as one {factor}, with as large a zero and a gain as their scatter allows. Rows that were read "
+            f"without taking the instrument down are of one {factor}: number them alike"
+        )
+    elif not group.any():
+        message = (
+            f"one {factor}: how {factor}s differ in zero and gain is unknown, and no uncertainty holds it; "
+            f"{cure}"
+        )
+    elif fit.loads[0].fit.dof < FEWEST_DOF:
+        message = (
+            f"so few rows that zeros and gains of {factor}s cannot be told from noise, and no uncertainty "
+            f"holds them; {cure}"
+        )
+    else:
+        return []
+    return [Finding(rule="one-run", where=session.path.name, message=message, level="note")]
+
+
+def stated_findings(load: LoadResult) -> list[Finding]:
+    """Return that the rows scatter by more than the uncertainties that the fit weighs them by."""
+    if load.chi2_within is None or load.fit.chi2 is None or load.stated is None:
+        return []
+    dof, unit = load.fit.dof, load.setting.unit
+    limit = chi2_limit(dof)
+    if max(load.chi2_within, load.fit.chi2) <= limit:
+        return []
+    apart = load.of_runs.any()
+    beyond = load.chi2_within > limit
+    chi2 = load.chi2_within if beyond else load.fit.chi2
+    inside = f" within {load.scatter.factor}s" if load.scatter is not None and apart and beyond else ""
+    message = (
+        f"the rows scatter{inside} {np.sqrt(chi2 / dof):.3g} times as much as their stated uncertainties "
+        f"({load.stated:.3g} {unit} rms): chi-square {chi2:.4g} with {dof} degrees of freedom, by chance "
+        f"up to {limit:.4g} (95 %)"
+    )
+    if load.scatter is not None and apart:
+        message += (
+            f"; between {load.scatter.groups} {load.scatter.factor}s zero {load.scatter.zero:.3g} and gain "
+            f"{load.scatter.gain:.3g} {unit} at full scale"
+        )
+    message += (
+        "; the covariance holds what the rows show"
+        if beyond
+        else "; the uncertainties hold the scatter within a run, and the covariance what runs differ by"
+    )
+    gross = beyond and load.chi2_within > _gross(dof)
+    level: Literal["warning", "note"] = "warning" if gross else "note"
+    return [Finding(rule="stated-u", where=load.setting.name, message=message, level=level)]
+
+
+def _gross(dof: int) -> float:
+    from scipy.special import chdtri
+
+    return float(chdtri(dof, _GROSS))
+
+
+def method_findings(session: Session, load: LoadResult) -> list[Finding]:
+    """Return that another method suits the rows better; not where unnumbered runs may make them seem so."""
+    spread = load.diagnostics.heteroscedasticity
+    if spread is None or spread >= _RISK / len(session.loads) or session.method != "ols":
+        return []
+    factor, group = groups_of(session.table, session.zero)
+    if group.any():
+        message = 'the scatter grows or shrinks with the load; consider method = "wls" with u_ columns'
+    else:
+        message = (
+            f"the scatter grows or shrinks with the load, as it does where {factor}s differ in gain, and no "
+            f"{factor}s are told apart: number them before another method is considered"
+        )
+    return [Finding(rule="method", where=load.setting.name, message=message, level="note")]
+
+
+def scatter_findings(load: LoadResult) -> list[Finding]:
+    """Return that the rows lie further from their own equation than a check load may lie from it."""
+    unit, tolerance = load.setting.unit, load.setting.tolerance
+    if load.fit.residual_sd <= tolerance:
+        return []
+    message = (
+        f"the rows lie {load.fit.residual_sd:.4g} {unit} from their own equation (residual standard "
+        f"deviation), and a check load may lie {tolerance:.4g} {unit} from it"
+    )
+    if load.scatter is not None and (load.scatter.zero or load.scatter.gain):
+        message += (
+            f"; within a {load.scatter.factor} {load.scatter.within:.3g}, between {load.scatter.factor}s "
+            f"zero {load.scatter.zero:.3g} and gain {load.scatter.gain:.3g} {unit} at full scale"
+        )
+    return [Finding(rule="scatter", where=load.setting.name, message=message)]
