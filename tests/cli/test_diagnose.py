@@ -156,7 +156,7 @@ def test_an_effect_of_some_runs_names_them(run, tmp_path):
     found = run(write_case(tmp_path, HEAD + dated, **files), "--out", tmp_path / "out")
     (one,) = answered(tmp_path / "out")["effects"]
     assert one["parameters"][0]["runs"] in (["r0.csv"], ["r1.csv"])
-    assert f"in {one['parameters'][0]['runs'][0]} alone" in found.stdout
+    assert f"In {one['parameters'][0]['runs'][0]} alone." in found.stdout
 
 
 def test_a_document_without_libreoffice_is_refused_before_the_search(run, tmp_path, monkeypatch):

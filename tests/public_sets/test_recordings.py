@@ -67,7 +67,7 @@ def test_every_case_is_read_and_its_simulation_answers_at_the_declared_parameter
 ) -> None:
     declared = channels(recording.name)
     table = pd.DataFrame({name: np.linspace(1.0, 2.0, 30) for name in declared})
-    conditions = {"speed0": 1.0, "start": 90.0}
+    conditions = {"speed0": 1.0, "start": 90.0, "angle0": 0.5}
     tables = {"first": table, "second": table.iloc[:-1]}
     runs = tuple(Run(name=name, table=rows, conditions=conditions) for name, rows in tables.items())
     case = read_case(write_case(recording, runs, tmp_path))
