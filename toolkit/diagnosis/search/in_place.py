@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, jacobian
-from toolkit.diagnosis.fit.noise import Layout, whiten
+from toolkit.diagnosis.fit.noise import whiten
 from toolkit.diagnosis.policy import FOLLOWING
 from toolkit.diagnosis.search.forward_step import Rival, at_bound, joint_fit, score_in_place
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.effects.applied import AppliedEffect
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,23 +68,22 @@ def _alike(
         places[each.key] = slice(at, at + len(each.searched))
         at += len(each.searched)
     own = places[applied.key]
-    amount = np.array(
-        [
-            0.0 if each.off is None else applied.values[each.name] - each.off
-            for each in applied.searched
-        ]
-    ) / sizes[own]  # fmt: skip
     beside = np.delete(np.arange(at), np.arange(own.start, own.stop))
-    span = np.linalg.qr(
-        np.vstack([_white(columns, beside, screen), problem.prior_rows(sizes, at)[:, beside]])
-    )[0]
+    others = {name: column[:, beside] for name, column in columns.items()}
+    own_response = _response(
+        problem, joint, applied, {name: column[:, own] / sizes[own] for name, column in columns.items()}
+    )
+    if own_response is None:
+        return []
+    span = np.linalg.qr(np.vstack([_white(others, screen), problem.prior_rows(sizes, at)[:, beside]]))[0]
 
     def off(rows: Array) -> Array:
         return np.asarray(rows - span @ (span.T @ rows))
 
-    none = np.zeros((len(problem.free), len(amount)))
-    target = off(np.vstack([_white(columns, np.arange(own.start, own.stop), screen), none]) @ amount)
+    target = off(screen.rows(own_response))[:, 0]
     size = float(target @ target)
+    if not (np.isfinite(span).all() and 0 < size < np.inf):
+        return []
     present = {each.key for each in joint.active}
     sought = [candidate for candidate in listed if candidate.key not in present and not candidate.discrete]
     screen.prepare(sought)
@@ -92,8 +92,10 @@ def _alike(
         seen = []
         for scored in screen.score(candidate):
             rows = off(screen.rows(scored.directions))
+            if not np.isfinite(rows).all():
+                continue
             coefficients = np.linalg.lstsq(rows, target, rcond=1e-9)[0]
-            taken = float(target @ (rows @ coefficients)) / max(size, 1e-300)
+            taken = float(target @ (rows @ coefficients)) / size
             reached = scored.valued(coefficients.tolist())
             if reached is not None and taken > FOLLOWING.alike:
                 seen.append((taken, reached))
@@ -101,11 +103,28 @@ def _alike(
     return [reached for _, reached in sorted(ranked, key=lambda entry: -entry[0])]
 
 
-def _white(columns: dict[str, Array], chosen: NDArray[np.intp], screen: LinearisedFit) -> Array:
-    layouts: dict[str, Layout] = screen.layouts
+def _response(
+    problem: Problem, joint: Fit, applied: AppliedEffect, derivatives: dict[str, Array]
+) -> dict[str, Array] | None:
+    """Return what an effect does, (rows, 1) of every output; None where the simulation does not run without.
+
+    By its derivatives times its sizes: without it a motion may be another one. A limit has no size.
+    """
+    sizes = [0.0 if each.off is None else applied.values[each.name] - each.off for each in applied.searched]
+    if np.isfinite(sizes).all():
+        return {name: columns @ np.array(sizes)[:, None] for name, columns in derivatives.items()}
+    others = tuple(each for each in joint.active if each.key != applied.key)
+    try:
+        bare = problem.simulate(joint.p, others)
+    except FitError:
+        return None
+    return {name: (joint.simulated[name] - bare[name])[:, None] for name in problem.names}
+
+
+def _white(columns: dict[str, Array], screen: LinearisedFit) -> Array:
     return np.vstack(
         [
-            whiten(columns[name][where.index][:, chosen], where, screen.base.noise[name])
-            for name, where in layouts.items()
+            whiten(columns[name][where.index], where, screen.base.noise[name])
+            for name, where in screen.layouts.items()
         ]
     )
