@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from benchmarks.recordings import readers
 from benchmarks.recordings.losses import LOSSES
+from benchmarks.recordings.plants import PLANTS
 from benchmarks.recordings.recording import Recording
 from benchmarks.recordings.rigs import RIGS
 
@@ -160,4 +161,5 @@ RECORDINGS: tuple[Recording, ...] = (
     ),
     *RIGS,
     *LOSSES,
+    *PLANTS,
 )  # fmt: skip
