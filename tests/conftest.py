@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import sys
+import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from hypothesis import settings
 
 from tests.declared_answers import hold_to_declarations
+from toolkit.audit import workers
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
 from toolkit.system import can_fork
@@ -23,11 +27,20 @@ settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.
 settings.load_profile("toolkit")
 hold_to_declarations()
 
-# A case's worker is forked where no thread holds a lock that it may want. The runner's own thread waits
-# for orders and holds none: without this every worker of every test begins as a new interpreter, 0.4 s each.
+# A case's worker is forked where no thread holds a lock that it may want. The runner's own thread waits for
+# orders and holds none, and neither do the idle threads of compiled libraries, which stay from the first test
+# that has a Parquet file written (Arrow) or a Schematron asked (a Java machine): without this every worker of
+# every later test begins as a new interpreter, 0.5 s each.
 if can_fork():
     _RUNNER = posix.threads()
-    posix._has_threads = lambda: not posix.threads() <= _RUNNER
+    posix._has_threads = lambda: not {str(thread.native_id) for thread in threading.enumerate()} <= _RUNNER
+
+# An audit's worker begins as a new interpreter, 0.4 s of imports each. In tests all come of one process that
+# has these behind it; `test_workers.py` holds what a user's computer does by scripts of its own.
+if can_fork():
+    _READY = multiprocessing.get_context("forkserver")
+    _READY.set_forkserver_preload(["toolkit.audit.archive"])
+    workers.mp = SimpleNamespace(get_context=lambda _: _READY)
 
 # The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
 sys.dont_write_bytecode = False

@@ -36,9 +36,22 @@ EQUATION = "def rhs(t, x, u, p):\n    BODY\n    return [-p['k'] * x[0]]\n"
 EQUATION += "def outputs(x, u, p):\n    return {'F': x[0]}\ndef initial(p):\n    return [1.0]\n"
 
 
-def toolkit(*words: object, **options: object) -> subprocess.CompletedProcess[str]:
+def apart(*words: object, **options: object) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own: the test asks about its end, or its environment."""
     command = [sys.executable, "-c", "from toolkit.cli.main import run; run()", *map(str, words)]
     return subprocess.run(command, check=False, capture_output=True, text=True, timeout=120, **options)
+
+
+@pytest.fixture
+def answered(capfd):
+    """Run the command line here; return its exit code and what reached the descriptors of both streams."""
+
+    def call(*words: object) -> subprocess.CompletedProcess[str]:
+        with pytest.raises(SystemExit) as ended:
+            run([*map(str, words)])
+        return subprocess.CompletedProcess(words, int(ended.value.code or 0), *capfd.readouterr())
+
+    return call
 
 
 def refused(case: Path, *words: object) -> dict[str, str]:
@@ -103,19 +116,19 @@ def test_the_last_words_are_in_the_error_without_what_a_terminal_would_obey(tmp_
     assert "\x1b" not in error["got"]
 
 
-def test_a_simulator_that_prints_without_end_does_not_end_the_tool(tmp_path):
+def test_a_simulator_that_prints_without_end_does_not_end_the_tool(tmp_path, answered):
     says = "os.write(2, b'n' * 300_000)\n    print('n' * 300_000)\n    os.system('echo more')\n    "
     case = write_case(tmp_path, simulator=START + says + GOOD)
-    ended = toolkit("diagnose", case, "--out", tmp_path / "answer", "--json")
+    ended = answered("diagnose", case, "--out", tmp_path / "answer", "--json")
     assert ended.returncode == 1, ended.stderr
     assert json.loads(ended.stdout)["verdict"] == "named"
     assert ended.stderr == ""
 
 
-def test_one_set_of_parameters_that_kills_is_a_failed_run_and_told(tmp_path):
+def test_one_set_of_parameters_that_kills_is_a_failed_run_and_told(tmp_path, answered):
     dies = "if p['mass'] != 94.0: print('only 94', flush=True); os._exit(5)\n    "
     case = write_case(tmp_path, simulator=START + dies + GOOD)
-    ended = toolkit("diagnose", case, "--out", tmp_path / "answer", "--json")
+    ended = answered("diagnose", case, "--out", tmp_path / "answer", "--json")
     answer = json.loads(ended.stdout)
     if ended.returncode == 2:  # more deaths than restarts
         assert answer["error"]["rule"] == "simulator-died"
@@ -147,7 +160,7 @@ LEAVES = "import subprocess\n    subprocess.Popen(['sleep', '600'], start_new_se
 def test_no_process_of_a_simulator_outlives_the_tool(tmp_path, end):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     case = write_case(tmp_path, simulator=START + LEAVES + end + GOOD)
-    toolkit("diagnose", case, "--out", tmp_path / "answer", "--budget", 2, env={**os.environ, mark: "1"})
+    apart("diagnose", case, "--out", tmp_path / "answer", "--budget", 2, env={**os.environ, mark: "1"})
     assert alive(mark) == []
 
 
@@ -155,7 +168,7 @@ def test_a_fork_bomb_is_ended(tmp_path):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     bomb = "end = time.time() + 9\n    while time.time() < end:\n        os.fork(); time.sleep(0.1)\n    "
     case = write_case(tmp_path, simulator=START + bomb + GOOD)
-    ended = toolkit("diagnose", case, "--out", tmp_path / "out", "--json", env={**os.environ, mark: "1"})
+    ended = apart("diagnose", case, "--out", tmp_path / "out", "--json", env={**os.environ, mark: "1"})
     assert ended.returncode == 2
     assert "processes" in json.loads(ended.stdout)["error"]["got"]
     assert alive(mark) == []
@@ -187,17 +200,17 @@ def test_the_worker_ends_with_the_tool(tmp_path, sent):
     assert not (tmp_path / "answer").exists()
 
 
-def test_a_call_in_compiled_code_ends_with_the_budget(tmp_path):
+def test_a_call_in_compiled_code_ends_with_the_budget(tmp_path, answered):
     hangs = "ctypes.PyDLL(None).sleep(600)\n    "  # holds the interpreter: no signal handler of Python runs
     case = write_case(tmp_path, simulator=START + hangs + GOOD)
-    ended = toolkit("diagnose", case, "--out", tmp_path / "answer", "--budget", 2, "--json")
+    ended = answered("diagnose", case, "--out", tmp_path / "answer", "--budget", 2, "--json")
     assert ended.returncode == 1
     assert json.loads(ended.stdout)["complete"] is False
 
 
-def test_a_model_file_runs_its_code_apart_as_well(tmp_path):
+def test_a_model_file_runs_its_code_apart_as_well(tmp_path, answered):
     case = write_case(tmp_path, simulator=SIMULATOR)
-    assert toolkit("diagnose", case, "--out", tmp_path / "answer").returncode == 1
+    assert answered("diagnose", case, "--out", tmp_path / "answer").returncode == 1
     (tmp_path / "sim.py").write_text(SIMULATOR)
     text = (tmp_path / "answer" / "model.toml").read_text()
     (tmp_path / "sim.py").write_text("import os\nos._exit(0)\n")
@@ -210,7 +223,7 @@ def test_a_model_file_runs_its_code_apart_as_well(tmp_path):
         for line in text.splitlines()
     ]
     (tmp_path / "answer" / "model.toml").write_text("\n".join(lines))
-    ended = toolkit(
+    ended = answered(
         "simulate", tmp_path / "answer" / "model.toml", "--inputs", tmp_path / "r0.csv", "--out",
         tmp_path / "more", "--json",
     )  # fmt: skip

@@ -45,8 +45,9 @@ def models(*names):
     return [word for name in names for word in ("--model", name)]
 
 
-@pytest.fixture
-def answer(tire):
+@pytest.fixture(scope="module")
+def answer(tmp_path_factory):
+    tire = write(tmp_path_factory.mktemp("answer") / "tire.csv", turn=-1.0)
     code, out = run(tire, *models("magic_formula", *FAST), "--json")
     return code, json.loads(out)
 

@@ -14,9 +14,14 @@ from toolkit.files import sha256_bytes
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Runner() as runner:
-        yield Bench(quick_folder, tmp_path_factory.mktemp("crash"), runner)
+def runner() -> Iterator[Runner]:
+    with Runner() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def bench(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    return Bench(quick_folder, tmp_path_factory.mktemp("crash"), runner)
 
 
 @pytest.mark.parametrize("command", QUICK, ids=lambda command: command.name)
@@ -27,15 +32,14 @@ def test_nothing_is_lost_or_mixed_and_the_next_run_gives_the_same(bench: Bench, 
 
 
 @pytest.fixture(scope="module")
-def signed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Runner() as runner:
-        yield Bench(signed_folder, tmp_path_factory.mktemp("crash"), runner)
+def signed(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    return Bench(signed_folder, tmp_path_factory.mktemp("crash"), runner)
 
 
 ALIKE = pytest.mark.campaign(
     "an entry in the list of persons, or in the ledger, is cut off by another command"
 )
-FURTHER = ("person revoke", "calibration withdraw (answered)")
+FURTHER = ("person enrol", "person revoke", "calibration withdraw (answered)")
 
 
 @pytest.mark.parametrize(

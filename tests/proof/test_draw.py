@@ -36,7 +36,7 @@ QUICK: list[tuple[str, tuple[str, tuple[str, ...]] | None]] = [
     ("confounded", ("pull by load", ("conicity",))),
     ("two", ("tire-columns", ("zero_offset", "turn_slip"))),
     ("three", ("drive-force", ("coulomb_friction", "filter_lag", "zero_drift"))),
-    ("stirred single", ("drive", ("constant_force",))),
+    ("stirred single", ("thermal", ("zero_drift",))),
     ("control", None),
     ("single", ("tire-machine", ("load_lag",))),
     ("single", ("labview", ("wrong_calibration",))),

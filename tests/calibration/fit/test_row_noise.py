@@ -95,13 +95,11 @@ def test_the_covariance_is_that_of_the_map_from_loads_to_coefficients(tmp_path: 
     step, at = 0.01, session.table.names.index("F")
     A = np.empty((2, rows))
     for row in range(rows):
-        ends = []
-        for side in (-1, 1):
-            values = session.table.values.copy()
-            values[row, at] += side * step
-            path.with_name("loads.csv").write_text(_csv(session.table.run, session.table.up, values))
-            ends.append(np.asarray(fitted(path).fit.coefficients))
-        A[:, row] = (ends[1] - ends[0]) / (2 * step)
+        # To one side: coefficients are linear in the loads, those of distances as good as over 0.01 N.
+        values = session.table.values.copy()
+        values[row, at] += step
+        path.with_name("loads.csv").write_text(_csv(session.table.run, session.table.up, values))
+        A[:, row] = (np.asarray(fitted(path).fit.coefficients) - fit.coefficients) / step
     noise = np.tile(stated(method), 6)
     noise = np.hypot(noise, SLOPE * U_CELL) if method == "odr" else noise
     size = np.sqrt(np.mean(noise**2))

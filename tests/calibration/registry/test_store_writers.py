@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -72,10 +73,11 @@ def test_a_killed_write_happened_or_did_not(
     tmp_path: Path, make_session: Callable[..., Path], point: str
 ) -> None:
     first, second = make_session(hub_data(40, 20), name="a"), make_session(hub_data(40, 21), name="b")
+    begun = tmp_path / "begun"
+    begun.mkdir()
+    calibrate(first, Registry(begun))
     for at in range(1, 40):
-        folder = tmp_path / f"cal-{at}"
-        folder.mkdir()
-        calibrate(first, Registry(folder))
+        folder = shutil.copytree(begun, tmp_path / f"cal-{at}")
         victim = FORK.Process(target=_killed, args=(second, folder, point, at))
         victim.start()
         victim.join()

@@ -188,7 +188,10 @@ def test_means_hold_no_gap_and_skip_missing_samples(tmp_path: Path) -> None:
     assert case.channel("F").sd == pytest.approx(windows(rows, rows.runs[0], 4).mean(white).std(), rel=0.01)
 
 
-@pytest.mark.parametrize("rows", [1, 5, 12, 40])
+BETWEEN = pytest.mark.campaign("a number of rows between the least and the most that are held in every run")
+
+
+@pytest.mark.parametrize("rows", [1, pytest.param(5, marks=BETWEEN), pytest.param(12, marks=BETWEEN), 40])
 def test_a_run_too_short_for_means_is_left_out_and_told(tmp_path: Path, rows: int) -> None:
     answer = diagnose(case_of(tmp_path, swept(0), swept(1), swept(2).iloc[:rows]), None).diagnosis
     assert answer.verdict == "nothing"
@@ -196,7 +199,7 @@ def test_a_run_too_short_for_means_is_left_out_and_told(tmp_path: Path, rows: in
     assert [finding.where for finding in told] == ["CASE.toml", "r2.csv"]
 
 
-@pytest.mark.parametrize("rows", [70, 120, 200])
+@pytest.mark.parametrize("rows", [70, pytest.param(120, marks=BETWEEN), 200])
 def test_many_short_runs_are_averaged_over_fewer_rows(tmp_path: Path, rows: int) -> None:
     runs = [swept(seed).iloc[k : k + rows] for seed in range(3) for k in range(0, 1200 - rows, 300)]
     answer = diagnose(case_of(tmp_path, *runs), None).diagnosis

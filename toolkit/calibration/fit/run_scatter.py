@@ -219,7 +219,9 @@ class _Problem:
         """
         p, phi = self.columns, points[:, 2, None, None, None]
         white = 1 - phi * phi
-        products = self.first + (self.own - phi * self.crossed + phi * phi * self.before) / white
+        products = (self.first + self.own)[None]
+        if phi.any():  # rows that are not correlated have the same products at every point
+            products = self.first + (self.own - phi * self.crossed + phi * phi * self.before) / white
         root = points[:, None, None, :2]
         inner = np.eye(2) + root.transpose(0, 1, 3, 2) * products[:, :, p:-1, p:-1] * root
         across = products[:, :, :, p:-1] * root

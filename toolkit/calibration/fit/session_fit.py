@@ -25,7 +25,7 @@ from toolkit.calibration.fit.regression import (
 )
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
-from toolkit.calibration.fit.session_scatter import scatter_of_rows
+from toolkit.calibration.fit.session_scatter import FittedRows, scatter_of_rows
 from toolkit.calibration.records.scatter import RunScatter
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.session.settings import wrong
@@ -223,8 +223,11 @@ def _result(
         coefficients=fit.coefficients, indications=session.indications, where=session.path,
     )  # fmt: skip
     scatter = scatter_of_rows(
-        design, load, table, zero=session.zero, noise=noise, residuals=fit.residuals, dof=fit.dof,
-        residual_sd=fit.residual_sd, between=session_statements(session).between(setting.name),
+        FittedRows(
+            design=design, load=load, table=table, zero=session.zero, noise=noise, residuals=fit.residuals,
+            residual_sd=fit.residual_sd, dof=fit.dof,
+            between=session_statements(session).between(setting.name),
+        )
     )  # fmt: skip
     of_runs = np.zeros_like(load)
     if scatter is not None:

@@ -5,6 +5,7 @@ Fit and refit come here, so that what a record stores is held against what its o
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,58 +26,51 @@ if TYPE_CHECKING:
 _SAME = 1e-6
 
 
-def scatter_of_rows(
-    design: NDArray[np.float64],
-    load: NDArray[np.float64],
-    table: Table,
-    *,
-    zero: str,
-    noise: RowNoise | None,
-    residuals: NDArray[np.float64],
-    residual_sd: float,
-    dof: int,
-    between: BetweenRuns | None,
-) -> RunScatter | None:
-    """Return the scatter that the coefficients' covariance is made of; None where they have their own.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FittedRows:
+    """The rows of a load, and what its equation leaves of them.
 
     ``design`` (rows, terms), ``load`` and ``residuals`` (rows,); ``between`` is what the session states of
     runs, which counts where its rows cannot tell them.
     """
-    factor, group = groups_of(table, zero)
+
+    design: NDArray[np.float64]
+    load: NDArray[np.float64]
+    table: Table
+    zero: str
+    noise: RowNoise | None
+    residuals: NDArray[np.float64]
+    residual_sd: float
+    dof: int
+    between: BetweenRuns | None
+
+    def session_rows(self, *, every: bool = False) -> SessionRows:
+        """Return the rows as their scatter is judged; ``every`` run counts, of however few rows."""
+        profile = None if self.noise is None else self.noise.profile
+        return SessionRows.of(self.design, self.load, self.table, self.zero, noise=profile, every=every)
+
+
+def scatter_of_rows(rows: FittedRows) -> RunScatter | None:
+    """Return the scatter that the coefficients' covariance is made of; None where they have their own."""
+    factor, group = groups_of(rows.table, rows.zero)
     if group.any():
-        profile = None if noise is None else noise.profile
-        return estimate(SessionRows.of(design, load, table, zero, noise=profile))
-    shown = residual_sd if noise is None else noise.shown(residuals, dof)
-    if between is not None:
-        return stated_scatter(factor, between, residual_sd=shown, dof=dof)
-    if are_untold(table, zero) and shown:
-        fitted = load - residuals
-        relative = fitted / (float(np.abs(load).max()) or 1.0)
+        return estimate(rows.session_rows())
+    noise, residuals, dof = rows.noise, rows.residuals, rows.dof
+    shown = rows.residual_sd if noise is None else noise.shown(residuals, dof)
+    if rows.between is not None:
+        return stated_scatter(factor, rows.between, residual_sd=shown, dof=dof)
+    if are_untold(rows.table, rows.zero) and shown:
+        fitted = rows.load - residuals
+        relative = fitted / (float(np.abs(rows.load).max()) or 1.0)
         return untold_scatter(factor, relative, residuals, within=shown, dof=dof)
     return None if noise is None else scatter_of_one(noise, residuals, factor, dof)
 
 
-def is_of_rows(
-    scatter: RunScatter,
-    design: NDArray[np.float64],
-    load: NDArray[np.float64],
-    table: Table,
-    *,
-    zero: str,
-    noise: RowNoise | None,
-    residuals: NDArray[np.float64],
-    residual_sd: float,
-    dof: int,
-    between: BetweenRuns | None,
-) -> bool:
+def is_of_rows(scatter: RunScatter, rows: FittedRows) -> bool:
     """Tell whether a stored scatter is the one that the rows have (see `scatter_of_rows`)."""
     if scatter.groups > 1:  # of runs of few rows, too, in records made before these counted as one
-        profile = None if noise is None else noise.profile
-        return is_lowest(SessionRows.of(design, load, table, zero, noise=profile, every=True), scatter)
-    expected = scatter_of_rows(
-        design, load, table, zero=zero, noise=noise, residuals=residuals, residual_sd=residual_sd, dof=dof,
-        between=between,
-    )  # fmt: skip
+        return is_lowest(rows.session_rows(every=True), scatter)
+    expected = scatter_of_rows(rows)
     if expected is None or expected.groups > 1:
         return False
     if (scatter.factor, scatter.dof, scatter.model) != (expected.factor, expected.dof, expected.model):

@@ -21,7 +21,7 @@ import numpy as np
 
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
-from toolkit.calibration.fit.session_scatter import is_of_rows
+from toolkit.calibration.fit.session_scatter import FittedRows, is_of_rows
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
@@ -311,11 +311,12 @@ def scatter_covariance(
     """
     design = term_matrix(fit.terms, table.columns(record.indications))
     load, noise = table.column(fit.load), row_noise(record, fit, table)
-    if fit.scatter is None or not is_of_rows(
-        fit.scatter, design, load, table, zero=record.zero, noise=noise,
+    rows = FittedRows(
+        design=design, load=load, table=table, zero=record.zero, noise=noise,
         residuals=load - design @ np.asarray(fit.coefficients), residual_sd=fit.residual_sd or 0.0,
         dof=fit.dof or 0, between=statements_of(record).between(fit.load),
-    ):  # fmt: skip
+    )  # fmt: skip
+    if fit.scatter is None or not is_of_rows(fit.scatter, rows):
         return None
     group = groups_of(table, record.zero, every=fit.scatter.groups > 1)[1]
     return weighed_rows(design, load, group, noise, operator).covariance(fit.scatter)

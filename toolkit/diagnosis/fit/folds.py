@@ -15,7 +15,6 @@ Source: Laird and Ware, Biometrics 38 (1982) 963, random effects with a variance
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ import numpy as np
 from toolkit.diagnosis.fit.descent import Derivatives, Space
 from toolkit.diagnosis.fit.fit import Fit, fit, jacobian
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, log_likelihood, whiten
+from toolkit.diagnosis.fit.scatter_sizes import likeliest_sizes
 from toolkit.diagnosis.policy import ROWS, SCATTER
 from toolkit.effects.applied import AppliedEffect
 
@@ -185,10 +185,6 @@ def beyond_form(problem: Problem, refitted: HeldOut, before: HeldOut, after: Hel
     return False
 
 
-_GRID = 9  # sizes of a scatter that are tried first
-_STEPS = (3.0, 1.7, 1.3, 1.14, 1.07)  # factors by which it then moves
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UnseenRun:
     """One output of one run that a fit has not seen, in units of the noise of its training rows.
@@ -236,24 +232,8 @@ def scattered_scores(runs: Sequence[UnseenRun], *, by_run: bool) -> tuple[float,
         return ()
     best = (0.0, 0.0)
     if by_run and len(runs) >= SCATTER.fewest:
-        best = max(_sizes(runs), key=lambda sizes: sum(_scores(runs, *sizes)))
-        for step in _STEPS:
-            nearby = [
-                (best[0] * a, best[1] * b) for a, b in itertools.product((1.0, step, 1 / step), repeat=2)
-            ]
-            best = max(nearby, key=lambda sizes: sum(_scores(runs, *sizes)))
+        best = likeliest_sizes(runs, lambda zero, gain: sum(_scores(runs, zero, gain)))
     return _scores(runs, *best)
-
-
-def _sizes(runs: Sequence[UnseenRun]) -> list[tuple[float, float]]:
-    """Return scatters of zero and gain: none, and from below what a run can show to all that it leaves."""
-    largest = math.sqrt(max(run.rest for run in runs))
-    sizes = np.sqrt(np.max([np.diag(run.inner) for run in runs], axis=0))
-    zeros, gains = (
-        [0.0, *np.geomspace(SCATTER.least, max(largest, 2 * SCATTER.least), _GRID) / max(one, 1e-150)]
-        for one in sizes.tolist()
-    )
-    return [(float(zero), float(gain)) for zero in zeros for gain in gains]
 
 
 def _scores(runs: Sequence[UnseenRun], zero: float, gain: float) -> tuple[float, ...]:

@@ -25,6 +25,7 @@ import numpy as np
 from toolkit.diagnosis.fit.descent import Space
 from toolkit.diagnosis.fit.fit import Fit, resimulated
 from toolkit.diagnosis.fit.noise import Autoregression, fit_noise, log_likelihood, whiten
+from toolkit.diagnosis.fit.scatter_sizes import likeliest_sizes
 from toolkit.diagnosis.policy import SCATTER, VERDICT
 from toolkit.errors import FitError
 
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_GRID = 9  # sizes of a scatter that are tried first
-_STEPS = (3.0, 1.7, 1.3, 1.14, 1.07)  # factors by which it then moves
 _PASSES = 4  # linear about the fit of the pass before
 _BETTER = 1e-3  # of the log-likelihood: less is no other fit
 
@@ -240,22 +239,10 @@ def _likelihood(
 def _likeliest(outputs: Mapping[str, _Output], beneath: _Beneath) -> dict[str, tuple[float, float]]:
     """Return the scatter of zeros and gains of every output, one output after the other."""
     sizes: dict[str, tuple[float, float]] = dict.fromkeys(outputs, (0.0, 0.0))
-
-    def score(name: str, pair: tuple[float, float]) -> float:
-        return _likelihood(outputs, beneath, {**sizes, name: pair}, restricted=True)
-
     for _, (name, output) in itertools.product(range(2 if len(outputs) > 1 else 1), outputs.items()):
-        largest = math.sqrt(max(part.rest for part in output.parts))
-        shown = np.sqrt(np.max([np.diag(part.inner) for part in output.parts], axis=0))
-        zeros, gains = (
-            [0.0, *np.geomspace(SCATTER.least, max(largest, 2 * SCATTER.least), _GRID) / max(each, 1e-150)]
-            for each in shown.tolist()
-        )
-        best = max(itertools.product(zeros, gains), key=lambda pair: score(name, pair))
-        for step in _STEPS:
-            nearby = [
-                (best[0] * a, best[1] * b) for a, b in itertools.product((1.0, step, 1 / step), repeat=2)
-            ]
-            best = max(nearby, key=lambda pair: score(name, pair))
-        sizes[name] = (float(best[0]), float(best[1]))
+
+        def likelihood(zero: float, gain: float, name: str = name) -> float:
+            return _likelihood(outputs, beneath, {**sizes, name: (zero, gain)}, restricted=True)
+
+        sizes[name] = likeliest_sizes(output.parts, likelihood)
     return sizes
