@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.answer.answer import Diagnosis
-from toolkit.diagnosis.answer.build_answer import answer_of, mostly_unknown
+from toolkit.diagnosis.answer.build_answer import answer_of
 from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 from toolkit.diagnosis.answer.failed_runs import FailedRuns
+from toolkit.diagnosis.answer.naming import mostly_unknown
 from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.averages import averages_findings, is_smooth, of_kept_rows, rows_averaged

@@ -62,6 +62,21 @@ class _Rows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Drift:
+    """Which outputs only drift, and over how many rows their rates are taken."""
+
+    grows: float = _set(
+        1.8, "times the way of the first half", "a steady force moves it: two where nothing leads back"
+    )
+    wanders: float = _set(
+        0.5, "of twice the error's variance", "an error moves by in an eighth of a run: of a random walk 3/8"
+    )
+    fewest: int = _set(16, "rows of a run", "in fewer there are no halves to be compared")
+    clear: float = _set(4.0, "times the sensor's noise", "an error moves by, where its rate says something")
+    parts: int = _set(8, "parts of a run", "over more rows than one has a rate is a mean of many motions")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Priors:
     """How far a parameter of the simulation may move."""
 
@@ -448,11 +463,11 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER, AVERAGES = _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
-UNSEEN, FOLLOWING = _Unseen(), _Following()
+DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN, FOLLOWING,
-    LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN,
+    FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
 
 

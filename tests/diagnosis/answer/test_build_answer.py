@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.answer.build_answer import _is_smooth
+from toolkit.diagnosis.answer.naming import _is_smooth
 from toolkit.diagnosis.search.unexplained import StructureFound
 from toolkit.effects.catalogue import effects
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,25 +12,19 @@ from toolkit.diagnosis.answer.answer import (
     Diagnosis,
     FoundEffect,
     FoundParameter,
-    HeldOutFit,
     Mismatch,
     NominalParameter,
     Verdict,
     recorded,
 )
 from toolkit.diagnosis.answer.found_laws import found_laws
+from toolkit.diagnosis.answer.held_out_errors import held_out_errors, structured, with_laws
 from toolkit.diagnosis.answer.locate import places
-from toolkit.diagnosis.answer.next_measurements import (
-    equivalent_to,
-    implausible,
-    next_measurements,
-    outsized,
-)
+from toolkit.diagnosis.answer.naming import mostly_unknown
+from toolkit.diagnosis.answer.next_measurements import equivalent_to, next_measurements
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.answer.refit_findings import refit_findings
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.fit.sensor_noise import noise_parts, spread
-from toolkit.diagnosis.fit.structure import RUNS, groups
 from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
@@ -40,9 +33,6 @@ from toolkit.effects.applied import AppliedEffect
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.law.learn import Laws
 
 
@@ -73,13 +63,20 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         mismatch=_mismatches(search, unknown=unknown),
         effects=effects,
         nominal_parameters=nominal,
-        held_out=_with_laws(search, laws, _held_out(search, unknown=unknown)),
+        held_out=with_laws(search, laws, held_out_errors(search, unknown=unknown)),
         held_out_by=search.folds.told(len(search.problem.runs)),
         depends_on=tuple(
             (structure.output, structure.variables)
             for structure in search.structure or (search.structure_before if unknown else ())
         ),
-        not_found=not_found(search.screen, search.scored, names, alpha=SCREENING.alpha / tests, units=units),
+        not_found=not_found(
+            search.screen,
+            search.scored,
+            names,
+            {step.active.effect.name for step in search.steps} - names,
+            alpha=SCREENING.alpha / tests,
+            units=units,
+        ),
         next_measurements=next_measurements(search, effects, verdict),
         findings=(*findings, *_outliers(case, search), *refit_findings(case, search)),
         complete=not search.skipped and laws.complete,
@@ -87,157 +84,6 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         recordings=recorded(case.runs),
         laws=found_laws(search, laws),
     )
-
-
-def mostly_unknown(search: Search) -> bool:
-    """Tell whether what stays after the named effects outweighs them: they then only imitate it.
-
-    By the log-likelihood, by what they take of the held-out mean square that is above the noise, and by the
-    parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
-    what was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with
-    a size that no cell has.
-    """
-    if search.steps and implausible(search) and not _takes_nearly_all(search):
-        return True
-    shown = _taken(search)
-    if search.steps and not shown and _is_smooth(search):
-        return True
-    if search.steps and _is_within_accuracy(search):
-        return True
-    if not search.structure:
-        return False
-    if outsized(search):
-        return True
-    if any(removed > VERDICT.nearly * above for removed, above in shown):
-        return False
-    unexplained = max(
-        (structure.gain / 2 for structure in search.structure if not structure.rest), default=0.0
-    )
-    explained = sum(step.gain for step in search.steps)
-    if explained < VERDICT.mostly * (explained + unexplained):
-        return True
-    if all(step.active.effect.from_digits for step in search.steps):
-        return not search.steps  # read off the digits: it does not imitate anything
-    return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
-
-
-def _is_smooth(search: Search) -> bool:
-    """Tell whether a smooth discrepancy without a name explains more than the effects, parameters counted.
-
-    A simulation is never exact: what it misses by a part in a thousand is smooth, and some effect imitates a
-    share of it. Asked of effects that show in no output above the noise; a larger one has a law of its own.
-    """
-    if all(step.active.effect.from_digits for step in search.steps):
-        return False
-    n = sum(int(counted.sum()) for counted in search.problem.kept.values())
-    cost = 0.5 * math.log(n)  # of a parameter (BIC)
-    named = sum(step.gain - cost * len(step.active.searched) for step in search.steps)
-    nameless = (
-        structure.gain / 2 - cost * structure.columns
-        for structure in search.structure_before
-        if structure.columns and not structure.rest
-    )
-    return max(nameless, default=-math.inf) > named + VERDICT.close
-
-
-def _is_within_accuracy(search: Search) -> bool:
-    """Tell whether effects move every output by less than a simulation is off without any.
-
-    Another integrator or a tire's formula misses its plant by as much, and some effect takes a share of that.
-    One that takes most of what is above the noise is what was left out, however small: within the runs, or of
-    their zeros more than it would of zeros that move by chance.
-    """
-    if all(step.active.effect.from_digits for step in search.steps):
-        return False
-    problem = search.problem
-    if _takes_nearly_all(search) and _foretells_zeros(search):
-        return False
-    for name, kept in problem.kept.items():
-        # about every run's own mean: zeros that move are no effect's to take
-        before, after, floor = (
-            _within_runs(problem, error, kept)
-            for error in (
-                problem.observed[name] - search.held_refitted.simulated[name],
-                problem.observed[name] - search.held_augmented.simulated[name],
-                search.augmented.residual[name],
-            )
-        )
-        shown = before > VERDICT.shown * floor
-        if shown and before - after > VERDICT.taken * (before - floor):
-            return False
-        moved = (search.held_augmented.simulated[name] - search.held_refitted.simulated[name])[kept]
-        if len(moved) and math.sqrt(float(np.mean(moved**2))) > VERDICT.accuracy * spread(problem, name):
-            return False
-    return True
-
-
-def _foretells_zeros(search: Search) -> bool:
-    """Tell whether effects take more of the runs' zeros, on unseen rows, than of as many that move by chance.
-
-    Zeros that move are one independent value a run: of three a constant takes nine tenths in one case of
-    twenty, and the best of all that were tried in most. The share that q parameters take of k such values is
-    a beta variable with q and k - q degrees of freedom (the F test, one-sided).
-    """
-    from scipy.stats import beta
-
-    problem, shares = search.problem, []
-    for name, kept in problem.kept.items():
-        before, after = (
-            sum(
-                float((problem.observed[name] - held.simulated[name])[rows][kept[rows]].mean()) ** 2
-                for rows in problem.slices
-                if kept[rows].any()
-            )
-            for held in (search.held_refitted, search.held_augmented)
-        )
-        shares.append((before - after) / max(before, 1e-300))
-    taken = sum(max(len(step.active.searched), 1) for step in search.steps)
-    free = len(problem.runs) - taken
-    tests = max(len(search.scored), 1)
-    return free > 0 and tests * float(beta.sf(max(shares), taken / 2, free / 2)) < SCREENING.alpha
-
-
-def _taken(search: Search) -> list[tuple[float, float]]:
-    """Return what effects take of each output's held-out mean square, and what of it is above the noise.
-
-    Outputs that show nothing but noise do not count: of nothing, nothing is two thirds. Where the runs have
-    zeros of their own, these are no effect's to take, and every run counts about its own mean.
-    """
-    problem, shown = search.problem, []
-    for output in _held_out(search, unknown=False):
-        name, counted = output.channel, problem.kept[output.channel]
-        before, after, floor = output.refitted_rmse**2, output.augmented_rmse**2, output.noise_floor**2
-        if any(each.output == name and each.variables == RUNS for each in search.structure):
-            errors = (
-                problem.observed[name] - search.held_refitted.simulated[name],
-                problem.observed[name] - search.held_augmented.simulated[name],
-                search.augmented.residual[name],
-            )
-            before, after, floor = (_within_runs(problem, error, counted) for error in errors)
-        if before > VERDICT.shown * floor:
-            shown.append((before - after, before - floor))
-    return shown
-
-
-def _takes_nearly_all(search: Search) -> bool:
-    """Tell whether effects take nearly all that is above the sensor's own noise on unseen rows.
-
-    What foretells all else is not withdrawn for a parameter that is far off beside it: its prior is as likely
-    wrong, and the answer gives the parameter with its shift.
-    """
-    shares = []
-    for output in _held_out(search, unknown=False):
-        before, after = output.refitted_rmse**2, output.augmented_rmse**2
-        sensor = noise_parts(search.problem, search.augmented, output.channel).sensor_sd ** 2
-        if before > VERDICT.shown * sensor:
-            shares.append((before - after) / (before - sensor))
-    return bool(shares) and min(shares) > VERDICT.nearly
-
-
-def _within_runs(problem: Problem, error: NDArray[np.float64], counted: NDArray[np.bool_]) -> float:
-    """Return the mean square of an error about its mean in every run."""
-    parts = [error[rows][counted[rows]] for rows in problem.slices if counted[rows].any()]
-    return float(np.mean(np.concatenate([part - part.mean() for part in parts]) ** 2))
 
 
 def _verdict(
@@ -365,11 +211,11 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[Mismatch, ...]:
             if ratio * counted.sum() > VERDICT.telling:
                 p_values.append(search.steps[0].p_value)
         else:
-            share, signal = _structured(search, name)
+            share, signal = structured(search, name)
         if not p_values:
             continue
         if unknown:
-            share, signal = max((share, signal), _structured(search, name), key=lambda pair: pair[0])
+            share, signal = max((share, signal), structured(search, name), key=lambda pair: pair[0])
         mismatches.append(
             Mismatch(
                 channel=name,
@@ -391,86 +237,6 @@ def _depends_on(search: Search, name: str) -> tuple[str, ...]:
         default=None,
     )
     return () if most is None else most.variables
-
-
-def _structured(search: Search, name: str) -> tuple[float, NDArray[np.float64]]:
-    """Return share and signal of the smooth structure in an output's refitted residual."""
-    problem, counted = search.problem, search.problem.kept[name]
-    residual = search.refitted.residual[name]
-    best, signal = 0.0, np.zeros(problem.rows)
-    dependences = {structure.variables for structure in search.structure_before if structure.output == name}
-    for group in groups(problem, search.refitted):
-        if group.output != name or (dependences and group.variables not in dependences):
-            continue
-        fit = np.linalg.lstsq(group.columns[counted], residual[counted], rcond=None)[0]
-        smooth = group.columns @ fit
-        share = 1 - float(np.sum((residual - smooth)[counted] ** 2)) / max(
-            float(np.sum(residual[counted] ** 2)), 1e-300
-        )
-        if share > best:
-            best, signal = share, smooth
-    return best, signal
-
-
-def _held_out(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
-    problem = search.problem
-    errors = []
-    augmented = search.held_refitted if unknown else search.held_augmented
-    for output in problem.model.outputs:
-        counted, observed = problem.kept[output.name], problem.observed[output.name]
-        if not counted.any():
-            continue
-
-        def rmse(
-            simulated: NDArray[np.float64], o: NDArray[np.float64] = observed, k: NDArray[np.bool_] = counted
-        ) -> float:
-            return math.sqrt(float(np.mean((o[k] - simulated[k]) ** 2)))
-
-        errors.append(
-            HeldOutFit(
-                channel=output.name,
-                unit=output.unit,
-                nominal_rmse=rmse(search.nominal.simulated[output.name]),
-                refitted_rmse=rmse(search.held_refitted.simulated[output.name]),
-                augmented_rmse=rmse(augmented.simulated[output.name]),
-                # No noise is larger than an error that was reached on rows that no fit has seen.
-                noise_floor=min(
-                    _floor(search, output.name, output.sd),
-                    math.inf if output.sd is not None else rmse(augmented.simulated[output.name]),
-                ),
-                noise=noise_parts(problem, search.augmented, output.name),
-            )
-        )
-    return tuple(errors)
-
-
-def _with_laws(search: Search, laws: Laws, errors: tuple[HeldOutFit, ...]) -> tuple[HeldOutFit, ...]:
-    """Return held-out errors with those that the laws leave beside them; an event tells nothing there."""
-    if not any(law.predicts for law in laws.listed):
-        return errors
-    problem = search.problem
-    told = []
-    for output in errors:
-        counted = problem.kept[output.channel]
-        away = (problem.observed[output.channel] - laws.held_out.simulated[output.channel])[counted]
-        rmse = math.sqrt(float(np.mean(away**2)))
-        stated = problem.sd_of(output.channel) is not None
-        floor = output.noise_floor if stated else min(output.noise_floor, rmse)
-        told.append(replace(output, with_laws_rmse=rmse, noise_floor=floor))
-    return tuple(told)
-
-
-def _floor(search: Search, name: str, sd: float | None) -> float:
-    """Return an output's noise: as stated, else what is left when smooth structure is taken out too."""
-    if sd is not None:
-        return sd
-    counted = search.problem.kept[name]
-    noise = math.sqrt(float(np.mean(search.augmented.residual[name][counted] ** 2)))
-    if any(structure.output == name and not structure.rest for structure in search.structure):
-        share, _ = _structured(search, name)
-        refitted = math.sqrt(float(np.mean(search.refitted.residual[name][counted] ** 2)))
-        noise = min(noise, refitted * math.sqrt(max(1 - share, 0.0)))
-    return noise
 
 
 def _outliers(case: Case, search: Search) -> tuple[Finding, ...]:

@@ -16,15 +16,25 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 
 
+NO_PLACE = "no place for it in this case"
+
+
 def not_found(
-    screen: LinearisedFit, scored: Sequence[Scored], names: set[str], *, alpha: float, units: dict[int, str]
+    screen: LinearisedFit,
+    scored: Sequence[Scored],
+    names: set[str],
+    withdrawn: set[str],
+    *,
+    alpha: float,
+    units: dict[int, str],
 ) -> tuple[NotFound, ...]:
     """Return every effect that is not named, with its minimum detectable size.
 
     Parameters
     ----------
     scored : every candidate and start about the last fit
-    names : of the effects that were found
+    names : of the effects that are named
+    withdrawn : of those that were found and are not named
     alpha : of one test, so that the whole search keeps its own
     units : of the first parameter, by the identity of each scored
     """
@@ -54,15 +64,12 @@ def not_found(
         if name in names:
             continue
         if name not in best:
+            why = "found, but what stays without a name outweighs it" if name in withdrawn else NO_PLACE
             entries.append(
                 NotFound(
-                    name=name,
-                    minimum_detectable=None,
-                    unit="",
-                    observable=False,
-                    why="no place for it in this case",
+                    name=name, minimum_detectable=None, unit="", observable=name in withdrawn, why=why
                 )
-            )
+            )  # fmt: skip
             continue
         size, unit, visible = best[name]
         why = "" if visible else "its response vanishes here, or the free parameters take it all"

@@ -16,7 +16,22 @@ if TYPE_CHECKING:
 
 def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
     """Return what is told of parameters at their bounds, runs that differ, and a refit that does harm."""
-    return (*_at_bounds(case, search), *_scatter(case, search), *_worse(case, search))
+    return (
+        *_at_bounds(case, search), *_scatter(case, search), *_worse(case, search), *_drifting(case, search)
+    )  # fmt: skip
+
+
+def _drifting(case: Case, search: Search) -> tuple[Finding, ...]:
+    return tuple(
+        Finding(
+            rule="drift-limited",
+            where=f"{case.path.name}: {name}",
+            level="note",
+            message="an integrating plant that nothing leads back: its free simulation is limited by drift, "
+            f"and judged by its rates over {apart} rows",
+        )
+        for name, apart in search.problem.rates.items()
+    )
 
 
 def _scatter(case: Case, search: Search) -> tuple[Finding, ...]:

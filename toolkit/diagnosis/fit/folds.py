@@ -154,10 +154,9 @@ def matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> 
 
     By its mean square or by its variance: where a drift starts is found in a later step.
     """
-    for name, counted in problem.kept.items():
-        observed = problem.observed[name][counted]
+    for name, observed in problem.observed.items():
         error_before, error_after = (
-            observed - held_out.simulated[name][counted] for held_out in (before, after)
+            problem.judged(name, observed - held_out.simulated[name]) for held_out in (before, after)
         )
         if np.mean(error_after**2) < np.mean(error_before**2) * (1 - least) or np.var(error_after) < np.var(
             error_before
@@ -174,10 +173,9 @@ def beyond_form(problem: Problem, refitted: HeldOut, before: HeldOut, after: Hel
     refitted, before : without any effect, and with those that were found
     form : how far an effect's form is off, as a share of what the effect is
     """
-    for name, counted in problem.kept.items():
-        observed = problem.observed[name][counted]
+    for name, observed in problem.observed.items():
         square_refitted, square_before, square_after = (
-            float(np.mean((observed - held_out.simulated[name][counted]) ** 2))
+            float(np.mean(problem.judged(name, observed - held_out.simulated[name]) ** 2))
             for held_out in (refitted, before, after)
         )
         if square_before - square_after > form**2 * max(square_refitted - square_before, 0.0):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +33,8 @@ class Problem:
 
     ``kept`` masks the rows that count, for each output over all runs in their order; ``slices`` are the
     rows of each run; ``floor`` is the resolution of each output's numbers, or what the simulation itself is
-    unsure by, below which no noise is known.
+    unsure by, below which no noise is known. ``rates`` has the outputs that only drift, and the rows by which
+    the values are apart whose rate is judged.
     """
 
     case: Case
@@ -45,6 +46,7 @@ class Problem:
     kept: dict[str, NDArray[np.bool_]]
     floor: dict[str, float]
     slices: tuple[slice, ...]
+    rates: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -60,6 +62,25 @@ class Problem:
         """Return the layout of an output's kept values, confined to some rows."""
         good = self.kept[name] if rows is None else self.kept[name] & rows
         return layout([run.t for run in self.runs], [good[rows] for rows in self.slices])
+
+    def judged(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what counts of an output's values, (rows,): those of its kept rows, or their rates [1/s]."""
+        kept, apart = self.kept[name], self.rates.get(name)
+        if apart is None:
+            return values[kept]
+        rates = []
+        for run, rows in zip(self.runs, self.slices, strict=True):
+            t, there = run.t[kept[rows]], values[rows][kept[rows]]
+            rates.append((there[apart:] - there[:-apart]) / (t[apart:] - t[:-apart]))
+        return np.concatenate(rates)
+
+    def judged_sd(self, name: str, sd: float) -> float:
+        """Return the standard deviation of what is judged of an output by that of its values' white noise."""
+        apart = self.rates.get(name)
+        if apart is None:
+            return sd
+        row = float(np.median(np.concatenate([np.diff(run.t) for run in self.runs])))
+        return float(np.sqrt(2) * sd / (apart * row))
 
     def simulate(self, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
         """Return every output over all runs in their order; ``p`` are the free parameters."""

@@ -25,6 +25,7 @@ from toolkit.diagnosis.law.trial import (
     trials_of,
     unlocked_tone,
 )
+from toolkit.diagnosis.law.unseen_runs import laws_on_unseen_runs
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, best_of
@@ -167,6 +168,29 @@ def _next(
             law = _judged(search, base, held_out, trial, refit, looked)
             if law is not None:
                 return law
+    return _by_unseen_runs(search, base, held_out, screen, trials, weight)
+
+
+def _by_unseen_runs(
+    search: Search,
+    base: Fit,
+    held_out: HeldOut,
+    screen: LinearisedFit,
+    trials: Sequence[Trial],
+    weight: float,
+) -> tuple[Law, Fit, HeldOut] | None:
+    """Return the simplest of the laws that whole unseen runs show best, None where they show none.
+
+    That there is something to explain is beyond doubt there: the p-value is that of the law's own gain.
+    """
+    problem = search.problem
+    shown = laws_on_unseen_runs(problem, search.folds, base, held_out, screen, trials, weight)
+    order = _simplest_first([(each.gain, each.trial, each.fit) for each in shown])
+    for gain, trial, refit in order:
+        scores = next(each.held_out for each in shown if each.fit is refit)
+        if _told_from_none(refit):
+            p = min(1.0, math.exp(-min(gain, 700.0)))
+            return _law(search, base, held_out, trial, refit, scores, p_value=p), refit, scores
     return None
 
 
@@ -201,47 +225,57 @@ def _judged(
     applied = refit.active[-1]
     if not _told_from_none(refit):
         return None
-    gain: float | None = None
     scores = held_out
     if trial.form == "event":
-        share = _taken(problem, base.residual, refit.residual)
-        if share < LAWS.share:
+        if _taken(problem, base.residual, refit.residual) < LAWS.share:
             return None
     else:
         try:
             scores = hold_out(problem, search.folds, refit.active, refit)
         except FitError:
             return None
-        gain = scores.total - held_out.total
-        if gain < STEP.least_gain or not matters(problem, held_out, scores, LAWS.share):
+        if scores.total - held_out.total < STEP.least_gain or not matters(
+            problem, held_out, scores, LAWS.share
+        ):
             return None
-        errors = [
-            {name: problem.observed[name] - simulated[name] for name in problem.names}
-            for simulated in (held_out.simulated, scores.simulated)
-        ]
-        share = _taken(problem, *errors)
         name = str(applied.channel)
         if search.folds.by_run and name in problem.names:
             counting = [rows.start + np.flatnonzero(problem.kept[name][rows]) for rows in problem.slices]
-            columns = (held_out.simulated[name], *(each[name] for each in errors))
+            columns = (
+                held_out.simulated[name],
+                *(problem.observed[name] - each.simulated[name] for each in (held_out, scores)),
+            )
             runs = [tuple(column[at] for column in columns) for at in counting if len(at)]
             if tells_runs_apart_alone(trial, looked, runs):
                 return None
+    law = _law(search, base, held_out, trial, refit, scores, p_value=p_value(trial, looked))
+    return law, refit, scores
+
+
+def _law(
+    search: Search, base: Fit, held_out: HeldOut, trial: Trial, refit: Fit, scores: HeldOut, *, p_value: float
+) -> Law:
+    """Return a law that stands; an event's shares are those of the rows that it was fitted to."""
+    problem, applied = search.problem, refit.active[-1]
     moved = [
         parameter.name
         for parameter, before, after in zip(problem.free, base.p, refit.p, strict=True)
         if parameter.sd and abs(after - before) > LAWS.moved * parameter.sd
     ]
-    law = Law(
+    event = trial.form == "event"
+    errors = [
+        {name: problem.observed[name] - each.simulated[name] for name in problem.names}
+        for each in ((base, refit) if event else (held_out, scores))
+    ]
+    return Law(
         trial=trial,
         applied=applied,
-        p_value=p_value(trial, looked),
-        held_out_gain=gain,
-        share=share,
+        p_value=p_value,
+        held_out_gain=None if event else scores.total - held_out.total,
+        share=_taken(problem, *errors),
         confounded=tuple(moved),
         resembles=_resembling(search, base, replace(trial, applied=applied)),
     )
-    return law, refit, scores
 
 
 def _told_from_none(refit: Fit) -> bool:
@@ -259,11 +293,12 @@ def _told_from_none(refit: Fit) -> bool:
 
 def _taken(problem: Problem, before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> float:
     """Return the largest share of an output's mean square that is gone."""
-    shares = [
-        1 - float(np.mean(after[name][kept] ** 2)) / max(float(np.mean(before[name][kept] ** 2)), 1e-300)
+    squares = {
+        name: [float(np.mean(problem.judged(name, error[name]) ** 2)) for error in (before, after)]
         for name, kept in problem.kept.items()
         if kept.any()
-    ]
+    }
+    shares = [1 - left / max(there, 1e-300) for there, left in squares.values()]
     return max(shares, default=0.0)
 
 

@@ -98,6 +98,19 @@ def ranked(
     ----------
     weight : what a parameter costs of the log-likelihood
     """
+    best = likely(problem, base, screen, listed, weight)
+    exact = []
+    for trial, directions in zip(best, all_responses(problem, base, best), strict=True):
+        if directions is not None:
+            gain, coefficients, trust = screen.gain(directions)
+            exact.append(replace(at_coefficients(trial, coefficients), gain=gain * trust))
+    return sorted(exact, key=lambda trial: -(trial.gain - 2 * weight * trial.cost))
+
+
+def likely(
+    problem: Problem, base: Fit, screen: LinearisedFit, listed: Sequence[Trial], weight: float
+) -> list[Trial]:
+    """Return the laws that explain most at a fixed noise, of each the best start, the best ones refined."""
     quick: dict[object, Trial] = {}
     for trial, directions in zip(listed, all_responses(problem, base, listed), strict=True):
         if directions is None:
@@ -107,12 +120,7 @@ def ranked(
             quick[trial.place] = replace(trial, gain=gain)
     best = sorted(quick.values(), key=lambda trial: -trial.gain)[: LAWS.sharpened]
     best[: LAWS.refined] = _refined(problem, base, screen, best[: LAWS.refined])
-    exact = []
-    for trial, directions in zip(best, all_responses(problem, base, best), strict=True):
-        if directions is not None:
-            gain, coefficients, trust = screen.gain(directions)
-            exact.append(replace(at_coefficients(trial, coefficients), gain=gain * trust))
-    return sorted(exact, key=lambda trial: -(trial.gain - 2 * weight * trial.cost))
+    return best
 
 
 def _refined(problem: Problem, base: Fit, screen: LinearisedFit, trials: Sequence[Trial]) -> list[Trial]:

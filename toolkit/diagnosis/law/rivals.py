@@ -101,8 +101,8 @@ def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> 
     """
 
     def error(held_out: HeldOut, name: str) -> float:
-        counted = problem.kept[name]
-        return float(np.mean((problem.observed[name] - held_out.simulated[name])[counted] ** 2))
+        away = problem.judged(name, problem.observed[name] - held_out.simulated[name])
+        return float(np.mean(away**2))
 
     outputs = [name for name in problem.names if problem.kept[name].any()]
     taken = [

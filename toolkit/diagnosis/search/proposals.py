@@ -22,6 +22,7 @@ from toolkit.diagnosis.policy import FOLLOWING, SCREENING
 from toolkit.diagnosis.search.candidates import CandidateEffect, Start, candidates
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
+from toolkit.diagnosis.search.unexplained import StructureFound
 from toolkit.diagnosis.simulators.following import PARAMETER_STEP
 from toolkit.diagnosis.simulators.simulator import Following, TermPattern
 from toolkit.effects.law import ITSELF, POSITION, TIME
@@ -64,6 +65,20 @@ class Proposals:
         term = candidate.active.effect.term
         abrupt = term is not None and (term.limit is not None or term.bristle is not None)
         return candidate.key not in self.hopeless or not abrupt
+
+    def unconfirmed(self, problem: Problem) -> tuple[StructureFound, ...]:
+        """Return what prediction errors show and no free simulation confirms: no name, and not nothing."""
+        if not self.scored:
+            return ()
+        best = self.scored[0]
+        place = (f"the equation of {best.candidate.active.channel}",)
+        return tuple(
+            StructureFound(
+                output=name, variables=place, gain=best.gain, p_value=self.p_of[id(best)], rest=True
+            )
+            for name in problem.names
+            if problem.kept[name].any()
+        )
 
 
 NONE = Proposals((), (), {}, frozenset())

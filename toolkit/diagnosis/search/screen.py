@@ -280,6 +280,19 @@ class LinearisedFit:
             return replace(trial, gain=0.0, trust=trust, active=trial.reached(coefficients))
         return replace(trial, gain=gain, trust=trust, active=reached)
 
+    def whitened(self) -> LinearisedFit:
+        """Return the screen under white noise alone."""
+        return replace(self, base=replace(self.base, noise=self.white.noise), coloured=self.white)
+
+    def plain_gain(self, directions: Stacked) -> tuple[float, list[float]]:
+        """Return twice the gain under white noise, and the responses' coefficients by least squares."""
+        under = self.white
+        raw = self._rows(directions, under.noise)
+        raw = raw - under.span @ (under.span.T @ raw)
+        coefficients = np.linalg.lstsq(raw, under.left, rcond=1e-9)[0]
+        remaining = float(np.sum((under.left - raw @ coefficients) ** 2))
+        return self.n * math.log(under.rest / max(remaining, 1e-12 * under.rest)), coefficients.tolist()
+
     def gain(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, tuple[float, ...], float]:
         """Return twice the gain of the log-likelihood, the responses' coefficients, and its trust.
 

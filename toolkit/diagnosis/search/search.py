@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.fit.drift import judged_by_rates
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
@@ -153,6 +154,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     refitted = fit(problem)
     problem = without_outliers(problem, refitted.residual)
     refitted = fit(problem, start=refitted.p)
+    problem = judged_by_rates(problem, refitted)
     folds = folds_of(problem, refitted)
     listed = candidates(problem)
     skipped: list[str] = []
@@ -163,6 +165,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     scored: tuple[Scored, ...] = ()
     before: tuple[StructureFound, ...] = ()
     structure: tuple[StructureFound, ...] = ()
+    proposed = NONE
     try:
         for turn in range(STEP.most_effects + 1):
             share = STEP.later if turn else STEP.first
@@ -171,7 +174,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in scored))
                 budget.check(f"step {turn + 1}: joint fits of {names}")
 
-            led, proposed, sought = None, NONE, tuple(listed)
+            led, sought = None, tuple(listed)
             if turn < STEP.most_effects:
                 budget.check(f"step {turn + 1}: the equation along the recording")
                 proposed = proposals(problem, base)
@@ -238,6 +241,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     except BudgetSpentError as error:
         skipped.append(str(error))
     base, steps = _with_a_size(problem, base, steps)
+    if not steps:
+        structure += proposed.unconfirmed(problem)
     with contextlib.suppress(BudgetSpentError):
         base, held_base, steps = _told_from_none(problem, folds, base, held_base, steps)
     scatter: tuple[RunScatter, ...] = ()

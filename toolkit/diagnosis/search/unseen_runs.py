@@ -21,7 +21,7 @@ from toolkit.diagnosis.policy import PRIORS, SCREENING, UNSEEN, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Rival, Step, at_bound, joint_fit
 from toolkit.diagnosis.search.noise_floor import is_beyond_noise
-from toolkit.diagnosis.search.screen import Scored, best_of
+from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
 from toolkit.diagnosis.search.screen_step import Look, about_declared
 from toolkit.errors import FitError
 
@@ -51,9 +51,7 @@ def shown_on_unseen_runs(
 
     Of several that do, those whose errors the runs do not tell apart are one class, the likeliest first.
     """
-    first = not base.active and folds.by_run and len(problem.runs) >= UNSEEN.runs
-    few = view.screen.trust(base.noise) <= SCREENING.least_trust
-    if not (first and few and is_beyond_noise(problem, base)):
+    if base.active or not asked_of_unseen_runs(problem, folds, base, view.screen):
         return None
     shown = []
     for trial, made in _fitted(problem, base, view)[: UNSEEN.judged]:
@@ -61,11 +59,12 @@ def shown_on_unseen_runs(
             held_out = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
-        if _takes_most(problem, held_base, held_out):
+        if takes_most(problem, held_base, held_out):
             shown.append(_Shown(trial, made, held_out))
     if not shown:
         return None
-    gains = _gains(problem, held_base, shown)
+    of_shown = gains_of(problem, held_base, [(each.fit, each.held_out) for each in shown])
+    gains = {id(each): gain for each, gain in zip(shown, of_shown, strict=True)}
     best = max(gains.values())
 
     def order(each: _Shown) -> tuple[bool, float]:
@@ -133,24 +132,31 @@ def _left(problem: Problem, simulated: Mapping[str, NDArray[np.float64]]) -> flo
     return float(np.mean(_runs(problem, simulated)))
 
 
-def _takes_most(problem: Problem, before: HeldOut, after: HeldOut) -> bool:
+def asked_of_unseen_runs(problem: Problem, folds: Folds, base: Fit, screen: LinearisedFit) -> bool:
+    """Tell whether whole runs that no fit has seen have to say what is right, as no noise can."""
+    enough = folds.by_run and len(problem.runs) >= UNSEEN.runs
+    few = screen.trust(base.noise) <= SCREENING.least_trust
+    return enough and few and is_beyond_noise(problem, base)
+
+
+def takes_most(problem: Problem, before: HeldOut, after: HeldOut) -> bool:
     """Tell whether most of the error is gone: nearly all of it in the median run, and half in every one."""
     shares = 1 - _runs(problem, after.simulated) / np.maximum(_runs(problem, before.simulated), 1e-300)
     return bool(np.median(shares) > UNSEEN.usual and shares.min() > UNSEEN.every)
 
 
-def _gains(problem: Problem, before: HeldOut, shown: Sequence[_Shown]) -> dict[int, float]:
-    """Return the gains of the log-likelihood of independent values, by the identity of each.
+def gains_of(problem: Problem, before: HeldOut, shown: Sequence[tuple[Fit, HeldOut]]) -> list[float]:
+    """Return the gains of the log-likelihood of independent values, of fits on rows that they have not seen.
 
     There are as many as the rows are worth beside the longest memory that any of the fits leaves: each is
     judged by the same rows.
     """
-    gains = dict.fromkeys(map(id, shown), 0.0)
+    gains = [0.0] * len(shown)
     for name, kept in problem.kept.items():
         observed = problem.observed[name][kept]
-        worth = int(kept.sum()) / max(each.fit.noise[name].correlation_rows for each in shown)
+        worth = int(kept.sum()) / max(fit.noise[name].correlation_rows for fit, _ in shown)
         left = float(np.mean((observed - before.simulated[name][kept]) ** 2))
-        for each in shown:
-            after = float(np.mean((observed - each.held_out.simulated[name][kept]) ** 2))
-            gains[id(each)] += 0.5 * worth * math.log(max(left, 1e-300) / max(after, 1e-300))
+        for i, (_, held_out) in enumerate(shown):
+            after = float(np.mean((observed - held_out.simulated[name][kept]) ** 2))
+            gains[i] += 0.5 * worth * math.log(max(left, 1e-300) / max(after, 1e-300))
     return gains

@@ -11,8 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
-from toolkit.diagnosis.simulators.simulator import Capability, Model
+from toolkit.diagnosis.simulators.simulator import Capability, Following, Model
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.law import ITSELF, is_law
 from toolkit.errors import ConfigError
@@ -21,10 +23,11 @@ from toolkit.simulation.plan_file import CaseParameter
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.following import Followed
+    from toolkit.diagnosis.simulators.simulator import LedAlong, Parameters
     from toolkit.effects.effect import Effect
     from toolkit.simulation.model_file import FittedEffect
 
@@ -92,8 +95,29 @@ class WithEffects:
                 pushed=lambda run, p, active, channel, pattern: pushed(
                     run, self._parameters(p), self._all(p, active), channel, pattern
                 ),
+                followed=None if motion.followed is None else self._following(motion.followed),
             )
         return dataclasses.replace(plain, motion=motion)
+
+    def _following(self, plain: LedAlong) -> LedAlong:
+        """Return how the equation is led along its recording with the effects in it.
+
+        Their own parameters are as they stand: prediction errors answer to those of the simulation alone.
+        """
+
+        def followed(
+            runs: Sequence[Run], p: Parameters, active: Sequence[AppliedEffect], asked: Following
+        ) -> tuple[Followed, NDArray[np.float64]]:
+            own = [name in self._own for name in asked.steps]
+            steps = {name: step for name, step in asked.steps.items() if name in self._own}
+            made, of_own = plain(
+                runs, self._parameters(p), self._all(p, active), dataclasses.replace(asked, steps=steps)
+            )
+            answers = np.zeros((*of_own.shape[:2], len(own)))
+            answers[:, :, own] = of_own
+            return made, answers
+
+        return followed
 
     def _parameters(self, p: Mapping[str, float]) -> dict[str, float]:
         return {name: value for name, value in p.items() if name in self._own}

@@ -108,6 +108,8 @@ class OdeApart:
         runs: Sequence[Run],
         points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]],
     ) -> None:
+        if all(_key(*point) in self._prepared.get(run, {}) for run in runs for point in points):
+            return
         self._prepared = {run: {} for run in runs}
         sets = [(dict(p), _crossing(active)) for p, active in points]
         rows = sum(run.rows for run in runs)

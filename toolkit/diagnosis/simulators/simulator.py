@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     # Signals of an equation, (n,) by name, to force-like terms of shape (n, forces): a `TermPattern`
     Pattern = Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
     Parameters = Mapping[str, float]
+    LedAlong = Callable[
+        [Sequence[Run], Parameters, Sequence[AppliedEffect], "Following"],
+        tuple[Followed, NDArray[np.float64]],
+    ]
     # A channel's name to its largest recorded magnitude over the runs that are judged
     Largest = Callable[[str | None], float]
 
@@ -124,13 +128,7 @@ class Moving:
     position: Callable[[str | None], str | None]
     states: tuple[StateRange, ...]
     pushed: Callable[[Run, Parameters, Sequence[AppliedEffect], str | None, Pattern], Arrays]
-    followed: (
-        Callable[
-            [Sequence[Run], Parameters, Sequence[AppliedEffect], Following],
-            tuple[Followed, NDArray[np.float64]],
-        ]
-        | None
-    ) = None
+    followed: LedAlong | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

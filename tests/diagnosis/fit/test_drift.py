@@ -1,0 +1,122 @@
+"""An integrating plant that is driven open loop is told as drift-limited, and judged by its rates."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.diagnosis.cases import write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.drift import judged_by_rates
+from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.simulators.build_simulator import model_of
+
+CASE = """schema = 1
+[simulation]
+kind = "ode"
+path = "sim.py"
+states = ["position", "speed"]
+force_terms = {{ speed = "N/kg" }}
+[simulation.parameters]
+mass = {{ value = 5.0, unit = "kg", sd = 0.5, bounds = [1.0, 20.0] }}
+viscous = {{ value = 4.0, unit = "N*s/m", sd = 2.0, bounds = [0.0, 40.0] }}
+[recording]
+time = "t"
+[recording.channels]
+t = {{ unit = "s", role = "time" }}
+{pull}
+position = {{ unit = "m", role = "output" }}
+{runs}
+"""
+PULL = 'pull = { unit = "N", role = "input" }'
+SIMULATOR = """
+def initial(p, run):
+    return [0.0, %s]
+def rhs(t, x, u, p):
+    return [x[1], (%s - %s * x[0] - p["viscous"] * x[1]) / p["mass"]]
+def outputs(x, u, p):
+    return {"position": x[0]}
+"""
+T = np.arange(0.0, 5.0, 0.05)
+
+
+def runs(count, seed=1, dry=0.0, zero=0.0):
+    """Draw runs of a cart of 5 kg and 4 N s/m under a pull that changes at random, by Euler steps of 1 ms.
+
+    ``dry`` is its dry friction [N], ``zero`` the standard deviation of a steady force of each run [N].
+    """
+    rng = np.random.default_rng(seed)
+    tables = {}
+    for k in range(count):
+        levels = rng.choice([-12.0, -8.0, 8.0, 12.0], size=6)
+        pull = levels[(T // 0.9).astype(int)]
+        unknown = zero * rng.normal()
+        position, speed, shown = 0.0, 0.0, []
+        for before, after_it in zip(pull, np.append(pull[1:], pull[-1]), strict=True):
+            shown.append(position)
+            for step in range(50):
+                drive = before + (after_it - before) * step / 50 + unknown - 4.0 * speed
+                slip = np.sign(speed) * dry if abs(speed) > 1e-6 else np.clip(drive, -dry, dry)
+                after = speed + (drive - slip) / 5.0 * 1e-3
+                speed = 0.0 if after * speed < 0 and abs(drive) <= dry else after
+                position += speed * 1e-3
+        noisy = np.array(shown) + rng.normal(0, 1e-4, T.size)
+        tables[f"r{k}__csv"] = pd.DataFrame({"t": T, "pull": pull, "position": noisy})
+    return tables
+
+
+def written(folder, tables, spring=0.0, *, driven=True):
+    listed = "\n".join(f'[[recording.run]]\nfile = "{name.replace("__", ".")}"' for name in tables)
+    text = CASE.format(runs=listed, pull=PULL if driven else "")
+    if not driven:
+        tables = {name: table.drop(columns="pull") for name, table in tables.items()}
+    simulator = SIMULATOR % ("0.0" if driven else "1.0", 'u["pull"]' if driven else "0.0", spring)
+    return read_case(write_case(folder, text, simulator=simulator, **tables))
+
+
+@pytest.mark.parametrize(
+    ("spring", "driven", "drifts"), [(0.0, True, True), (40.0, True, False), (0.0, False, False)]
+)
+def test_only_a_driven_plant_that_nothing_leads_back_drifts(tmp_path, spring, driven, drifts):
+    case = written(tmp_path, runs(2, zero=0.3), spring, driven=driven)
+    problem = problem_of(case, model_of(case, None))
+    assert bool(judged_by_rates(problem, fit(problem)).rates) is drifts
+
+
+def test_a_rate_is_the_slope_of_what_was_recorded(tmp_path):
+    case = written(tmp_path, runs(2, zero=0.3))
+    problem = problem_of(case, model_of(case, None))
+    problem = judged_by_rates(problem, fit(problem))
+    steady = np.concatenate([0.3 * run.t for run in problem.runs])
+    assert problem.judged("position", steady) == pytest.approx(0.3)
+
+
+@pytest.fixture(scope="module")
+def drifting(tmp_path_factory):
+    """Two runs with dry friction, each with a steady force of its own that nobody simulates."""
+    case = written(tmp_path_factory.mktemp("cart"), runs(2, dry=2.0, zero=0.3))
+    return diagnose(case, None).diagnosis
+
+
+def test_a_drifting_plant_is_told_and_its_errors_are_those_of_its_rates(drifting):
+    told = [finding for finding in drifting.findings if finding.rule == "drift-limited"]
+    assert [finding.where for finding in told] == ["CASE.toml: position"]
+    assert drifting.held_out[0].unit == "(m)/s"
+
+
+def test_what_prediction_errors_show_is_not_nothing_where_free_simulation_cannot_confirm_it(drifting):
+    """From row to row the friction shows; each run's own force carries its position away all the same."""
+    assert drifting.verdict == "unknown"
+    assert ("the equation of speed",) in [variables for _, variables in drifting.depends_on]
+
+
+@pytest.mark.campaign(
+    "a third run takes a minute; the suite holds that a drifting plant is judged by its rates"
+)
+def test_dry_friction_of_a_cart_is_named_though_its_position_drifts(tmp_path):
+    answer = diagnose(written(tmp_path, runs(3, dry=2.0, zero=0.3)), None).diagnosis
+    (friction,) = [effect for effect in answer.effects if effect.key.name == "coulomb_friction"]
+    (size,) = [each for each in friction.parameters if each.name == "coulomb"]
+    low, high = size.ci95
+    assert low < 2.0 / 5.0 < high

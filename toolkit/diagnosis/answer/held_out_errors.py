@@ -1,0 +1,116 @@
+"""Errors of every output on rows that no fit has seen, and the noise below them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.answer.answer import HeldOutFit
+from toolkit.diagnosis.fit.sensor_noise import NoiseParts, noise_parts
+from toolkit.diagnosis.fit.structure import groups
+from toolkit.diagnosis.search.search import Search
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.law.learn import Laws
+
+
+def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
+    """Return the errors of every output; of one that only drifts those of its rates.
+
+    Parameters
+    ----------
+    unknown : effects that were found are not told
+    """
+    problem = search.problem
+    errors = []
+    augmented = search.held_refitted if unknown else search.held_augmented
+    for output in problem.model.outputs:
+        if not problem.kept[output.name].any():
+            continue
+
+        def rmse(simulated: NDArray[np.float64], name: str = output.name) -> float:
+            away = problem.judged(name, problem.observed[name] - simulated)
+            return math.sqrt(float(np.mean(away**2)))
+
+        errors.append(
+            HeldOutFit(
+                channel=output.name,
+                unit=f"({output.unit})/s" if output.name in problem.rates else output.unit,
+                nominal_rmse=rmse(search.nominal.simulated[output.name]),
+                refitted_rmse=rmse(search.held_refitted.simulated[output.name]),
+                augmented_rmse=rmse(augmented.simulated[output.name]),
+                # No noise is larger than an error that was reached on rows that no fit has seen.
+                noise_floor=min(
+                    _floor(search, output.name, output.sd),
+                    math.inf if output.sd is not None else rmse(augmented.simulated[output.name]),
+                ),
+                noise=judged_noise(search, output.name),
+            )
+        )
+    return tuple(errors)
+
+
+def judged_noise(search: Search, name: str) -> NoiseParts:
+    """Return the noise of what is judged of an output, the sensor's apart."""
+    problem, parts = search.problem, noise_parts(search.problem, search.augmented, name)
+    if name not in problem.rates:
+        return parts
+    total = float(np.mean(problem.judged(name, search.augmented.residual[name]) ** 2))
+    sensor = min(problem.judged_sd(name, parts.sensor_sd), math.sqrt(total))
+    return replace(parts, sensor_sd=sensor, process_sd=math.sqrt(max(total - sensor**2, 0.0)))
+
+
+def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutFit, ...]) -> tuple[HeldOutFit, ...]:
+    """Return held-out errors with those that the laws leave beside them; an event tells nothing there."""
+    if not any(law.predicts for law in laws.listed):
+        return errors
+    problem = search.problem
+    told = []
+    for output in errors:
+        name = output.channel
+        away = problem.judged(name, problem.observed[name] - laws.held_out.simulated[name])
+        rmse = math.sqrt(float(np.mean(away**2)))
+        stated = problem.sd_of(output.channel) is not None
+        floor = output.noise_floor if stated else min(output.noise_floor, rmse)
+        told.append(replace(output, with_laws_rmse=rmse, noise_floor=floor))
+    return tuple(told)
+
+
+def _floor(search: Search, name: str, sd: float | None) -> float:
+    """Return an output's noise: as stated, else what is left when smooth structure is taken out too."""
+    problem, residual = search.problem, search.augmented.residual[name]
+    if sd is not None:
+        return problem.judged_sd(name, sd)
+    noise = math.sqrt(float(np.mean(problem.judged(name, residual) ** 2)))
+    if name in problem.rates:
+        return noise
+    counted = problem.kept[name]
+    if any(structure.output == name and not structure.rest for structure in search.structure):
+        share, _ = structured(search, name)
+        refitted = math.sqrt(float(np.mean(search.refitted.residual[name][counted] ** 2)))
+        noise = min(noise, refitted * math.sqrt(max(1 - share, 0.0)))
+    return noise
+
+
+def structured(search: Search, name: str) -> tuple[float, NDArray[np.float64]]:
+    """Return share and signal of the smooth structure in an output's refitted residual."""
+    problem, counted = search.problem, search.problem.kept[name]
+    residual = search.refitted.residual[name]
+    best, signal = 0.0, np.zeros(problem.rows)
+    dependences = {structure.variables for structure in search.structure_before if structure.output == name}
+    for group in groups(problem, search.refitted):
+        if group.output != name or (dependences and group.variables not in dependences):
+            continue
+        fit = np.linalg.lstsq(group.columns[counted], residual[counted], rcond=None)[0]
+        smooth = group.columns @ fit
+        share = 1 - float(np.sum((residual - smooth)[counted] ** 2)) / max(
+            float(np.sum(residual[counted] ** 2)), 1e-300
+        )
+        if share > best:
+            best, signal = share, smooth
+    return best, signal

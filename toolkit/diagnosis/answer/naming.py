@@ -1,0 +1,174 @@
+"""Whether effects that were found are named, or only imitate what stays without a name."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.answer.held_out_errors import held_out_errors, judged_noise
+from toolkit.diagnosis.answer.next_measurements import implausible, outsized
+from toolkit.diagnosis.fit.sensor_noise import spread
+from toolkit.diagnosis.fit.structure import RUNS
+from toolkit.diagnosis.policy import SCREENING, VERDICT
+from toolkit.diagnosis.search.search import Search
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.problem import Problem
+
+
+def mostly_unknown(search: Search) -> bool:
+    """Tell whether what stays after the named effects outweighs them: they then only imitate it.
+
+    By the log-likelihood, by what they take of the held-out mean square that is above the noise, and by the
+    parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
+    what was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with
+    a size that no cell has.
+    """
+    if search.steps and implausible(search) and not _takes_nearly_all(search):
+        return True
+    shown = _taken(search)
+    if search.steps and not shown and _is_smooth(search):
+        return True
+    if search.steps and _is_within_accuracy(search):
+        return True
+    if not search.structure:
+        return False
+    if outsized(search):
+        return True
+    if any(removed > VERDICT.nearly * above for removed, above in shown):
+        return False
+    unexplained = max(
+        (structure.gain / 2 for structure in search.structure if not structure.rest), default=0.0
+    )
+    explained = sum(step.gain for step in search.steps)
+    if explained < VERDICT.mostly * (explained + unexplained):
+        return True
+    if all(step.active.effect.from_digits for step in search.steps):
+        return not search.steps  # read off the digits: it does not imitate anything
+    return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
+
+
+def _is_smooth(search: Search) -> bool:
+    """Tell whether a smooth discrepancy without a name explains more than the effects, parameters counted.
+
+    A simulation is never exact: what it misses by a part in a thousand is smooth, and some effect imitates a
+    share of it. Asked of effects that show in no output above the noise; a larger one has a law of its own.
+    """
+    if all(step.active.effect.from_digits for step in search.steps):
+        return False
+    n = sum(int(counted.sum()) for counted in search.problem.kept.values())
+    cost = 0.5 * math.log(n)  # of a parameter (BIC)
+    named = sum(step.gain - cost * len(step.active.searched) for step in search.steps)
+    nameless = (
+        structure.gain / 2 - cost * structure.columns
+        for structure in search.structure_before
+        if structure.columns and not structure.rest
+    )
+    return max(nameless, default=-math.inf) > named + VERDICT.close
+
+
+def _is_within_accuracy(search: Search) -> bool:
+    """Tell whether effects move every output by less than a simulation is off without any.
+
+    Another integrator or a tire's formula misses its plant by as much, and some effect takes a share of that.
+    One that takes most of what is above the noise is what was left out, however small: within the runs, or of
+    their zeros more than it would of zeros that move by chance.
+    """
+    if all(step.active.effect.from_digits for step in search.steps):
+        return False
+    problem = search.problem
+    if _takes_nearly_all(search) and _foretells_zeros(search):
+        return False
+    for name, kept in problem.kept.items():
+        # about every run's own mean: zeros that move are no effect's to take
+        before, after, floor = (
+            _within_runs(problem, name, error)
+            for error in (
+                problem.observed[name] - search.held_refitted.simulated[name],
+                problem.observed[name] - search.held_augmented.simulated[name],
+                search.augmented.residual[name],
+            )
+        )
+        shown = before > VERDICT.shown * floor
+        if shown and before - after > VERDICT.taken * (before - floor):
+            return False
+        moved = (search.held_augmented.simulated[name] - search.held_refitted.simulated[name])[kept]
+        if len(moved) and math.sqrt(float(np.mean(moved**2))) > VERDICT.accuracy * spread(problem, name):
+            return False
+    return True
+
+
+def _foretells_zeros(search: Search) -> bool:
+    """Tell whether effects take more of the runs' zeros, on unseen rows, than of as many that move by chance.
+
+    Zeros that move are one independent value a run: of three a constant takes nine tenths in one case of
+    twenty, and the best of all that were tried in most. The share that q parameters take of k such values is
+    a beta variable with q and k - q degrees of freedom (the F test, one-sided).
+    """
+    from scipy.stats import beta
+
+    problem, shares = search.problem, []
+    for name, kept in problem.kept.items():
+        before, after = (
+            sum(
+                float((problem.observed[name] - held.simulated[name])[rows][kept[rows]].mean()) ** 2
+                for rows in problem.slices
+                if kept[rows].any()
+            )
+            for held in (search.held_refitted, search.held_augmented)
+        )
+        shares.append((before - after) / max(before, 1e-300))
+    taken = sum(max(len(step.active.searched), 1) for step in search.steps)
+    free = len(problem.runs) - taken
+    tests = max(len(search.scored), 1)
+    return free > 0 and tests * float(beta.sf(max(shares), taken / 2, free / 2)) < SCREENING.alpha
+
+
+def _taken(search: Search) -> list[tuple[float, float]]:
+    """Return what effects take of each output's held-out mean square, and what of it is above the noise.
+
+    Outputs that show nothing but noise do not count: of nothing, nothing is two thirds. Where the runs have
+    zeros of their own, these are no effect's to take, and every run counts about its own mean.
+    """
+    problem, shown = search.problem, []
+    for output in held_out_errors(search, unknown=False):
+        name = output.channel
+        before, after, floor = output.refitted_rmse**2, output.augmented_rmse**2, output.noise_floor**2
+        if any(each.output == name and each.variables == RUNS for each in search.structure):
+            errors = (
+                problem.observed[name] - search.held_refitted.simulated[name],
+                problem.observed[name] - search.held_augmented.simulated[name],
+                search.augmented.residual[name],
+            )
+            before, after, floor = (_within_runs(problem, name, error) for error in errors)
+        if before > VERDICT.shown * floor:
+            shown.append((before - after, before - floor))
+    return shown
+
+
+def _takes_nearly_all(search: Search) -> bool:
+    """Tell whether effects take nearly all that is above the sensor's own noise on unseen rows.
+
+    What foretells all else is not withdrawn for a parameter that is far off beside it: its prior is as likely
+    wrong, and the answer gives the parameter with its shift.
+    """
+    shares = []
+    for output in held_out_errors(search, unknown=False):
+        before, after = output.refitted_rmse**2, output.augmented_rmse**2
+        sensor = judged_noise(search, output.channel).sensor_sd ** 2
+        if before > VERDICT.shown * sensor:
+            shares.append((before - after) / (before - sensor))
+    return bool(shares) and min(shares) > VERDICT.nearly
+
+
+def _within_runs(problem: Problem, name: str, error: NDArray[np.float64]) -> float:
+    """Return the mean square of an error about its mean in every run; rates have no zero that moves."""
+    if name in problem.rates:
+        return float(np.mean(problem.judged(name, error) ** 2))
+    counted = problem.kept[name]
+    parts = [error[rows][counted[rows]] for rows in problem.slices if counted[rows].any()]
+    return float(np.mean(np.concatenate([part - part.mean() for part in parts]) ** 2))
