@@ -16,6 +16,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.forward import simulate_model
 from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Following
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError, ToolkitError
@@ -175,6 +176,26 @@ def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
     # the drag holds back: less than the t^2/2 of a body without it
     assert moved[-1] < 0.9 * run.t[-1] ** 2 / 2
     np.testing.assert_allclose(linear, moved, atol=0.01 * moved[-1])
+
+
+def test_an_equation_is_led_along_its_recording_with_the_effects_that_it_has(tmp_path):
+    case = drag_ode(tmp_path / "case")
+    _, path = written(case, tmp_path / "answer")
+    whole, bare = read_case(case, model=path), read_case(case)
+    (effect,) = whole.effects
+
+    def errors(case, active):
+        model = model_of(case, None)
+        p = {parameter.name: parameter.value for parameter in model.parameters}
+        sensor = {output.name: 0.05 for output in model.outputs}
+        asked = Following(steps=dict.fromkeys(p, 1e-3), sensor=sensor, unread={})
+        made, answers = model.capability.motion.followed(case.runs, p, active, asked)
+        assert answers.shape[2] == len(p)
+        return made.errors
+
+    of_model = errors(whole, ())
+    assert np.allclose(of_model, errors(bare, (effect.applied,)), equal_nan=True)
+    assert not np.allclose(of_model, errors(bare, ()), equal_nan=True)
 
 
 def test_a_models_effects_are_in_its_motion_once(tmp_path):
