@@ -346,10 +346,13 @@ class OdeModel:
         return (run, between and run.rows > 1, tuple(p.values()), forces_key), forces
 
     def _keep(self, key: tuple[Any, ...], simulated: dict[str, NDArray[np.float64]] | FitError) -> None:
+        if len(self._kept) > 400 or self._held > _MOST_HELD:
+            self._kept.clear()
+            self._held = 0
         self._kept[key] = simulated
-        self._held += _bytes(simulated)
-        while self._held > _MOST_HELD and len(self._kept) > 1:
-            self._held -= _bytes(self._kept.pop(next(iter(self._kept))))
+        self._held += (
+            0 if isinstance(simulated, FitError) else sum(column.nbytes for column in simulated.values())
+        )
 
     def integrated(
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool = False
@@ -463,7 +466,3 @@ def _loaded(case: Case) -> OdeModel:
 def _between_rows(applied: AppliedEffect) -> bool:
     """Tell whether an effect shows what the equation did between two rows."""
     return applied.effect.on_channel is not None and applied.effect.on_channel.between_rows
-
-
-def _bytes(simulated: dict[str, NDArray[np.float64]] | FitError) -> int:
-    return 0 if isinstance(simulated, FitError) else sum(column.nbytes for column in simulated.values())
