@@ -245,7 +245,7 @@ def _job(
     folder: Path,
     options: Options,
     comparison: Comparison | None,
-    tire: TestTire | None,
+    tire: TestTire | None = None,
 ) -> Job:
     from toolkit.calibration.registry.registry import instrument_of
     from toolkit.lab.tire_tests.handover import details_of, provenance, writers
