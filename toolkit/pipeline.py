@@ -11,7 +11,7 @@ from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.model import Characteristics
 from toolkit.errors import RecordingError
 from toolkit.findings import Finding
-from toolkit.machine import load_machine
+from toolkit.machine import load_machine, own_text
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.read import read_recording
 from toolkit.reduction.corrections import tare_of_file
@@ -104,7 +104,9 @@ def process(
         machine=machine, record=record, info=folder.info, tare=tare,
     )  # fmt: skip
     hidden = [finding for name, one, _ in named for finding in hidden_findings(one.hidden, name)]
-    reduced = dataclasses.replace(reduced, findings=(*reduced.findings, *findings, *hidden))
+    reduced = dataclasses.replace(
+        reduced, findings=(*reduced.findings, *findings, *hidden), definition=own_text(folder.info.machine)
+    )
     characteristics = characterise(reduced, machine=machine, record=record, sweeps=sweeps)
     return TestResult(reduced=reduced, characteristics=characteristics)
 

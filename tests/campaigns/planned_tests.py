@@ -103,7 +103,7 @@ def entries(seed: int) -> tuple[Entry, ...]:
             ("protocol", own),
             ("planned", found.design),
             ("evenly spaced", dataclasses.replace(found.design, slip_angles_rad=even)),
-            ("every angle", dataclasses.replace(found.design, slip_angles_rad=steps_of(MACHINE.protocol))),
+            ("every angle", dataclasses.replace(found.design, slip_angles_rad=steps_of(MACHINE))),
         ):
             made.append(Entry(loads=text, asked_N=loads, name=name, design=design))
     return tuple(made)

@@ -23,6 +23,7 @@ from toolkit.findings import Finding
 from toolkit.lab.home import home_template
 from toolkit.lab.tire_tests import resolve
 from toolkit.lab.tire_tests.handover import details_of
+from toolkit.lab.tire_tests.tire_files import fit_test_tire
 from toolkit.recording.marks import is_own_output
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tydex import read_tydex
@@ -172,7 +173,8 @@ def test_several_tests_are_made_in_one_command_and_a_bad_one_stops_no_other(
 def test_the_hand_over_has_one_manifest_and_the_content_hash_is_the_same_twice(
     tmp_path: Path, monkeypatch, capsys
 ) -> None:
-    made = named("altimax-89", special="=1+1")
+    shown = named("altimax-89", special="=1+1")
+    made = resolve.Resolved(result=shown.result, record=shown.record, findings=shown.findings)
     monkeypatch.setattr(resolve, "resolve_test", lambda _test, **_options: made)
     template = make(tmp_path, p("{{tk:report.date}} {{tk:test.special}}") + p("{{tk:figure.gough}}"))
     out = tmp_path / "out"
@@ -215,6 +217,10 @@ def test_the_hand_over_has_one_manifest_and_the_content_hash_is_the_same_twice(
     )
     assert said in (out / "test.tdx").read_text()
     assert read_tir(out / "tire.tir").version is not None
+    # Who is given the tire file is told what its fit leaves open.
+    of_fit = [finding.as_dict() for finding in fit_test_tire(made.result.reduced).findings()]
+    assert of_fit
+    assert [one for one in told[0]["findings"] if one["where"].startswith("tire file, mf61")] == of_fit
 
 
 @office_needed

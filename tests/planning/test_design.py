@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
+from toolkit.channels import Axes
 from toolkit.machine import load_machine
 from toolkit.planning.design import Design, Pace, ordered, pace_of, standard, steps_of
 
@@ -39,7 +40,19 @@ def test_the_machine_stands_at_multiples_of_its_smallest_step() -> None:
     protocol = dataclasses.replace(
         M15.protocol, slip_angles_rad=tuple(map(math.radians, (-3.0, 0.0, 1.5, 4.5)))
     )
-    np.testing.assert_allclose(np.degrees(steps_of(protocol)), [-3, -1.5, 0, 1.5, 3, 4.5], atol=1e-9)
+    machine = dataclasses.replace(M15, protocol=protocol)
+    np.testing.assert_allclose(np.degrees(steps_of(machine)), [-3, -1.5, 0, 1.5, 3, 4.5], atol=1e-9)
+
+
+@pytest.mark.parametrize("axes", ["ISO-W", "adapted-SAE"])
+def test_a_design_is_in_SAE_whatever_the_machine_shows(axes: Axes) -> None:
+    shown = dataclasses.replace(
+        M15.protocol, slip_angles_rad=tuple(map(math.radians, (0.0, 1.0, -1.0, 3.0, 6.0)))
+    )
+    machine = dataclasses.replace(M15, axes=axes, protocol=shown)
+    design = standard(machine, machine.rotations)
+    np.testing.assert_allclose(np.degrees(design.slip_angles_rad), [0, -1, 1, -3, -6], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(steps_of(machine)), np.arange(-6, 2), atol=1e-9)
 
 
 @pytest.mark.parametrize("count", [7, 9, 13])

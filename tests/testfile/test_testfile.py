@@ -14,9 +14,10 @@ import pytest
 import python_calamine
 
 from toolkit.characteristics.model import Characteristics, Row
-from toolkit.errors import RecordingError, ToolkitError
+from toolkit.errors import ConfigError, RecordingError, ToolkitError
 from toolkit.findings import Finding
 from toolkit.machine import load_machine
+from toolkit.machine.definition import machine_file
 from toolkit.pipeline import TestResult, process, read_test
 from toolkit.recording.folder import read_test_folder
 from toolkit.testfile import read_test_file, write_test_file
@@ -207,7 +208,8 @@ def test_a_file_from_before_anything_was_stated_keeps_its_hash(tmp_path: Path, m
         "reduced": dataclasses.asdict(bare.reduced),
         "characteristics": first_form(bare.characteristics),
     }
-    del content["reduced"]["stated"]
+    for name in ("stated", "definition"):
+        del content["reduced"][name]
     for condition in content["reduced"]["conditions"]:
         del condition["hub"]
     for name in ("draft_reasons", "since", "signature"):
@@ -227,3 +229,24 @@ def test_a_result_that_no_registry_was_asked_about_is_a_draft_and_stays_one(
     result = dataclasses.replace(made[0], reduced=dataclasses.replace(made[0].reduced, calibration=two))
     write_test_file(tmp_path / "x.xlsx", result)
     assert read_test_file(tmp_path / "x.xlsx").reduced.calibration == two
+
+
+def test_a_test_of_an_own_machine_holds_its_definition(tmp_path: Path, made: Made) -> None:
+    text = machine_file("m15-virtual").read_text()
+    # Blank lines, umlauts, a line that looks like a number or a formula: every one is a line of the text.
+    text = text.replace('name = "m15-virtual"', '# Prüfstand\n\n# =1+1\nname = "rig 7"\n')
+    own = dataclasses.replace(made[0], reduced=dataclasses.replace(made[0].reduced, definition=text))
+    write_test_file(tmp_path / "x.xlsx", own)
+    back = read_test_file(tmp_path / "x.xlsx")
+    assert back == own
+    assert back.reduced.machine().name == "rig 7"
+    assert back.reduced.machine().protocol == load_machine("m15-virtual").protocol
+
+
+def test_a_machine_that_is_not_where_the_test_was_reduced_is_an_error_that_says_so(made: Made) -> None:
+    info = dataclasses.replace(made[0].reduced.info, machine="gone/rig.toml")
+    reduced = dataclasses.replace(made[0].reduced, info=info, definition="")
+    with pytest.raises(ConfigError, match="not where the test was reduced from") as caught:
+        reduced.machine()
+    assert caught.value.rule == "unknown-machine"
+    assert "process the recordings again" in caught.value.next_step

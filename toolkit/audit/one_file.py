@@ -73,14 +73,10 @@ def changes(
     columns: Columns,
     blocks: Sequence[Block],
     new: Mapping[str, NDArray[np.float64]] | None,
-    *,
-    turn: int = 1,
 ) -> tuple[Change, ...]:
     """Return what the record in force would change in a recording's load blocks.
 
     ``new`` are FY [N] and MZ [N·m] by that record (`toolkit.audit.identify.recompute`), None without one.
-
-    ``turn`` is the sign of the file's slip angle in SAE axes, in which the protocol's steps are.
     """
     if not blocks:
         return ()
@@ -91,7 +87,7 @@ def changes(
     step = None
     if recording.has("SA"):
         rows["SA"] = recording["SA"].si
-        step = nearest_step(turn * float(rows["SA"].mean()), protocol)
+        step = nearest_step(float(rows["SA"].mean()), protocol)
     stacked = np.stack(list(rows.values()))
     table = np.array([stacked[:, block.rows].mean(axis=1) for block in blocks])
     means = dict(zip(rows, table.T.tolist(), strict=True))
@@ -223,7 +219,7 @@ class Auditor:
         reversal = table.get("reversal")
         direction = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
         sae = signs(context.machine.axes, "SAE", direction)
-        changed = changes(loaded, columns, blocks, new, turn=sae["SA"])
+        changed = changes(loaded, columns, blocks, new)
         return FileAudit(
             path=name,
             sha256=recording.sha256,

@@ -298,10 +298,11 @@ def _resolved(stage: Path) -> Resolved:
 
 def _tire_file(resolved: Resolved, path: Path) -> str:
     """Write MF 6.1 over all loads of the forward run, and tell how well it fits."""
-    from toolkit.lab.tire_tests.tire_files import write_test_tir
+    from toolkit.lab.tire_tests.tire_files import fit_test_tire
 
-    fit = write_test_tir(path, resolved.result.reduced, comments=[resolved.result.reduced.machine_title])
-    errors = ", ".join(f"{channel.channel} {channel.error_percent:.2f} %" for channel in fit.fits)
+    tire = fit_test_tire(resolved.result.reduced)
+    tire.write(path, [resolved.result.reduced.machine_title])
+    errors = ", ".join(f"{channel.channel} {channel.error_percent:.2f} %" for channel in tire.fit.fits)
     return f"tire.tir: MF 6.1 over all loads, error {errors}"
 
 

@@ -1,7 +1,7 @@
 """A machine as data: channels and their units, geometry, drum, protocol, limits."""
 
 from toolkit.machine.correction import Correction
-from toolkit.machine.definition import Column, Drum, Machine, TypeB, load_machine, machine_names
+from toolkit.machine.definition import Column, Drum, Machine, TypeB, load_machine, machine_names, own_text
 from toolkit.machine.hub import Hub
 from toolkit.machine.protocol import Protocol, read_protocol
 from toolkit.machine.sweeping import Delay, Sweeping
@@ -18,5 +18,6 @@ __all__ = [
     "TypeB",
     "load_machine",
     "machine_names",
+    "own_text",
     "read_protocol",
 ]

@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from toolkit.channels import CHANNELS, Axes, Rotation
+from toolkit.channels import CHANNELS, Axes, Rotation, signs
 from toolkit.declared import (
     Above,
     AtLeast,
@@ -310,6 +310,11 @@ class Machine:
         return self.kind == "simulated"
 
     @property
+    def SA_to_SAE(self) -> int:
+        """Sign in SAE axes of a slip angle as the machine shows it: in its files and in its protocol."""
+        return signs(self.axes, "SAE")["SA"]
+
+    @property
     def indications(self) -> tuple[Column, ...]:
         """The load cells' columns, in file order."""
         return tuple(column for column in self.columns if column.role == "indication")
@@ -380,6 +385,14 @@ def load_machine(name_or_path: str) -> Machine:
             rule="unknown-machine",
         )
     return machine_of_text(read_input(path, SETTINGS_FILE), path)
+
+
+def own_text(name_or_path: str) -> str:
+    """Return the text of a definition that was given by its path; empty of a packaged one."""
+    if not name_or_path.endswith(".toml"):
+        return ""
+    text = read_input(machine_file(name_or_path), SETTINGS_FILE).decode("utf-8-sig")
+    return text.replace("\r\n", "\n")
 
 
 def machine_file(name_or_path: str) -> Path:

@@ -38,7 +38,8 @@ class Protocol:
     slip_angles_rad: Annotated[
         tuple[float, ...], Unit("deg"), Above(-90), Below(90), Size(1),
         Entry(
-            "in the order of the test; a step that stands twice is measured twice", key="slip_angles",
+            "as the machine shows them, in the order of the test; a step that stands twice is measured twice",
+            key="slip_angles",
             example={"value": [0, 1, -1, 0], "unit": "deg"},
         ),
     ]  # fmt: skip

@@ -14,7 +14,7 @@ from toolkit.simulation.steps import Motion
 from toolkit.simulation.tire import TireTruth, revolution_time_s
 
 if TYPE_CHECKING:
-    from toolkit.machine import Machine, Protocol
+    from toolkit.machine import Machine
 
 _ACTUATOR_S = 2.5  # from one load to the next, as the virtual machine waits on average
 _ORDERS = 400
@@ -22,7 +22,10 @@ _ORDERS = 400
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """Every slip angle [rad] at every load [N] in every direction; a step that stands twice is repeated."""
+    """Every slip angle [rad] at every load [N] in every direction; a step that stands twice is repeated.
+
+    Slip angles are in SAE axes, as those of the earlier tests.
+    """
 
     slip_angles_rad: tuple[float, ...]
     loads_N: tuple[float, ...]
@@ -69,24 +72,27 @@ def pace_of(machine: Machine, *, between_files_s: float | None = None) -> Pace:
 
 
 def standard(machine: Machine, rotations: tuple[Rotation, ...]) -> Design:
-    """Return the design of the machine's own protocol."""
+    """Return the design of the machine's own protocol, its slip angles in SAE axes."""
     protocol = machine.protocol
     return Design(
-        slip_angles_rad=tuple(protocol.slip_angles_rad) * protocol.repeats,
+        slip_angles_rad=tuple(machine.SA_to_SAE * a + 0.0 for a in protocol.slip_angles_rad)
+        * protocol.repeats,
         loads_N=tuple(protocol.loads_N),
         rotations=protocol.rotations or rotations,
     )
 
 
-def steps_of(protocol: Protocol) -> tuple[float, ...]:
-    """Return the slip angles [rad] at which the machine can stand: multiples of its smallest step, in range.
+def steps_of(machine: Machine) -> tuple[float, ...]:
+    """Return the slip angles [rad], in SAE axes, at which a machine can stand.
+
+    They are the multiples of the smallest step of its protocol, in the protocol's range.
 
     >>> from toolkit.machine import load_machine
-    >>> steps = steps_of(load_machine("m15").protocol)
+    >>> steps = steps_of(load_machine("m15"))
     >>> len(steps), round(math.degrees(steps[0]), 6)
     (21, -10.0)
     """
-    angles = sorted(set(protocol.slip_angles_rad))
+    angles = sorted({machine.SA_to_SAE * angle for angle in machine.protocol.slip_angles_rad})
     gaps = [b - a for a, b in itertools.pairwise(angles)]
     step = min(gaps, default=math.radians(1.0))
     low, high = math.ceil(angles[0] / step - 1e-6), math.floor(angles[-1] / step + 1e-6)

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 DETECTABLE = 7.85
 """Noncentrality of one degree of freedom that a test at 5 % sees in 80 % of all sessions: (1.96 + 0.84)^2."""
+RANK_TOLERANCE = 1e-6
+"""Of terms scaled to unit size: singular values below are none."""
 _POWERS = range(2, 8)
 _DEPENDENT = 1e-6  # of a column's length: what other columns make of it
 _REPEATABLE = 1e-9  # of the largest load: rows that repeat to rounding
@@ -93,6 +95,21 @@ class Knowledge:
     def indications(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what loads (rows, loads) will indicate (rows, indications)."""
         return np.column_stack([loads, np.ones(len(loads))]) @ self.plane
+
+    def beside_the_loads(self, fit: LoadFit) -> tuple[str, float] | None:
+        """Return the indication that least follows the named loads, and that part of its range.
+
+        None where the loads of the record's own rows tell the terms of an equation apart: whatever cannot is
+        then not for want of a name.
+        """
+        own_loads = self.loads.matrix(self.names)
+        own = _unit_columns(self.terms(fit, own_loads))
+        if np.linalg.matrix_rank(own, tol=RANK_TOLERANCE) == own.shape[1]:
+            return None
+        shown = self.loads.matrix(self.record.indications)
+        rest = np.ptp(shown - self.indications(own_loads), axis=0)
+        share = rest / np.maximum(np.ptp(shown, axis=0), 1e-300)
+        return self.record.indications[int(np.argmax(share))], float(share.max())
 
     def terms(self, fit: LoadFit, loads: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the equation's terms (rows, terms) under loads (rows, loads)."""

@@ -61,7 +61,10 @@ class PlannedValue:
 class PlannedDesign:
     """A design in the units of people, slip angles in the order in which they are to be measured."""
 
-    slip_angles_deg: Annotated[tuple[float, ...], Entry("each direction's recordings, in their order")]
+    slip_angles_deg: Annotated[
+        tuple[float, ...],
+        Entry("each direction's recordings, in their order; in the axes of the machine"),
+    ]
     loads_N: Annotated[tuple[float, ...], Entry("in each recording")]
     rotations: Annotated[tuple[Rotation, ...], Entry("directions of the drum")]
     rows: Annotated[int, Entry("conditions of the reduced test")]
@@ -157,10 +160,10 @@ def plan_protocol(
         like=like,
         tires=tuple(tire.tire for tire in tires),
         calibration=None if earlier.shared.record is None else earlier.shared.record.id,
-        plan=_shown(plan.design, tread),
-        protocol=_shown(protocol, free, in_order=True),
-        alike=None if alike is None or not alike.feasible else _shown(alike.design, free),
-        same_time=None if same_time is None else _shown(same_time.design, free),
+        plan=_shown(plan.design, tread, machine=machine),
+        protocol=_shown(protocol, free, machine=machine, in_order=True),
+        alike=None if alike is None or not alike.feasible else _shown(alike.design, free, machine=machine),
+        same_time=None if same_time is None else _shown(same_time.design, free, machine=machine),
         sweeps=sweeps,
         values=_values(question, plan, of_protocol, same_time, () if choice is None else choice.reaches),
         assumptions=(
@@ -185,11 +188,11 @@ def in_time(question: Question, tread: Tread, protocol: Design) -> Judged | None
     return search.best(most) if most >= MIN_POINTS else None
 
 
-def _shown(design: Design, tread: Tread, *, in_order: bool = False) -> PlannedDesign:
+def _shown(design: Design, tread: Tread, *, machine: Machine, in_order: bool = False) -> PlannedDesign:
     angles = design.slip_angles_rad if in_order else ordered(design.slip_angles_rad, seed=_SEED)
     design = dataclasses.replace(design, slip_angles_rad=angles)
     return PlannedDesign(
-        slip_angles_deg=tuple(round(math.degrees(a), 6) + 0.0 for a in angles),
+        slip_angles_deg=tuple(round(math.degrees(machine.SA_to_SAE * a), 6) + 0.0 for a in angles),
         loads_N=tuple(float(load) for load in design.loads_N),
         rotations=design.rotations,
         rows=design.rows,
@@ -341,8 +344,9 @@ def _written(loads_N: Sequence[float], as_in: Sequence[float]) -> tuple[float, .
     return tuple(by_size.get(load, load) for load in loads_N)
 
 
-def simulation_text(plan: ProtocolPlan, *, machine: str, on: date, tire: str | None) -> str:
-    """Return the plan file that ``toolkit simulate`` runs."""
+def simulation_text(plan: ProtocolPlan, *, machine: str, on: date, tire: str | None, turn: int = 1) -> str:
+    """Return the plan file that ``toolkit simulate`` runs; ``turn`` is the plan's slip angles' sign there."""
+    angles = [turn * angle + 0.0 for angle in plan.plan.slip_angles_deg]
     table: dict[str, Any] = {
         "schema": 1,
         "kind": "test",
@@ -351,7 +355,7 @@ def simulation_text(plan: ProtocolPlan, *, machine: str, on: date, tire: str | N
         "machine": machine,
         "seed": _SEED,
         "rotations": list(plan.plan.rotations),
-        "slip_angles": {"value": list(plan.plan.slip_angles_deg), "unit": "deg"},
+        "slip_angles": {"value": angles, "unit": "deg"},
         "loads": {"value": list(plan.plan.loads_N), "unit": "N"},
         "acquisition": {"negated": []},
     }
@@ -360,7 +364,7 @@ def simulation_text(plan: ProtocolPlan, *, machine: str, on: date, tire: str | N
         settled = [
             {"rotation": rotation, "slip_angles": {"value": [angle], "unit": "deg"}}
             for rotation in plan.plan.rotations
-            for angle in plan.plan.slip_angles_deg
+            for angle in angles
         ]
         table["run"] = [*settled, *plan.sweeps.runs()]
     if tire is not None:

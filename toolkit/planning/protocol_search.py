@@ -85,8 +85,8 @@ class Question:
         """The slip angles at which the machine can stand and every earlier test measured [rad]."""
         low = max(earlier.reach_rad[0] for earlier in self.tires)
         high = min(earlier.reach_rad[1] for earlier in self.tires)
-        protocol = self.tires[0].machine.protocol
-        slack, steps = protocol.slip_angle_tolerance_rad, steps_of(protocol)
+        machine = self.tires[0].machine
+        slack, steps = machine.protocol.slip_angle_tolerance_rad, steps_of(machine)
         return tuple(step for step in steps if low - slack <= step <= high + slack)
 
     def reaches(self, design: Design, *, shift: float = 0.0) -> tuple[Reach, ...]:

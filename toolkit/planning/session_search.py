@@ -13,6 +13,7 @@ from toolkit.calibration.fit.findings import FEW_POINTS
 from toolkit.errors import ConfigError
 from toolkit.planning.check_loads import choose_check_loads
 from toolkit.planning.criteria import Criterion
+from toolkit.planning.knowledge import RANK_TOLERANCE
 from toolkit.planning.row_exchange import Price, Response, exchange, loss
 
 if TYPE_CHECKING:
@@ -112,12 +113,14 @@ class SessionSearch:
     def _refuse_what_cannot_be_told(self) -> None:
         for fit, response in zip(self.knowledge.record.loads, self.responses, strict=True):
             terms = response.common[:, : response.wanted]
-            if np.linalg.matrix_rank(terms, tol=1e-6) < response.wanted:
+            if np.linalg.matrix_rank(terms, tol=RANK_TOLERANCE) < response.wanted:
                 absent = [
                     self.knowledge.names[at]
                     for at in range(self.feasible.loads.shape[1])
                     if not self.feasible.loads[:, at].any()
                 ]
+                if not absent and (unnamed := self.knowledge.beside_the_loads(fit)) is not None:
+                    raise self._follows_an_unnamed_load(*unnamed)
                 lacking = f", none of {', '.join(absent)}" if absent else f" for the terms of {fit.load}"
                 raise ConfigError(
                     "the feasible loads cannot tell the coefficients apart", where=self.feasible.source,
@@ -127,6 +130,17 @@ class SessionSearch:
                     + (" and ".join(absent) or "the cells in another combination"),
                     rule="plan-fixtures",
                 )  # fmt: skip
+
+    def _follows_an_unnamed_load(self, indication: str, share: float) -> ConfigError:
+        record, names = self.knowledge.record, ", ".join(self.knowledge.names)
+        return ConfigError(
+            "the indications follow a load that the session does not name", where=record.id,
+            got=f"{100 * share:.0f} % of the range of {indication} in its rows does not follow {names}",
+            expected=f"indications that {names} explain: a plan can only put on what is named",
+            next_step="enter what was put on beside them, most often MX at a hub, as a load of the session "
+            "(a column of its data, a name in loads), calibrate, and plan from that record",
+            rule="plan-record",
+        )  # fmt: skip
 
     def _refuse_what_shows_no_misfit(self) -> None:
         """Refuse feasible loads of too few levels, unless that is asked for."""

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.channels import Rotation
+from toolkit.errors import ConfigError
 from toolkit.findings import Finding
+from toolkit.machine import load_machine
+from toolkit.machine.definition import machine_of_text
 from toolkit.recording.model import TestInfo
 from toolkit.reduction.physics import RULES
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from toolkit.machine import TypeB
+    from toolkit.machine import Machine, TypeB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +41,7 @@ class Condition:
     ``u_*_zero`` is what the zero of the cells leaves: that of an untared bridge, or the scatter of the tare.
     ``indications`` are the cells' means minus tare, in the record's order and units.
     ``FY_file`` and ``MZ_file`` are the acquisition program's own values, None where the file has none.
+    ``step_SA`` is the step of the protocol, which states what the machine shows, in SAE axes like ``SA``.
     ``first_row`` and ``last_row`` count from 1 at the first data row of the file.
     ``hub`` holds the loads of the hub beside FY and MZ, as measured; empty where the machine has none.
     """
@@ -92,7 +97,7 @@ class ReducedTest:
     ``protocol`` is the source that the protocol of the test names, ``machine_title`` what the definition of
     its machine calls it; ``stated`` are the standard
     uncertainties that the machine states of what has no calibration record (GUM type B), as far as the test
-    uses them.
+    uses them. ``definition`` is the text of the machine's definition where it is none of the packaged ones.
     """
 
     info: TestInfo
@@ -106,6 +111,33 @@ class ReducedTest:
     protocol: str = ""
     machine_title: str = ""
     stated: tuple[TypeB, ...] = ()
+    definition: str = ""
+
+    def machine(self) -> Machine:
+        """Return the machine of the test, with its own protocol: the definition that stands in the test.
+
+        A test of before 1.0.0 holds none; its machine is then looked for where it was reduced.
+
+        Raises
+        ------
+        ConfigError
+            ``unknown-machine``: that definition is not there any more
+        """
+        if self.definition:
+            return machine_of_text(self.definition.encode(), Path(self.info.machine))
+        try:
+            return load_machine(self.info.machine)
+        except ConfigError as error:
+            if error.rule != "unknown-machine":
+                raise
+            raise ConfigError(
+                "the machine's definition is not where the test was reduced from",
+                where=f"the reduced test {self.info.name}",
+                got=f"no file {self.info.machine}",
+                expected="a reduced test that holds the definition of its machine",
+                next_step="process the recordings again, or go on in the folder in which it was reduced",
+                rule="unknown-machine",
+            ) from error
 
     @property
     def impossible(self) -> tuple[Finding, ...]:

@@ -184,14 +184,16 @@ def _conditions(
             blocks.append((order, file, block.mean_FZ))
     conditions = _one_step_a_load(conditions, machine.protocol)
     kept = np.flatnonzero(used).tolist()
+    # A protocol, and what departs from it, is told in the slip angles that the machine shows.
+    shown = machine.SA_to_SAE
     placed = [
         plan.Placed(
             file=file.name,
             file_order=order,
             rotation=file.rotation,
-            SA=condition.SA,
+            SA=shown * condition.SA,
             FZ=mean_FZ,
-            step_SA=condition.step_SA,
+            step_SA=None if condition.step_SA is None else shown * condition.step_SA,
             step_FZ=condition.step_FZ,
         )
         for condition, (order, file, mean_FZ) in ((conditions[index], blocks[index]) for index in kept)
@@ -269,7 +271,7 @@ def _condition(
         rotation=file.rotation,
         first_row=rows.start + 1,
         last_row=rows.stop,
-        step_SA=step_SA,
+        step_SA=None if step_SA is None else sign["SA"] * step_SA + 0.0,
         step_FZ=plan.nearest_load(FZ.value, machine.protocol),
         SA=sign["SA"] * SA.value,
         FZ=FZ.value,
@@ -383,7 +385,7 @@ def _at_common_load(conditions: Sequence[Condition]) -> list[Condition]:
 
 
 def _ordered(conditions: Sequence[Condition], machine: Machine) -> tuple[Condition, ...]:
-    steps = {step: place for place, step in enumerate(machine.protocol.slip_angles_rad)}
+    steps = {machine.SA_to_SAE * step: place for place, step in enumerate(machine.protocol.slip_angles_rad)}
 
     def key(c: Condition) -> tuple[bool, bool, int, float, str]:
         place = len(steps) if c.step_SA is None else steps[c.step_SA]

@@ -99,7 +99,7 @@ def content_hash(result: TestResult, *, before_intervals: bool = False) -> str:
     ]:  # nor has a test of a hub that measures FY and MZ alone
         if not condition["hub"]:
             del condition["hub"]
-    for name in ("stated", "machine_title"):  # a file from before there were any keeps its hash
+    for name in ("stated", "machine_title", "definition"):  # a file from before there were any keeps its hash
         if not content["reduced"][name]:
             del content["reduced"][name]
     for name in ("draft_reasons", "since"):  # and one of a record in force has the hash of before too

@@ -156,6 +156,7 @@ def _result(sheets: dict[str, list[Cells]], items: Cells) -> TestResult:
         protocol=items["protocol"],
         machine_title=items.get("machine_title", ""),
         stated=_stated(items),
+        definition="\n".join(_numbered(items, "definition")),
     )
     return TestResult(reduced=reduced, characteristics=_characteristics(sheets, reduced))
 

@@ -197,6 +197,9 @@ def _provenance(result: TestResult, digest: str) -> Rows:
     yield ("averaging", reduced.averaging)
     yield ("protocol", reduced.protocol)
     yield ("machine_title", reduced.machine_title)
+    if reduced.definition:  # by lines: a cell holds no more than some ten thousand characters
+        lines = reduced.definition.split("\n")
+        yield from ((f"definition.{number}", text) for number, text in enumerate(lines, start=1))
     use = reduced.calibration
     if use.mark is not None:
         yield (str(use.word or "MARK"), use.mark)

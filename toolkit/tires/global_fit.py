@@ -16,6 +16,7 @@ from toolkit.errors import FitError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.reduction.selection import Selection, of_one_condition
+from toolkit.tires.between_loads import Between
 from toolkit.tires.global_data import CHANNELS, Measured, binned, cell, what_varies
 from toolkit.tires.global_model import (
     GlobalFit,
@@ -111,6 +112,7 @@ class Report:
             starts_agreeing=stage.agreeing,
             converged=converged,
             message=self._message(channel, joint, stage, own, converged, at_bound),
+            departure=Between(self.model, self.data, (channel,)).departure(self.values.tolist(), channel),
         )
 
     def _loads(self, channel: str, residual: Array, stage: StageFit) -> tuple[LoadShare, ...]:
@@ -179,6 +181,8 @@ class Report:
             )
         if at_bound:
             parts.append(f"at its bound: {', '.join(at_bound)}")
+        if stage.kept:
+            parts.append(f"kept physical between the measured loads: {', '.join(stage.kept)}")
         if joint:
             parts.append("FY and MZ were fitted together")
         elif channel == "MZ" and not self.model.moment_alone:
@@ -193,6 +197,7 @@ class Report:
 
 WEIGHTS = ("equal", "noise")
 _INNER, _LEAST = 20_000, 120  # rows x inner points of a search, and rows that it has at least
+_ASKED_FOR = (0.25, 0.5)  # rows ask for a swing whose want costs such a share of the error, and so many %
 _PREDICT_FROM = 3  # load blocks, so that two are left
 
 
@@ -248,7 +253,10 @@ def selection_of(data: Measured, model: GlobalModel) -> Selection:
 
 
 def global_findings(fit: ModelFit) -> list[Finding]:
-    """Return a finding for each channel whose minimum is not confirmed, a note for what data do not say."""
+    """Return what stands against each channel: a minimum that is not confirmed, a swing between the loads.
+
+    Notes tell what the data do not determine, and what ended at a bound.
+    """
     findings = []
     for channel_fit in fit.fits:
         where = f"{channel_fit.model} {channel_fit.channel} over all loads"
@@ -257,6 +265,13 @@ def global_findings(fit: ModelFit) -> list[Finding]:
         if channel_fit.converged and (open_ := undetermined(channel_fit)):
             text = f"not determined by these data: {', '.join(open_)}"
             findings.append(Finding(rule="not-determined", where=where, message=text, level="note"))
+        if (at := channel_fit.departure) is not None and at.too_large:
+            text = (
+                f"at {at.load_N:.0f} N, between the measured loads of {at.low_N:.0f} and {at.high_N:.0f} N, "
+                f"{at.channel} departs by {100 * at.share:.0f} % of its largest value from what the measured "
+                "loads suggest"
+            )
+            findings.append(Finding(rule="between-loads", where=where, message=text))
         if channel_fit.at_bound:
             text = f"{', '.join(channel_fit.at_bound)}: the search ended at the bound"
             findings.append(Finding(rule="at-bound", where=where, message=text, level="note"))
@@ -374,7 +389,25 @@ class _Fitter:
             starts=np.concatenate([np.array(more).reshape(-1, len(self.values)), self.starts]),
             sigma=self.sigma.get(channels[0]), robust=robust,
         )  # fmt: skip
-        return run(task, coarse, count, width)
+        fit = run(task, coarse, count, width)
+        # Most fits are physical between the rows of themselves; the others are searched again, kept so.
+        between = self._between(channels)
+        if not (left := between.left(fit.values.tolist())) or self.model.grid > 1:
+            return fit
+        again = run(replace(task, between=between), coarse, count, width)
+        # What physics does not forbid, rows may ask for.
+        before, after = self._error(channels, fit), self._error(channels, again)
+        if set(left) <= set(channels) and after - before > max(_ASKED_FOR[0] * before, _ASKED_FOR[1]):
+            return fit
+        return replace(again, kept=left)
+
+    def _error(self, channels: tuple[str, ...], fit: StageFit) -> float:
+        """Return the root mean square of the residuals over that of the rows [%], of the worst channel."""
+        curves = self._curves(fit.values, self.data)
+        return max(pooled_percent(curves[name] - self.given[name], self.given[name]) for name in channels)
+
+    def _between(self, channels: tuple[str, ...]) -> Between:
+        return Between(self.model, self.data, channels)
 
     def _bins(self, data: Measured) -> tuple[Measured, Array, float]:
         # A model with many inner points is searched on fewer bins.
@@ -433,4 +466,8 @@ class _Fitter:
             model=self.model, data=data, channels=channels, values=self.values, free=free,
             starts=self.starts, sigma=self.sigma.get(channels[0]), robust=self.loss == "robust",
         )  # fmt: skip
-        return refit(task, coarse, count)
+        values = refit(task, coarse, count)
+        between = self._between(channels)
+        if self.model.grid == 1 and between.left(values.tolist()):
+            return refit(replace(task, between=between), coarse, count)
+        return values

@@ -259,6 +259,43 @@ class Seeds:
         return float(np.exp(base)), change
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Factor:
+    """A factor of a model's equations whose bounds hold at every load, camber and pressure of the data.
+
+    A factor that changes its sign between two measured loads leaves the model's curves at these loads as they
+    are, where the equation is even in it, and makes something else of all loads between. ``low`` and ``high``
+    are the bounds that its parameter has at the nominal load, ``size`` a change that matters.
+    """
+
+    name: str
+    stage: Channel
+    low: float
+    high: float
+    size: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Departure:
+    """The largest departure of a channel: at ``load_N`` between two measured ones, as a share of its size."""
+
+    channel: str
+    load_N: float
+    low_N: float
+    high_N: float
+    share: float
+    limit: float
+
+    @property
+    def too_large(self) -> bool:
+        """Whether the rows do not hold the model there."""
+        return self.share > self.limit
+
+
+Factors = Callable[[Sequence[Any], Rows], Mapping[str, Any]]
+"""Values of a model's factors by name at rows, (rows,) or (copies, rows)."""
+
 Forces = Callable[[Sequence[Any], Rows], Responses]
 Starts = Callable[[Seeds], Sequence[Mapping[str, float]]]
 
@@ -271,7 +308,8 @@ class GlobalModel:
     ``grid`` is how many inner points (bristles) a row costs: it bounds how much is asked at once.
     ``moment_alone`` says that MZ does not use what FY's rows determine, so that MZ can be fitted without.
     ``reads`` names what the equations read beside slip angle and load whatever the parameters are: KAPPA, V,
-    IA; what they read by parameters alone follows from those (`variables`).
+    IA; what they read by parameters alone follows from those (`variables`). ``bounded`` are the factors whose
+    values ``factors`` gives; a model whose factors cannot leave their bounds has none.
     """
 
     name: str
@@ -288,6 +326,8 @@ class GlobalModel:
     moment_alone: bool = False
     per_load: bool = False
     reads: tuple[str, ...] = ()
+    bounded: tuple[Factor, ...] = ()
+    factors: Factors | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -347,7 +387,7 @@ class GlobalFit:
     which its parameters are defined. ``fixed`` names parameters that stand at a value which the data did not
     choose, with the reason in words; they count among ``not_determined``, and ``covariance`` holds the
     others, in their order. ``nominal_load_N`` is FNOMIN, at which ``slope_at_zero`` is given.
-    ``starts_agreeing`` ended at the lowest cost.
+    ``starts_agreeing`` ended at the lowest cost. ``departure`` is the largest one between the measured loads.
     """
 
     model: str
@@ -373,6 +413,7 @@ class GlobalFit:
     starts_agreeing: int
     converged: bool
     message: str
+    departure: Departure | None = None
 
     @property
     def load_N(self) -> None:

@@ -26,6 +26,7 @@ from toolkit.tires.global_data import Measured
 from toolkit.tires.global_solver import Box, Descent, descend, descend_each, linearise, spread_starts
 
 if TYPE_CHECKING:
+    from toolkit.tires.between_loads import Between
     from toolkit.tires.global_model import Array, GlobalModel
 
 _SAME = 1e-3  # the files contract: starts that agree in cost to this are at one minimum
@@ -45,7 +46,8 @@ _POLISH = 4_000_000  # rows x inner points x copies that a polish on the rows ma
 class Task:
     """A stage: channels, the free parameters' places, and all values (parameters,) with earlier stages' held.
 
-    ``sigma`` (rows,) standard deviation of a row relative to the others, None where all are alike.
+    ``sigma`` (rows,) standard deviation of a row relative to the others, None where all are alike;
+    ``between`` what keeps the model physical between the rows, None where nothing does.
     """
 
     model: GlobalModel
@@ -56,6 +58,7 @@ class Task:
     starts: Array
     sigma: Array | None = None
     robust: bool = False
+    between: Between | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,7 +70,8 @@ class StageFit:
     so is every parameter: ``covariance`` is the part of the free ones.
     ``fixed`` (place, reason); ``bound`` places at a bound; ``undetermined`` places without a standard error;
     ``time`` autocorrelation time of the residuals; ``dof`` degrees of freedom;
-    ``bin_width`` [rad] of the means that were fitted, zero where the rows were.
+    ``bin_width`` [rad] of the means that were fitted, zero where the rows were; ``kept`` names what was not
+    physical between the rows in a first search, in which it was free to.
     """
 
     values: Array
@@ -83,6 +87,7 @@ class StageFit:
     time: float
     dof: float
     bin_width: float
+    kept: tuple[str, ...] = ()
 
 
 class Misfit:
@@ -93,12 +98,19 @@ class Misfit:
         self.base, self.free, self.scale = task.values.copy(), list(task.free), scale
         self.weight = np.concatenate([weight] * len(self.channels)) if len(weight) == len(data) else weight
         self.y = np.concatenate([data[name] / scale[name] for name in self.channels])
+        self.between = task.between
+        # A tenth beyond what is physical costs as much as all rows would without a model.
+        self.stiff = 10.0 * float(np.sqrt(np.sum(self.weight**2)))
 
-    def raw(self, x: Array) -> Array:
-        """Return unweighted residuals (copies, rows x channels) of free parameters (copies, p)."""
+    def _values(self, x: Array) -> list[float | Array]:
         values: list[float | Array] = list(self.base.tolist())
         for place, column in zip(self.free, x.T, strict=True):
             values[place] = column[:, None]
+        return values
+
+    def raw(self, x: Array) -> Array:
+        """Return unweighted residuals (copies, rows x channels) of free parameters (copies, p)."""
+        values = self._values(x)
         with np.errstate(all="ignore"):
             responses = self.model.forces(values, self.data.rows)
         shape = (len(x), len(self.data))
@@ -107,8 +119,12 @@ class Misfit:
         return np.nan_to_num(r, nan=1e3, posinf=1e3, neginf=-1e3)
 
     def __call__(self, x: Array) -> Array:
-        """Return weighted residuals (copies, rows x channels)."""
-        return self.raw(x) * self.weight
+        """Return weighted residuals (copies, rows x channels), then what is not physical between the rows."""
+        weighted = self.raw(x) * self.weight
+        if self.between is None:
+            return weighted
+        excess = self.between.excess(self._values(x), len(x))
+        return np.concatenate([weighted, self.stiff * excess], axis=1)
 
     def box(self) -> Box:
         """Return bounds and sizes of the free parameters."""
@@ -310,9 +326,9 @@ def _noise(rows: Misfit, x: Array) -> tuple[float, float, float]:
     # Autocorrelation time, variance of a row of weight one with it, degrees of freedom.
     if rows.free:
         residual, J = linearise(rows, x, rows.box())
-        r, columns = residual[0], J[0]
+        r, columns = residual[0, : len(rows.y)], J[0, :, : len(rows.y)]
     else:
-        r, columns = rows(x)[0], np.zeros((0, len(rows.y)))
+        r, columns = rows(x)[0, : len(rows.y)], np.zeros((0, len(rows.y)))
     channels = len(rows.channels)
     time = max(
         autocorrelation_time(part, own)
@@ -329,6 +345,7 @@ def _covariance(misfit: Misfit, x: Array, variance: float) -> tuple[Array, Array
     if not len(misfit.free):
         return np.zeros((0, 0)), np.zeros(0)
     _, J = linearise(misfit, x, box, fine=True)
+    J = J[:, :, : len(misfit.y)]  # a bound is no measurement
     information = J[0] @ J[0].T / variance
     information += np.diag(12.0 * (box.size / (box.high - box.low)) ** 2)
     unit = 1.0 / np.sqrt(np.diag(information))

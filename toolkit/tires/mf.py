@@ -11,6 +11,7 @@ of the field (Pacejka 2012, appendix 3, prints typical sets; Besselink et al. 20
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.channels import Axes, signs
-from toolkit.tires.global_model import Responses, parameters
+from toolkit.tires.global_model import Factor, Factors, Responses, parameters
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine, state
 
@@ -251,6 +252,67 @@ def mf_forces(parameters: Sequence[GlobalParameter], evaluator: Evaluator) -> An
         return Responses(FY=responses.FY, MZ=responses.MZ, FX=responses.FX)
 
     return forces
+
+
+# name, parameter that has its bounds at the nominal load, text
+_FACTORS = """
+mu_y PDY1 friction of FY
+K_y  PKY1 largest cornering stiffness
+L_y  PKY2 load of the largest cornering stiffness
+E_y  PEY1 curvature of FY
+B_t  QBZ1 slope of the trail
+D_t  QDZ1 size of the trail
+E_t  QEZ1 curvature of the trail
+mu_x PDX1 friction of FX
+K_x  PKX1 slip stiffness
+E_x  PEX1 curvature of FX
+"""
+
+
+def mf_bounded(parameters: Sequence[GlobalParameter]) -> tuple[Factor, ...]:
+    """Return the factors of FX, FY and MZ that must stay within bounds (Besselink et al. 2010).
+
+    Above 1 the equations take a curvature E for 1 by themselves: it cannot be too large, and a fit may rest
+    on that limit at some of its loads.
+    """
+    by_name = {parameter.name: parameter for parameter in parameters}
+    lines = [line.split(maxsplit=2) for line in filter(None, _FACTORS.splitlines())]
+    return tuple(
+        Factor(
+            name=name, stage=by_name[like].stage, low=by_name[like].low, size=by_name[like].size, text=text,
+            high=math.inf if name.startswith("E_") else by_name[like].high,
+        )
+        for name, like, text in lines
+    )  # fmt: skip
+
+
+def mf_factors(parameters: Sequence[GlobalParameter]) -> Factors:
+    """Return the function ``factors(values, rows)`` of a version; 5.2 is 6.1 without pressure."""
+    names = tuple(parameter.name for parameter in parameters)
+
+    def factors(values: Sequence[Any], rows: Rows) -> Mapping[str, Any]:
+        p: Mapping[str, Any] = dict(zip(names, values, strict=True))
+        q, c = mf_state(rows), readers(p)[0]
+        squared, leaned = q.g * q.g, np.abs(q.g)
+        return {
+            "mu_y": (c("PDY1") + c("PDY2") * q.df) * (1 + c("PPY3") * q.dp + c("PPY4") * q.dp**2)
+            * (1 - c("PDY3") * squared),
+            "K_y": c("PKY1") * (1 + c("PPY1") * q.dp) * (1 - c("PKY3") * leaned),
+            "L_y": (c("PKY2") + c("PKY5") * squared) * (1 + c("PPY2") * q.dp),
+            "E_y": (c("PEY1") + c("PEY2") * q.df) * (1 + c("PEY5") * squared),
+            "B_t": (c("QBZ1") + c("QBZ2") * q.df + c("QBZ3") * q.df**2)
+            * (1 + c("QBZ4") * q.g + c("QBZ5") * leaned),
+            "D_t": (c("QDZ1") + c("QDZ2") * q.df) * (1 - c("PPZ1") * q.dp)
+            * (1 + c("QDZ3") * q.g + c("QDZ4") * squared),
+            "E_t": c("QEZ1") + c("QEZ2") * q.df + c("QEZ3") * q.df * q.df,
+            "mu_x": (c("PDX1") + c("PDX2") * q.df) * (1 + c("PPX3") * q.dp + c("PPX4") * q.dp**2)
+            * (1 - c("PDX3") * squared),
+            "K_x": (c("PKX1") + c("PKX2") * q.df) * np.exp(c("PKX3") * q.df)
+            * (1 + c("PPX1") * q.dp + c("PPX2") * q.dp**2),
+            "E_x": c("PEX1") + c("PEX2") * q.df + c("PEX3") * q.df**2,
+        }  # fmt: skip
+
+    return factors
 
 
 def mf_state(rows: Rows) -> State:

@@ -137,10 +137,23 @@ def rows_of_tests(
             continue
         yield row | {
             "date": stated.date,
-            "machine": stated.machine,
+            "machine": _name_of_machine(stated.machine, toml.parent),
             "tire": stated.tire.size if stated.tire is not None else None,
             "state": "reported" if sha256_bytes(data) in reported else "no report",
         }
+
+
+def _name_of_machine(stated: str, folder: Path) -> str:
+    """Return the name of a test's machine, which its definition has where ``test.toml`` names a file."""
+    from toolkit.errors import ToolkitError
+    from toolkit.machine import load_machine
+
+    if not stated.endswith(".toml"):
+        return stated
+    try:
+        return load_machine(str(folder / stated)).name
+    except ToolkitError:
+        return stated  # what is wrong with it is said where the test is read
 
 
 def _marks() -> Mapping[Kind, frozenset[str]]:

@@ -87,7 +87,6 @@ def plan_test(
     from datetime import date
 
     from toolkit.lab.plans.plan_sheets import protocol_sheet, sheet_text, write_plan
-    from toolkit.machine import load_machine
     from toolkit.planning.demands import parse_demand
     from toolkit.planning.printed_units import units_of
     from toolkit.planning.protocol_plan import plan_protocol
@@ -102,7 +101,7 @@ def plan_test(
     _refuse_endless(order)
     tell("the earlier test")
     tires, like, tire = _tires(order, spread)
-    own = load_machine(tires[0].machine.name)
+    own = tires[0].machine
     tread = dataclasses.replace(
         Tread.of(own, tires, between_files_s=order.between_files_s),
         energy_J=1e3 * order.sliding_kJ, rise_K=order.rise_K,
@@ -188,7 +187,6 @@ def _earlier(order: ProtocolOrder, like: Path | None) -> tuple[EarlierTest, str,
 
 
 def _of(resolved: Resolved, where: str) -> EarlierTest:
-    from toolkit.machine import load_machine
     from toolkit.planning.expectation import earlier_test
 
     reduced = resolved.result.reduced
@@ -199,8 +197,7 @@ def _of(resolved: Resolved, where: str) -> EarlierTest:
             expected="a test whose values are a tire's", next_step="'toolkit process' names the rows",
             rule="plan-like",
         )  # fmt: skip
-    machine = load_machine(reduced.info.machine)
-    return earlier_test(resolved.result, machine=machine, record=resolved.record)
+    return earlier_test(resolved.result, machine=reduced.machine(), record=resolved.record)
 
 
 def _virtual(order: ProtocolOrder, like: Path | None) -> EarlierTest:
@@ -373,14 +370,17 @@ def _files(plan: ProtocolPlan, own: Machine, tire: Path | None, out: Path) -> di
     """Return the protocol, and what the virtual machine runs of it, by the names of their files."""
     from datetime import date
 
+    from toolkit.machine import load_machine, machine_names
     from toolkit.machine.default import SIMULATED_MACHINE
     from toolkit.planning.protocol_plan import protocol_text, simulation_text
 
-    twin = own.name if own.simulated else SIMULATED_MACHINE
+    # A plan file names its machine; one of its own definition has no name that could be found again.
+    twin = own.name if own.simulated and own.name in machine_names() else SIMULATED_MACHINE
+    turn = own.SA_to_SAE * load_machine(twin).SA_to_SAE
     own_tire = None if tire is None else Path(os.path.relpath(real_path(tire), real_path(out))).as_posix()
     return {
         PROTOCOL: protocol_text(plan, own.protocol),
-        SIMULATION: simulation_text(plan, machine=twin, on=date(2026, 3, 17), tire=own_tire),
+        SIMULATION: simulation_text(plan, machine=twin, on=date(2026, 3, 17), tire=own_tire, turn=turn),
     }
 
 

@@ -101,14 +101,13 @@ def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
 
     from toolkit.comparison.compare import test_entry
     from toolkit.lab.tire_tests.resolve import resolve_test
-    from toolkit.machine import load_machine
 
     resolved = resolve_test(path, **options)
     reduced = resolved.result.reduced
     entry = test_entry(
         reduced,
         resolved.result.characteristics,
-        machine=load_machine(reduced.info.machine),
+        machine=reduced.machine(),
         record=resolved.record,
         source=str(path),
     )

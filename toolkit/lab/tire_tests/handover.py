@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.findings import Finding
     from toolkit.lab.tire_tests.resolve import Resolved
+    from toolkit.lab.tire_tests.tire_files import TestTire
     from toolkit.recording.folder import ReportDetails
     from toolkit.report.diagnosis.answer import Told
 
@@ -42,16 +43,16 @@ def details_of(test: Path, file: Path | None) -> ReportDetails:
 
 
 def writers(
-    resolved: Resolved, test: Path, *, xlsx: bool, tydex: bool, tir: bool
+    resolved: Resolved, test: Path, *, xlsx: bool, tydex: bool, tire: TestTire | None
 ) -> dict[str, Callable[[Path], object]]:
-    """Return the functions that write the files asked for, by name."""
+    """Return the functions that write the files asked for, by name; a ``tire`` is one of the test."""
     files: dict[str, Callable[[Path], object]] = {}
     if xlsx:
         files[WHOLE] = partial(_whole, resolved, test)
     if tydex:
         files[TYDEX] = partial(_tydex, resolved)
-    if tir:
-        files[TIR] = partial(_tir, resolved)
+    if tire is not None:
+        files[TIR] = partial(tire.write, comments=_comments(resolved))
     return files
 
 
@@ -210,12 +211,6 @@ def _directions(rotations: Sequence[str]) -> str:
         parts.append(f"rows {first} to {last} {rotation}")
         first = last + 1
     return f"{', '.join(parts)}; the axes follow the travel"
-
-
-def _tir(resolved: Resolved, path: Path) -> None:
-    from toolkit.lab.tire_tests.tire_files import write_test_tir
-
-    write_test_tir(path, resolved.result.reduced, comments=_comments(resolved))
 
 
 def _comments(resolved: Resolved) -> list[str]:

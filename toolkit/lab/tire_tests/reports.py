@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.lab.signatures.issuing import Issuing
     from toolkit.lab.tire_tests.resolve import Resolved
+    from toolkit.lab.tire_tests.tire_files import TestTire
     from toolkit.report.deliver import Delivered, Job
     from toolkit.report.diagnosis.answer import Told
     from toolkit.report.drawer import Drawer
@@ -166,10 +167,11 @@ def make_reports(
             if options.models:
                 step(f"{test.name}: tire models")
             result, comparison = _compared(test, result, options.models)
+            result, tire = _with_tire(result, options)
             if options.diagnosis:
                 tie_findings = diagnosis_findings(options.diagnosis[0].answer, result, test)
                 result = replace(result, findings=(*result.findings, *tie_findings))
-            jobs.append(_job(test, result, folder, options, comparison))
+            jobs.append(_job(test, result, folder, options, comparison, tire))
             resolved.append(result)
         except ToolkitError as error:
             if len(tests) == 1:
@@ -227,8 +229,23 @@ def _compared(test: Path, resolved: Resolved, models: tuple[str, ...]) -> tuple[
     return replace(resolved, findings=(*resolved.findings, *fit_findings)), fitted.comparison
 
 
+def _with_tire(resolved: Resolved, options: Options) -> tuple[Resolved, TestTire | None]:
+    """Return the tire that is handed over, if one is, and the test with what was found of its fit."""
+    from toolkit.lab.tire_tests.tire_files import fit_test_tire
+
+    if not options.tir:
+        return resolved, None
+    tire = fit_test_tire(resolved.result.reduced)
+    return replace(resolved, findings=(*resolved.findings, *tire.findings())), tire
+
+
 def _job(
-    test: Path, resolved: Resolved, folder: Path, options: Options, comparison: Comparison | None
+    test: Path,
+    resolved: Resolved,
+    folder: Path,
+    options: Options,
+    comparison: Comparison | None,
+    tire: TestTire | None = None,
 ) -> Job:
     from toolkit.calibration.registry.registry import instrument_of
     from toolkit.lab.tire_tests.handover import details_of, provenance, writers
@@ -262,7 +279,7 @@ def _job(
         template=options.template,
         content=content,
         out=folder,
-        extras=writers(resolved, test, xlsx=options.xlsx, tydex=options.tydex, tir=options.tir),
+        extras=writers(resolved, test, xlsx=options.xlsx, tydex=options.tydex, tire=tire),
         provenance=provenance(resolved, test, diagnosis=options.diagnosis and options.diagnosis[1]),
     )
 

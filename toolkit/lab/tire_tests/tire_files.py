@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.channels import Rotation
     from toolkit.machine.definition import Drum
     from toolkit.reduction.model import ReducedTest
     from toolkit.tires.global_data import Measured
@@ -133,8 +135,34 @@ def _road_note(road: Drum, radius_m: float | None) -> str:
     )
 
 
-def write_test_tir(path: Path, reduced: ReducedTest, *, comments: Sequence[str]) -> ModelFit:
-    """Write MF 6.1 over all loads of a test's first direction, and return the fit.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TestTire:
+    """MF 6.1 over all loads of a test's first direction, and the rows that it was fitted to."""
+
+    __test__ = False  # not a pytest class
+
+    fit: ModelFit
+    data: Measured
+    rotation: Rotation
+
+    def write(self, path: Path, comments: Sequence[str]) -> None:
+        """Write the tire file."""
+        from toolkit.tires.models.mf61 import MODEL
+        from toolkit.tires.tir_write import tire_fit, write_tir
+
+        write_tir(path, tire_fit(MODEL, self.fit, self.data), comments=[*comments, f"drum {self.rotation}"])
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what should be known of the fit by those who are given the file."""
+        from toolkit.tires.global_fit import global_findings
+
+        return tuple(
+            replace(finding, where=f"tire file, {finding.where}") for finding in global_findings(self.fit)
+        )
+
+
+def fit_test_tire(reduced: ReducedTest) -> TestTire:
+    """Return MF 6.1 over all loads of a test's first direction.
 
     The radius is that of the tire's size.
 
@@ -151,7 +179,6 @@ def write_test_tir(path: Path, reduced: ReducedTest, *, comments: Sequence[str])
     from toolkit.tires.global_data import measured, what_varies
     from toolkit.tires.global_fit import fit_global
     from toolkit.tires.models.mf61 import MODEL
-    from toolkit.tires.tir_write import tire_fit, write_tir
 
     groups = group(reduced)
     run = [block for block in groups if block.rotation == groups[0].rotation]
@@ -176,5 +203,4 @@ def write_test_tir(path: Path, reduced: ReducedTest, *, comments: Sequence[str])
             rule="one-load",
         )
     fit = fit_global(MODEL, data, predict=False)
-    write_tir(path, tire_fit(MODEL, fit, data), comments=[*comments, f"drum {run[0].rotation}"])
-    return fit
+    return TestTire(fit=fit, data=data, rotation=run[0].rotation)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import summary
+from toolkit.errors import ConfigError
 from toolkit.estimate import plus_minus
 from toolkit.machine import load_machine
 from toolkit.machine.default import DEFAULT_MACHINE
@@ -89,6 +91,14 @@ def _unit(name: str, description: str, unit: str) -> DeclaredValue[ReportedTest]
     )
 
 
+def _machine(t: ReportedTest, _style: Style) -> str:
+    # By a definition of its own a test names the path of a file, which is of no use to whom it is sent to.
+    try:
+        return t.result.reduced.machine().name
+    except ConfigError:
+        return Path(t.info.machine).stem
+
+
 _text, _number, _date = REPORT.text, REPORT.number, REPORT.date
 VALUES = (
     _text("test.name", "name of the test", lambda t, _: t.info.name),
@@ -96,11 +106,11 @@ VALUES = (
     _text("test.requestor", "requestor (customer)", lambda t, _: t.info.requestor),
     _text("test.special", "what is special about the test", lambda t, _: t.info.special),
     _text("test.surface", "surface of the road", lambda t, _: t.info.surface),
-    _text("test.machine", "name of the test machine", lambda t, _: t.info.machine),
+    _text("test.machine", "name of the test machine", _machine),
     _text(
         "machine.title",
         "the test machine as its definition calls it, else its name",
-        lambda t, _: t.result.reduced.machine_title or t.info.machine,
+        lambda t, style: t.result.reduced.machine_title or _machine(t, style),
     ),
     _text("test.pressure", "test pressure in psi and bar", _pressure),
     _text("test.loads", "the loads of the test, means of the blocks", _loads),
@@ -120,7 +130,7 @@ VALUES = (
     _text(
         "calibration.instrument",
         "instrument of the calibration record",
-        lambda t, _: t.record.instrument if t.record else t.info.machine,
+        lambda t, style: t.record.instrument if t.record else _machine(t, style),
     ),
     _text("calibration.status", "verified, unverified, or not approved and why", lambda t, _: t.use.status),
     _text("report.id", "id of the report, made from its inputs", lambda t, _: report_id(t.result, t.details)),

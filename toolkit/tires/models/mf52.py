@@ -22,6 +22,8 @@ from toolkit.tires.mf import (
     equivalent,
     kappa_force,
     longitudinal,
+    mf_bounded,
+    mf_factors,
     mf_forces,
     mf_starts,
     weight_x,
@@ -98,4 +100,6 @@ MODEL = GlobalModel(
     parameters=MF52,
     forces=mf_forces(MF52, forces),
     starts=mf_starts,
+    bounded=mf_bounded(MF52),
+    factors=mf_factors(MF52),
 )

@@ -25,6 +25,8 @@ from toolkit.tires.mf import (
     equivalent,
     kappa_force,
     longitudinal,
+    mf_bounded,
+    mf_factors,
     mf_forces,
     mf_starts,
     weight_x,
@@ -167,4 +169,6 @@ MODEL = GlobalModel(
     parameters=MF61,
     forces=mf_forces(MF61, forces),
     starts=mf_starts,
+    bounded=mf_bounded(MF61),
+    factors=mf_factors(MF61),
 )

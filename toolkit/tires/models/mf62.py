@@ -6,7 +6,7 @@ For FX, FY and MZ its equations are those of 6.1 (`toolkit.tires.models.mf61`); 
 from __future__ import annotations
 
 from toolkit.tires.global_model import GlobalModel
-from toolkit.tires.mf import MF61, mf_forces, mf_starts
+from toolkit.tires.mf import MF61, mf_bounded, mf_factors, mf_forces, mf_starts
 from toolkit.tires.models.mf61 import forces
 
 MODEL = GlobalModel(
@@ -19,4 +19,6 @@ MODEL = GlobalModel(
     parameters=MF61,
     forces=mf_forces(MF61, forces),
     starts=mf_starts,
+    bounded=mf_bounded(MF61),
+    factors=mf_factors(MF61),
 )

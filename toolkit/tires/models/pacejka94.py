@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.tires.global_model import GlobalModel, Responses, parameters
+from toolkit.tires.global_model import Factor, GlobalModel, Responses, parameters
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import nonzero, sine
 
@@ -115,6 +115,29 @@ def aligning(c: Sequence[Any], F: Array, slip: Array, g: Array) -> Array:
     return as_array(D * sine(BCD / nonzero(c[0] * D), c[0], E, x) + V)
 
 
+# D alone has no sign in D sin(C arctan(BCD x / (C D))): it must keep that of BCD, and so B its own.
+BOUNDED = (
+    Factor(
+        name="D_y", stage="FY", low=50.0, high=3000.0, size=100.0, text="friction of FY, in thousandths"
+    ),
+    Factor(
+        name="1/BC_z", stage="MZ", low=0.02, high=200.0, size=1.0,
+        text="slip angle of MZ: its largest value over its stiffness",
+    ),
+)  # fmt: skip
+
+
+def factors(values: Sequence[Any], rows: Rows) -> Mapping[str, Any]:
+    """Return the factors of `BOUNDED` at rows: a1 FZ + a2 [N/kN], D / BCD of the moment [deg]."""
+    F, g = rows.FZ / 1000.0, np.degrees(rows.IA)
+    a, c = values[:_SPLIT], values[_SPLIT:]
+    stiffness = (c[3] * F + c[4]) * np.maximum(1 - c[6] * np.abs(g), 0.05) * np.exp(-c[5] * F)
+    return {
+        "D_y": (a[1] * F + a[2]) * (1 - a[15] * g * g),
+        "1/BC_z": (c[1] * F + c[2]) * (1 - c[18] * g * g) / nonzero(as_array(stiffness)),
+    }
+
+
 def starts(seeds: Seeds) -> Sequence[Mapping[str, float]]:
     """Return starts: a1, a2, a3, a4, c1 to c4 from the curves of each load, shapes tried."""
     F = seeds.load / 1000.0
@@ -156,4 +179,6 @@ MODEL = GlobalModel(
     forces=forces,
     starts=starts,
     moment_alone=True,
+    bounded=BOUNDED,
+    factors=factors,
 )
