@@ -183,3 +183,17 @@ def test_the_page_of_inputs_has_every_limit() -> None:
     page = (EXAMPLES.parents[1] / "docs" / "inputs.md").read_text(encoding="utf-8").partition("\n## ")[0]
     stated = {size_of(text) for text in re.findall(r"\| (\d+ MB)", page)}
     assert stated == {form.limit for form in FORMS if form.title != "the PDF"}
+
+
+def test_a_folder_in_a_files_place_is_told_with_what_lies_in_it(tmp_path: Path) -> None:
+    for name in ("SESSION.toml", "loads.csv", ".hidden"):
+        (tmp_path / name).write_text("x")
+    with pytest.raises(ToolkitError) as caught:
+        read_input(tmp_path, SETTINGS_FILE)
+    assert (caught.value.rule, caught.value.got) == (
+        "folder-for-file",
+        "a folder with SESSION.toml, loads.csv",
+    )
+    with pytest.raises(ToolkitError) as caught:
+        read_input(tmp_path / "none", SETTINGS_FILE)
+    assert caught.value.rule == "no-file"

@@ -15,6 +15,7 @@ from typing import Any, TypeGuard
 
 from toolkit.errors import ConfigError, OutputError
 from toolkit.inputs import SETTINGS_FILE, open_regular, read_input
+from toolkit.printable import check_entries
 from toolkit.system import sync_file, sync_folder
 
 _AT_ONCE = 2**20
@@ -140,17 +141,21 @@ def as_written(text: str) -> float:
     return _Beyond(text) if math.isinf(number) and text.lstrip("+-") != "inf" else number
 
 
-def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
+def parse_toml(data: bytes, *, where: object, entered: bool = False) -> dict[str, Any]:
     """Parse the content of a TOML file; ``where`` names it in the message.
+
+    ``entered``: the laboratory keeps the file already. What it says is read as it is, whatever its texts
+    have: today's rules of what may enter make no record of the past unreadable.
 
     Raises
     ------
     ConfigError
-        ``not-toml``
+        ``not-toml``; ``unprintable``: a text or a key with a character that no document can print
     """
     try:
         # Editors of Windows begin a file with a mark.
-        return tomllib.loads(data.decode("utf-8-sig"), parse_float=as_written)
+        text = data.decode("utf-8-sig")
+        entries = tomllib.loads(text, parse_float=as_written)
     except (ValueError, RecursionError) as error:  # a number of thousands of digits, arrays without end
         twice = "Cannot overwrite" in str(error) or "Cannot declare" in str(error)
         raise ConfigError(
@@ -161,6 +166,9 @@ def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
             next_step="mend the line that is named",
             rule="not-toml",
         ) from error
+    if not entered:
+        check_entries(entries, where=where, source=text)
+    return entries
 
 
 def real_path(path: Path) -> Path:

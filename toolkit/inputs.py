@@ -30,6 +30,8 @@ from toolkit.errors import (
 from toolkit.system import WITHOUT_WAITING
 
 MIB = 2**20
+_NO_FILE = "no-file"
+_LISTED = 6  # names of a folder in an error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +46,7 @@ class Form:
     limit: int
     reason: str
     error: type[ToolkitError] = UnreadableError
-    rule: str = "no-file"
+    rule: str = _NO_FILE
     expected: str = "a readable file"
     next_step: str = "check the path and its permissions"
 
@@ -315,6 +317,12 @@ def unreadable(path: Path, form: Form, error: OSError | ValueError) -> ToolkitEr
             next_step="check that it is the file that was meant; --max-size SIZE reads a larger one",
             rule="too-large",
         )
+    if form.rule == _NO_FILE and _is_folder(path):
+        return form.error(
+            f"{form.title} is a folder", where=path, got=_listed(path),
+            expected=f"{form.expected}, not the folder that it lies in",
+            next_step="name the file in the folder", rule="folder-for-file",
+        )  # fmt: skip
     return form.error(
         f"{form.title} cannot be read",
         where=path,
@@ -323,6 +331,21 @@ def unreadable(path: Path, form: Form, error: OSError | ValueError) -> ToolkitEr
         next_step=form.next_step,
         rule=form.rule,
     )
+
+
+def _is_folder(path: Path) -> bool:
+    with contextlib.suppress(OSError, ValueError):
+        return path.is_dir()
+    return False
+
+
+def _listed(folder: Path) -> str:
+    """Return the first names in a folder, for people."""
+    with contextlib.suppress(OSError):
+        names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+        return f"a folder with {', '.join(names[:_LISTED])}{more}" if names else "an empty folder"
+    return "a folder"
 
 
 def open_regular_to_append(path: Path) -> BinaryIO:

@@ -85,7 +85,7 @@ def process(
     machine = machine_of(folder, protocol)
     speeds = dict(folder.sweeps)
     named = [
-        (recording.path.relative_to(folder.folder).as_posix(), recording, folder.rotation_of(recording.path))
+        (recording.name_in(folder.folder), recording, folder.rotation_of(recording.path))
         for recording in recordings
     ]
     settled = [entry for entry in named if entry[1].path not in speeds]

@@ -184,3 +184,12 @@ def test_the_first_line_answers_in_console_page_and_json_and_tables_fit_80_colum
     head = lines[: lines.index("")]
     assert " ".join(head) == f"{sentence}."
     assert all(len(line) <= 80 for line in lines[: lines.index("", len(head) + 1)])
+
+
+def test_a_record_that_nobody_had_approved_on_the_day_of_knowledge_is_named(archive):
+    """In 1970 nobody had approved a record of the machine; m15-r2, which serves, was on 31 December 2019."""
+    words = ("--known-at", "1970-06-01")
+    assert json.loads(run(archive, *words, "--json").stdout)["approved_later"] == {"m15-r2": "2019-12-31"}
+    text = " ".join(run(archive, *words).stdout.split())
+    assert "m15-r2: approved on 2019-12-31, after 1970-06-01: no earlier approval serves" in text
+    assert json.loads(run(archive, "--known-at", "2026-06-01", "--json").stdout)["approved_later"] == {}

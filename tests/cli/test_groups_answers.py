@@ -24,6 +24,7 @@ from toolkit.lab.home import packaged_home
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import simulate
 from toolkit.simulation.write import write_test
+from toolkit.version import __version__
 
 CALIBRATIONS = packaged_home() / "calibrations"
 FIG = packaged_home() / "toolkit" / "examples" / "fig4_4" / "M15_fig4_4.xlsx"
@@ -177,3 +178,12 @@ def test_options_of_a_class_are_options_of_the_command(capsys: pytest.CaptureFix
     command(["4", "-q"], standalone_mode=False)
     assert capsys.readouterr().out == ""
     assert seen == [(3, None, Output(json=True)), (4, None, Output(quiet=True))]
+
+
+def test_every_document_of_json_has_its_schema(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["explain", "--answer", "process"], ["explain", "--answer", "evaluate"], ["--version"]):
+        with pytest.raises(SystemExit) as caught:
+            run([*words, "--json"])
+        document = json.loads(capsys.readouterr().out)
+        assert (caught.value.code, document["schema"]) == (0, 1)
+    assert document == {"schema": 1, "version": __version__}

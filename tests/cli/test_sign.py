@@ -330,12 +330,22 @@ def test_the_agents_key_is_the_one_that_may_sign(run: Run) -> None:
     assert (code, "do not say who signs" in error) == (2, True), "two heads: nobody guesses"
 
 
-def test_what_would_move_the_cursor_is_shown_as_letters(run: Run) -> None:
-    reason = "a\x1b[2Jb\u202ec"
-    assert run(*DECISION[:-1], reason, "--request", "../r.json")[0] == 0
-    _, _, shown = run("sign", "../r.json", "--key", "../keys/anna", "--yes")
-    assert "\\u001b[2Jb\\u202ec" in shown
-    assert "\x1b" not in shown
+@pytest.mark.parametrize("reason", ["a\x1b[2Jb", "b\u202ec", "\udcff", "\x08"])
+def test_what_no_document_can_print_is_neither_requested_nor_signed(
+    run: Run, tmp_path: Path, reason: str
+) -> None:
+    code, _, error = run(*DECISION[:-1], reason, "--request", "../r.json")
+    assert (code, "no document can print" in error) == (2, True)
+    assert run(*DECISION, "--request", "../r.json")[0] == 0
+    # The same in a request that no command wrote: as an escape of JSON it is in no word of a command.
+    request = next(tmp_path.rglob("r.json"))
+    parts = json.loads(request.read_text(encoding="utf-8"))
+    body = json.loads(parts["message"]) | {"reason": reason}
+    parts["message"] = json.dumps(body, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+    request.write_text(json.dumps(parts), encoding="utf-8")
+    code, _, shown = run("sign", "../r.json", "--key", "../keys/anna", "--yes")
+    assert (code, "no document can print" in shown) == (2, True)
+    assert reason not in shown
 
 
 def test_a_rehearsal_in_a_laboratory_with_people_needs_no_key(run: Run, tmp_path: Path) -> None:

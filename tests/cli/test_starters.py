@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.declared.test_describe_filled_in import Lines, without_sign
+from toolkit.calibration.session.read import read_session
 from toolkit.cli.main import run
 from toolkit.declared import read
+from toolkit.declared.describe import asked_of, filled_in
 from toolkit.diagnosis.case.reader import read_case
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.lab.home import packaged_home
 from toolkit.lab.starters import FORMS, form_of
 from toolkit.machine import load_machine
 from toolkit.recording.folder import read_test_folder
@@ -64,7 +70,9 @@ def test_what_is_missing_is_told_all_at_once_by_the_command_and_by_the_reader(
     assert told["open"]
     with pytest.raises(ConfigError) as caught:
         read(form_of(word), folder / "f.toml")
-    assert all(name in str(caught.value) for name in told["open"])
+    asked = asked_of(form_of(word), {})  # by whoever works with the file, not by its reader
+    assert asked.keys() <= {*told["open"]}
+    assert all(name in str(caught.value) for name in told["open"] if name not in asked)
 
 
 @pytest.mark.parametrize("word", FORMS)
@@ -224,3 +232,78 @@ def test_a_person_is_asked_for_what_must_be_stated(folder: Path) -> None:
     assert "date = 2026-02-03\n" in text
     assert '\noperator = "first person"\n' in text
     assert "\n#data = " in text
+
+
+def test_a_name_that_nobody_knows_has_no_role_of_its_unit_alone(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "r.csv").write_text(
+        "Radlast [kN];A [N];Schräglauf [rad];G1 [mV/V];Temp [degC];F_Y [N]\n1;2;0,1;1;20;5\n"
+    )
+    _, told = answered(capsys, "machine", "new", "m.toml", "--from", "r.csv")
+    roles = {column["symbol"]: column.get("role") for column in told["guessed"]["column"]}
+    assert {name: roles[name] for name in ("Radlast", "A", "Schräglauf", "G1", "Temp")} == {
+        "Radlast": None, "A": None, "Schräglauf": None, "G1": "indication", "Temp": "covariate",
+    }  # fmt: skip
+    assert {"column[1].role", "column[2].role", "column[3].role"} <= {*told["open"]}
+    silent = "\n".join(told["not_guessed"])
+    assert "Radlast [kN]: what it holds" in silent
+    assert "no column is known as the load" in silent
+    assert "no column is known as the slip angle" in silent
+    assert (folder / "m.toml").read_text().count('#role = "..."   # FILL IN') == len(
+        [name for name in told["open"] if name.startswith("column")]
+    )
+
+
+def test_what_process_and_the_report_ask_for_is_marked_in_a_new_test(folder: Path) -> None:
+    """Values of test.toml that the default template prints outside a tk:if, by the template itself."""
+    from docx import Document
+
+    from toolkit.report.word.scan import scan
+    from toolkit.report.word.xml import stories
+
+    template = Path(__file__).parents[2] / "report_templates" / "org.docx"
+    paths = {
+        site.tag.path
+        for site in scan(stories(Document(str(template)).part.package))
+        if site.tag.family == "value"
+        and not any("tk:if." in str(tag.get(tag.keys()[0])) for parent in site.element.iterancestors()
+                    for tag in parent.iterfind("{*}sdtPr/{*}tag"))
+    }  # fmt: skip
+    entries = {"pressure", "operator", "requestor", "special", "surface", "laboratory", "date"}
+    printed = {path.removeprefix("test.") for path in paths} & entries
+    printed |= {path for path in paths if path.startswith("tire.")}
+    assert {"date", "requestor", "tire.company", "tire.DOT", "tire.series"} <= printed
+    asked = asked_of(form_of("test"), {})
+    assert printed == asked.keys()
+    assert command("test", "new", "test.toml", "--no-ask") == 0
+    text = filled_in((folder / "test.toml").read_text())
+    (folder / "test.toml").write_text(text)
+    assert asked_of(form_of("test"), tomllib.loads(text)) == {}
+    assert read(form_of("test"), folder / "test.toml")
+
+
+READERS = {"session": read_session, "machine": lambda path: load_machine(str(path)), "plan": read_plan}
+
+
+@pytest.mark.parametrize("word", READERS)
+def test_every_entry_is_accepted_as_it_is_printed_by_the_reader_of_its_command(
+    word: str, folder: Path
+) -> None:
+    rows = (f"{1 + i // 10},up,{i % 10 / 10},{i % 10 * 100 + (-1) ** i / 10}" for i in range(40))
+    (folder / "loads.csv").write_text("run,direction,D51 [mV/V],FY [N]\n" + "\n".join(rows))
+    (folder / "...").write_text("D51 [mV/V],FY [N]\n0.5,500\n")  # what the entry check is printed with
+    shutil.copy(packaged_home() / "toolkit/examples/virtual/tire.tir", "tire.tir")
+    assert command(word, "new", "new.toml", "--no-ask") == 0
+    lines = Lines(without_sign((folder / "new.toml").read_text()))
+    refused = []
+    for block in lines.blocks:
+        for at in block.entries:
+            if "standard.xml" in lines.lines[at]:
+                continue  # a digital certificate, which nobody has here
+            (folder / "taken.toml").write_text(lines.taken(block, at))
+            try:
+                READERS[word](folder / "taken.toml")
+            except ToolkitError as error:
+                refused.append((block.table, lines.lines[at], str(error)))
+    assert refused == []

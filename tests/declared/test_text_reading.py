@@ -150,7 +150,7 @@ def test_one_fault_has_its_rule_its_key_its_line_and_what_was_expected(
     _, faults = attempt(Sample, tomllib.loads(text))
     assert (faults[0].name, faults[0].rule_id) == (key, rule)
     assert expected in faults[0].expected
-    if len(faults) == 1:
+    if len(faults) == 1 and "u0000" not in new:  # which no settings file may hold, whatever it declares
         error = refused(text)
         assert error.rule == rule
         assert expected in str(error.expected)
@@ -255,5 +255,6 @@ def test_what_no_declaration_can_hold_is_an_error_of_the_program() -> None:
 def test_a_text_with_control_characters_is_told_so() -> None:
     """Seen on a terminal it looks like a text: what is wrong with it does not show."""
     error = refused(MINIMAL.replace('title = "short"', 'title = "short\\u001b[2K"'))
-    assert error.expected == "a text without control characters"
+    assert error.rule == "unprintable"
+    assert str(error.expected).startswith("a printable text: no control characters")
     assert "\\u001b" in str(error.line)

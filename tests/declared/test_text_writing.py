@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from tests.declared.sample import MINIMAL, WHOLE, Cell, Channel, Check, Constant, Sample, Sweep
 from toolkit.declared import Entry, Quantity, answer, json_value, plain, read_text, toml_text
 from toolkit.findings import Finding
+from toolkit.printable import unprintable
 from toolkit.units import unit
 
 
@@ -52,7 +53,9 @@ def quantities(low: float, high: float, *units: str) -> st.SearchStrategy[float]
     return numbers | st.builds(read, numbers, st.sampled_from(units))
 
 
-CHARACTERS = st.characters(codec="utf-8", exclude_categories=["Cs", "Cc"]) | st.sampled_from("\t\n\r\u0085")
+CHARACTERS = (st.characters(codec="utf-8", exclude_categories=["Cs", "Cc"]) | st.sampled_from("\t\n")).filter(
+    lambda character: unprintable(character) is None
+)
 TEXTS = st.text(CHARACTERS, min_size=1).filter(lambda text: bool(text.strip()))
 CHANNELS = st.builds(
     Channel, symbol=st.from_regex("[A-Z]+[0-9]*", fullmatch=True),

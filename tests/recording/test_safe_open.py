@@ -110,10 +110,10 @@ def test_a_flipped_byte_in_the_packed_data_is_seen_by_its_check_sum(tmp_path):
 
 
 def test_no_file_and_a_folder(tmp_path):
-    for path in (tmp_path / "none", tmp_path):
+    for path, rule in ((tmp_path / "none", "no-file"), (tmp_path, "folder-for-file")):
         with pytest.raises(UnreadableError) as caught:
             gate(path)
-        assert caught.value.rule == "no-file"
+        assert caught.value.rule == rule
 
 
 @pytest.mark.parametrize(

@@ -97,13 +97,21 @@ def test_truth_of_a_block_is_the_published_tire_at_its_angle_and_load():
     assert pytest.approx(expected, rel=1e-9) == block.FY_N
 
 
-def test_own_columns_carry_the_accident(small):
-    file = small.files[0]
-    lbf = 4.4482216152605
+def own_forces(file, E5):
     cell = {n: file.columns[n] / r * 3000.0 for n, r in (("D51", 2.0131), ("D52", 1.9874), ("E5", 2.0046))}
-    wrong = 0.99719 * cell["D51"] + 0.99718 * cell["D52"] - 1.0228 * cell["E5"]
-    np.testing.assert_allclose(file.columns["FY"], wrong, atol=2e-3)
-    assert np.abs(file.columns["FY"] - file.truth[0].FY_N / lbf).min() > 100
+    return 0.99719 * cell["D51"] + 0.99718 * cell["D52"] + E5 * cell["E5"]
+
+
+def test_own_columns_carry_the_accident_that_a_plan_asks_for():
+    accident = replace(SMALL, acquisition=replace(SMALL.acquisition, negated=("E5",)))
+    file = simulate(accident).files[0]
+    np.testing.assert_allclose(file.columns["FY"], own_forces(file, -1.0228), atol=2e-3)
+    assert np.abs(file.columns["FY"] - file.truth[0].FY_N / 4.4482216152605).min() > 100
+
+
+def test_own_columns_are_right_where_the_plan_asks_for_no_accident(small):
+    for file in small.files:
+        np.testing.assert_allclose(file.columns["FY"], own_forces(file, 1.0228), atol=2e-2)
 
 
 def test_pull_by_the_table_of_symmetries():

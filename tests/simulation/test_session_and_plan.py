@@ -41,7 +41,11 @@ class TestPlan:
         plan = read_plan(TEST_PLAN)
         plain = Plan(kind="test", title="", date=plan.date, machine=plan.machine, seed=0)
         for stage in ("tire", "road", "carriage", "cells", "acquisition", "session"):
-            assert getattr(plan, stage) == getattr(plain, stage), stage
+            stated = getattr(plan, stage)
+            if stage == "acquisition":  # the accident is the example's own
+                assert stated.negated == ("E5",)
+                stated = replace(stated, negated=())
+            assert stated == getattr(plain, stage), stage
         assert len(plan.slip_angles_rad) * len(plan.rotations) == 26
         assert len(plan.loads_N) == 5
         assert read_plan(SESSION_PLAN).session == plain.session

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import random
+from urllib.parse import quote
 
 import pytest
 
 from tests.workbench.conftest import Served
-from toolkit.workbench.forms import FILES_TYPE, MOST_FIELDS, Upload, read_form
+from toolkit.errors import ConfigError
+from toolkit.workbench.forms import FILES_TYPE, FORM_TYPE, MOST_FIELDS, Upload, read_form
 from toolkit.workbench.guard import LARGEST_UPLOAD
 
 BOUNDARY = "XXX"
@@ -81,3 +83,28 @@ def test_a_form_with_files_needs_the_key_of_our_pages_and_its_limit(own: Served)
     too_large = b"x" * (LARGEST_UPLOAD + 1)
     assert own.upload("/session", [("files", "a.csv", too_large)]).status == 413
     assert not (own.home / "drafts").exists()
+
+
+@pytest.mark.parametrize("text", [b"%ff", b"%c3", b"a%80"])
+def test_text_that_is_no_utf_8_is_refused(text: bytes) -> None:
+    with pytest.raises(ValueError):
+        read_form(b"a=" + text, FORM_TYPE)
+
+
+@pytest.mark.parametrize("text", ["\x00", "a\x0bb", "\x1b[2J", "\u202eb", "\x85"])
+def test_a_field_that_no_document_can_print_is_refused_in_either_form(text: str) -> None:
+    for body, kind in (
+        (f"reason={quote(text)}".encode(), FORM_TYPE),
+        (form(('name="reason"', text.encode())), TYPE),
+    ):
+        with pytest.raises(ConfigError) as caught:
+            read_form(body, kind)
+        assert (caught.value.rule, caught.value.where) == ("unprintable", "reason")
+
+
+def test_lines_and_tabs_of_a_field_stay() -> None:
+    assert read_form(b"a=1%0D%0A2%09", FORM_TYPE).fields == {"a": "1\r\n2\t"}
+
+
+def test_a_file_as_it_is_typed_is_judged_by_its_reader() -> None:
+    assert read_form(b"session=%00&by=B", FORM_TYPE).fields == {"session": "\x00", "by": "B"}

@@ -204,3 +204,15 @@ def test_what_a_decision_rests_on_stands_beside_it(served: Served) -> None:
     machine = load_machine("m15")
     gates = served.page("/record/m15-r1/part/gates").body
     assert f'data-machine="m15">m15, version {machine.version}' in gates
+
+
+@pytest.mark.parametrize(
+    "typed", ["by=%ff%fe&reason=x", "by=B&reason=%00a", "by=B%08&reason=x", "by=B&reason=%E2%80%AEx"]
+)
+def test_a_decision_in_words_that_no_document_can_print_is_refused(own: Served, typed: str) -> None:
+    on, head = str(own.guard.app.state.bench.today), own.registry.head("cell")  # type: ignore[attr-defined]
+    body = f"form_key={own.guard.keys.form}&on={on}&{typed}"
+    for record in ("cell-r1", "cell-r7"):
+        answer = own.ask(f"{own.place}/record/{record}/decide/withdraw", "POST", body)
+        assert answer.status == 400
+    assert own.registry.head("cell") == head

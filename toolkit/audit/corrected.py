@@ -1,15 +1,13 @@
 """Corrected copies: each recording whose Fy and Mz are not those of the record in force, with those that are.
 
 The originals are only read. A copy has the same name and columns; every number but Fy and Mz is the
-original's, and those two are the record's, in full. An index beside the copies says which file each
-replaces, by its hash, and which record computed it.
+original's, and those two are the record's, in full. Of a CSV file nothing else changes (`csvcopy`). An index
+beside the copies says which file each replaces, by its hash, and which record computed it.
 """
 
 from __future__ import annotations
 
-import csv
 import datetime as dt
-import io
 import json
 import os
 from collections.abc import Callable, Mapping
@@ -26,8 +24,9 @@ from toolkit.calibration.registry.registry import instrument_of
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import OutputError, ToolkitError
 from toolkit.files import real_path, sha256_file
-from toolkit.inputs import SETTINGS_FILE, read_input
+from toolkit.inputs import RECORDING_FILE, SETTINGS_FILE, read_input
 from toolkit.publication import publication, settle
+from toolkit.recording.csvcopy import with_numbers
 from toolkit.recording.folder import TEST_FILE, nearest_test_toml
 from toolkit.recording.formats import WRITERS
 from toolkit.recording.formats.vectors import Written
@@ -161,12 +160,13 @@ def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, stage: Pa
     try:
         use = standing.use(draft=draft, where=path)
         context = context_of(path)
-        recording = read_recording(path, context.machine)
+        data = read_input(path, RECORDING_FILE)
+        recording = read_recording(path, context.machine, data=data)
         if recording.sha256 != plain["sha256"]:
             failed = "the file changed since it was audited"
         else:
             columns = columns_of(recording)
-            _write(place, recording, recompute(columns, record), use)
+            _write(place, recording, data, recompute(columns, record), use)
             sha256 = sha256_file(place)
             _keep_test(path, archive, stage)
     except OutputError:
@@ -185,11 +185,16 @@ def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, stage: Pa
 
 
 def _write(
-    place: Path, recording: Recording, new: Mapping[str, NDArray[np.float64]], use: CalibrationUse
+    place: Path,
+    recording: Recording,
+    data: bytes,
+    new: Mapping[str, NDArray[np.float64]],
+    use: CalibrationUse,
 ) -> None:
     place.parent.mkdir(parents=True, exist_ok=True)
     if recording.format == "csv":
-        place.write_text(_csv(recording, new), encoding="utf-8", newline="")
+        columns_in_file = {column.symbol: column.values.tolist() for column in _replaced(recording, new)}
+        place.write_bytes(with_numbers(data, columns_in_file, recording.machine, where=recording.path))
         return
     title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
     title += f"; {use.mark}" if use.mark else ""
@@ -209,6 +214,10 @@ def _write(
     write_labview(place, machine, columns, simulated=recording.simulated, title=title)
 
 
+def _replaced(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> list[Written]:
+    return [column for column in _copied_columns(recording, new) if column.symbol in new]
+
+
 def _copied_columns(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> list[Written]:
     return [
         Written(
@@ -219,17 +228,6 @@ def _copied_columns(recording: Recording, new: Mapping[str, NDArray[np.float64]]
         )
         for channel in recording.series
     ]
-
-
-def _csv(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    # A header that a spreadsheet would take for a formula is made a text.
-    headers = [channel.header for channel in recording.series]
-    writer.writerow([f"'{text}" if text.startswith(("=", "+", "-", "@")) else text for text in headers])
-    columns = [column.values for column in _copied_columns(recording, new)]
-    writer.writerows([repr(float(v)) for v in row] for row in np.column_stack(columns))
-    return stream.getvalue()
 
 
 def _keep_test(path: Path, archive: Path, stage: Path) -> None:

@@ -16,18 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from toolkit.printable import check_text, escaped, unprintable
+
 if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.findings import Finding
-
-
-# What steers a terminal or turns the reading order: control characters but tabs and line ends, and the
-# directional formatting characters of Unicode (UAX 9; Boucher, Anderson, Trojan Source, 2021).
-_STEERING = {
-    code: repr(chr(code))[1:-1]
-    for code in (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
-    if chr(code) not in "\t\n"
-}
 
 
 def say(text: str, *, err: bool = False) -> None:
@@ -35,7 +28,7 @@ def say(text: str, *, err: bool = False) -> None:
 
     Names and values come from files of others: none may hide a line, or write another in its place.
     """
-    typer.echo(text.translate(_STEERING), err=err)
+    typer.echo(escaped(text), err=err)
 
 
 def ask_passphrase(key: Path, *, twice: bool = False) -> str:
@@ -87,11 +80,19 @@ class Command:
         bound = self.__signature__.bind(*arguments, **options)
         bound.apply_defaults()
         values = bound.arguments
+        self._check(values)
         groups = {
             name: group(**{option.name: values.pop(option.name) for option in dataclasses.fields(group)})
             for name, group in self._groups.items()
         }
         return self._command(**values, **groups)
+
+    def _check(self, values: Mapping[str, Any]) -> None:
+        """Refuse words that no document can print; a path is whatever the disk has, and is no such word."""
+        for name, value in values.items():
+            for text in value if isinstance(value, list | tuple) else (value,):
+                if type(text) is str and unprintable(text):
+                    check_text(text, where=_option_of(self.__signature__.parameters[name]))
 
     @functools.cached_property
     def _hints(self) -> dict[str, Any]:
@@ -118,6 +119,20 @@ class Command:
                 for option in dataclasses.fields(group)
             ]
         return inspect.Signature(parameters)
+
+
+def _option_of(parameter: inspect.Parameter) -> str:
+    """Return what a parameter of a command is called among its words: ``--checked-by``, ``ID``."""
+    stated = [
+        mark
+        for mark in getattr(parameter.annotation, "__metadata__", ())
+        if hasattr(mark, "param_decls") and hasattr(mark, "metavar")
+    ]
+    # In an annotation typer holds an option's first word as its default.
+    words = [word for mark in stated for word in (mark.default, *(mark.param_decls or ()))]
+    names = [word for word in words if isinstance(word, str) and word.startswith("--")]
+    names += [mark.metavar for mark in stated if mark.metavar]
+    return str(names[0] if names else parameter.name.upper())
 
 
 def answers(declared: str | type) -> Callable[[Callable[..., int]], Command]:

@@ -165,7 +165,8 @@ def explain(
     if answer_of is not None:
         from toolkit.cli.groups import declared_answers, schema_text
 
-        typer.echo(schema_text(answer_of, declared_answers(context.find_root().command)))
+        text = schema_text(answer_of, declared_answers(context.find_root().command))
+        output.answer(json.loads(text), text)
         return 0
     from toolkit.lab.rules import explained
 

@@ -139,6 +139,9 @@ def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line: 0 clean, 1 findings, 2 bad input, 101 a bug."""
     arguments = sys.argv[1:] if arguments is None else arguments
     as_json = "--json" in arguments
+    if as_json and "--version" in arguments and {*arguments} <= {"--version", "--json", "--quiet", "-q"}:
+        answer({"version": __version__}, "", as_json=True, quiet=False)
+        sys.exit(0)
     try:
         code = command_tree()(args=arguments, prog_name="toolkit", standalone_mode=False)
     except Requested as outcome:

@@ -8,12 +8,14 @@ that is missing in one message.
 from __future__ import annotations
 
 import inspect
+import re
 import textwrap
+import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from toolkit.declared.declaration import form_of, table_of
-from toolkit.declared.kinds import Kind
+from toolkit.declared.kinds import ChoiceKind, Kind, TextKind
 from toolkit.declared.lists import KeyedKind, ListKind
 from toolkit.declared.marks import Format
 from toolkit.declared.tables import Field, FormsKind, TableKind
@@ -21,8 +23,11 @@ from toolkit.declared.text import key_of, table_lines, value_text
 
 _WIDTH = 100
 _DIGITS = 6  # of a printed default
+_FILL_IN = "   # FILL IN"
 Notes = Mapping[str, str]
 """Key of the top level -> how its value was come by."""
+Root = Mapping[str, Any]
+"""A file as it is parsed: what its entries declare are the names that others may use."""
 
 
 def starter(cls: type) -> str:
@@ -39,31 +44,43 @@ def starter(cls: type) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _starter_table(kind: TableKind, path: tuple[str, ...], *, on: bool) -> Iterator[str]:
+def _starter_table(
+    kind: TableKind, path: tuple[str, ...], *, on: bool, root: Root | None = None, marked: bool = False
+) -> Iterator[str]:
+    """Yield the entries of a table; ``on``: required ones stand there, ``marked``: to be filled in."""
     below = []
     for declared in kind.fields:
         if _inner_table(declared.kind) is not None and declared.kind.entry.example is None:
             below.append(declared)
             continue
-        enabled = on and declared.required
+        enabled, mark = on and declared.required, _mark(declared) if marked else ""
         yield from _comment(_sentence(declared))
-        yield f"{'' if enabled else '#'}{key_of(declared.key)} = {_example(declared)}"
+        yield f"{'' if enabled else '#'}{key_of(declared.key)} = {_example(declared, root)}{mark}"
         if declared.beside is not None and declared.beside not in kind.own_keys:
-            yield f'{"" if enabled else "#"}{declared.beside} = "{declared.unit}"'
+            yield f'{"" if enabled else "#"}{declared.beside} = "{declared.unit}"{mark}'
     for declared in below:
-        inner = _inner_table(declared.kind)
-        if inner is None:
+        if _inner_table(declared.kind) is None:
             continue
-        enabled, names = on and declared.required, (*path, declared.key)
         yield ""
         yield from _comment(_sentence(declared))
-        header, inside = ".".join(map(key_of, names)), names
-        if isinstance(declared.kind, KeyedKind):
-            inside = (*names, next(iter(declared.kind.example())))
-            header = ".".join(map(key_of, inside))
-        brackets = ("[[", "]]") if isinstance(declared.kind, ListKind) else ("[", "]")
-        yield f"{'' if enabled else '#'}{brackets[0]}{header}{brackets[1]}"
-        yield from _starter_table(inner, inside, on=enabled)
+        yield from _inner_lines(declared, (*path, declared.key), on=on, root=root, marked=marked)
+
+
+def _inner_lines(
+    declared: Field, names: tuple[str, ...], *, on: bool, root: Root | None, marked: bool
+) -> Iterator[str]:
+    """Yield the header of a table below an entry, and its entries."""
+    inner = _inner_table(declared.kind)
+    if inner is None:
+        return
+    enabled, mark = on and declared.required, _mark(declared) if marked else ""
+    inside = names
+    if isinstance(declared.kind, KeyedKind):
+        inside = (*names, next(iter(_example_of(declared.kind, root))))
+    left, right = ("[[", "]]") if isinstance(declared.kind, ListKind) else ("[", "]")
+    header = f"{left}{'.'.join(map(key_of, inside))}{right}"
+    yield f"{'' if enabled else '#'}{header}{mark}"
+    yield from _starter_table(inner, inside, on=enabled, root=root, marked=bool(mark))
 
 
 def _inner_table(kind: Kind) -> TableKind | None:
@@ -74,19 +91,35 @@ def _inner_table(kind: Kind) -> TableKind | None:
     return inner if isinstance(inner, TableKind) else None
 
 
-def _example(declared: Field) -> str:
+def _example(declared: Field, root: Root | None = None) -> str:
     kind = declared.kind
     if declared.required or kind.entry.example is not None or declared.default in (None, (), ""):
-        return value_text(kind.example())
+        return value_text(_example_of(kind, root))
     return value_text(_printed(kind.write(declared.default)))
 
 
+def _example_of(kind: Kind, root: Root | None) -> Any:
+    """Return an example of a kind whose names are among those that the file declares."""
+    example = kind.example()
+    names = getattr(kind, "names", None)
+    allowed = () if names is None or root is None else names.names(root)
+    if isinstance(kind, KeyedKind) and allowed and example and kind.names is not None and kind.names.of:
+        return dict.fromkeys(allowed, next(iter(example.values())))
+    if isinstance(kind, TextKind) and allowed and example not in allowed:
+        return allowed[0]
+    return example
+
+
 def _sentence(declared: Field) -> str:
-    parts = [declared.kind.entry.help or declared.key.replace("_", " ")]
+    entry = declared.kind.entry
+    parts = [entry.help or declared.key.replace("_", " ")]
     if _inner_table(declared.kind) is None:
         parts.append(declared.kind.expected)
-    parts.append("required" if declared.required else f"default {_default(declared) or 'none'}")
-    return "; ".join(parts)
+    if entry.asked and not declared.required:
+        parts.append(f"{entry.asked} asks for it")
+    else:
+        parts.append("required" if declared.required else f"default {_default(declared) or 'none'}")
+    return "; ".join(parts + [f"together with {entry.together}"] * bool(entry.together))
 
 
 def _default(declared: Field) -> str:
@@ -140,12 +173,15 @@ def reference(cls: type) -> str:
 
 def _reference_row(declared: Field) -> str:
     default = "required" if declared.required else _default(declared) or "none"
-    former = "".join(f"; formerly `{key}`" for key in declared.kind.entry.old)
+    entry = declared.kind.entry
+    more = "".join(f"; formerly `{key}`" for key in entry.old)
+    more += f"; {entry.asked} asks for it" * bool(entry.asked)
+    more += f"; together with `{entry.together}`" * bool(entry.together)
     holds = declared.kind.expected
-    if _inner_table(declared.kind) is not None and declared.kind.entry.expected is None:
+    if _inner_table(declared.kind) is not None and entry.expected is None:
         tables = {ListKind: "tables below, [[...]]", KeyedKind: "tables below, by name"}
         holds = tables.get(type(declared.kind), "the table below")
-    cells = (f"`{declared.key}`", holds, default, declared.kind.entry.help + former)
+    cells = (f"`{declared.key}`", holds, default, entry.help + more)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
@@ -219,67 +255,118 @@ def outline(cls: type, values: Mapping[str, Any], notes: Notes | None = None) ->
     values : entries as a file holds them: texts, numbers, dates, lists, dicts
     notes : what stands beside an entry, such as where its value was found
     """
+    text = _outline(cls, values, notes or {}, None)
+    return _outline(cls, values, notes or {}, tomllib.loads(filled_in(text)))
+
+
+def filled_in(text: str) -> str:
+    """Return an outline whose marked entries stand as they are printed.
+
+    >>> filled_in('#name = "belt-2"   # FILL IN')
+    'name = "belt-2"'
+    """
+    return re.sub(rf"(?m)^#(.*?){_FILL_IN}$", r"\1", text)
+
+
+def asked_of(cls: type, values: Mapping[str, Any]) -> dict[str, str]:
+    """Return the entries that a new file lacks though it can be read, and who asks for each of them."""
+    return dict(_asked(table_of(cls), values, ""))
+
+
+def _asked(kind: TableKind, values: Mapping[str, Any], above: str) -> Iterator[tuple[str, str]]:
+    for declared in kind.fields:
+        entry, stated = declared.kind.entry, values.get(declared.key)
+        if entry.asked and stated is None:
+            yield f"{above}{declared.key}", f"{declared.kind.expected}; {entry.asked} asks for it"
+        elif isinstance(declared.kind, TableKind) and isinstance(stated or {}, Mapping):
+            yield from _asked(declared.kind, stated or {}, f"{above}{declared.key}.")
+
+
+def _outline(cls: type, values: Mapping[str, Any], notes: Notes, root: Root | None) -> str:
     form, kind = form_of(cls) or Format(), table_of(cls)
     lines = [*_comment(f"{form.title[0].upper()}{form.title[1:]}: {summary(cls)}"), "#"]
     lines += [*_comment("Take the sign # away from an entry to state it; FILL IN marks what must be stated.")]
     lines += ["", *([] if form.schema is None else [f"schema = {form.schema}", ""])]
-    lines += _entries(kind, (), values, notes or {})
+    lines += _entries(kind, (), values, notes, root)
     return "\n".join(lines).rstrip() + "\n"
 
 
 def _entries(
-    kind: TableKind, path: tuple[str, ...], values: Mapping[str, Any], notes: Notes
+    kind: TableKind, path: tuple[str, ...], values: Mapping[str, Any], notes: Notes, root: Root | None
 ) -> Iterator[str]:
-    below = [declared for declared in kind.fields if _is_below(declared)]
-    for declared in kind.fields:
+    offered = [field for field in kind.fields if not field.kind.entry.by_command or field.key in values]
+    below = [declared for declared in offered if _is_below(declared)]
+    for declared in offered:
         if declared in below:
             continue
         yield from _told(declared, notes)
         if declared.key in values:
             yield f"{key_of(declared.key)} = {value_text(values[declared.key])}"
-        elif declared.required:
-            yield f"#{key_of(declared.key)} = {_example(declared)}   # FILL IN"
         else:
-            yield f"#{key_of(declared.key)} = {_example(declared)}"
+            yield f"#{key_of(declared.key)} = {_example(declared, root)}{_mark(declared)}"
     for declared in below:
         yield ""
         yield from _told(declared, notes)
         names = (*path, declared.key)
         header, entry = ".".join(map(key_of, names)), values.get(declared.key)
         if isinstance(declared.kind, FormsKind):
-            yield from _chosen(declared.kind, names, entry, required=declared.required)
+            yield from _chosen(declared.kind, names, entry, root, required=declared.required)
             continue
         inner = _inner_table(declared.kind)
         if isinstance(entry, list):
             for part in entry:
-                yield from (f"[[{header}]]", *table_lines(part, names))
+                yield from (f"[[{header}]]", *table_lines(part, names), *_lacking(inner, part, root))
         elif isinstance(declared.kind, ListKind | KeyedKind) and entry is not None:
             yield from (f"[{header}]", *table_lines(entry, names))
         elif inner is not None and (entry is not None or _is_needed(declared)):
             yield f"[{header}]"
-            yield from _entries(inner, names, entry or {}, {})
+            yield from _entries(inner, names, entry or {}, {}, root)
         elif inner is not None:
-            yield from _commented(declared, inner, names)
+            yield from _inner_lines(declared, names, on=False, root=root, marked=True)
+
+
+def _lacking(inner: TableKind | None, part: Mapping[str, Any], root: Root | None) -> Iterator[str]:
+    """Yield the required entries that a table of a list does not state.
+
+    A choice has no example there: beside entries that are stated it would be a guess.
+    """
+    for declared in () if inner is None else inner.fields:
+        if declared.required and declared.key not in part:
+            yield from _comment(_sentence(declared))
+            open_ = isinstance(declared.kind, ChoiceKind)
+            example = value_text("...") if open_ else _example(declared, root)
+            yield f"#{key_of(declared.key)} = {example}{_FILL_IN}"
 
 
 def _chosen(
-    kind: FormsKind, names: tuple[str, ...], entry: Mapping[str, Any] | None, *, required: bool
+    kind: FormsKind,
+    names: tuple[str, ...],
+    entry: Mapping[str, Any] | None,
+    root: Root | None,
+    *,
+    required: bool,
 ) -> Iterator[str]:
     """Return the table that the entry's word chooses; all of them, commented out, where none is chosen."""
     header = ".".join(map(key_of, names))
-    if entry is not None:
-        chosen = kind.tables.get(entry.get(kind.tag or ""))
+    chosen = None if entry is None else kind.tables.get(entry.get(kind.tag or ""))
+    if entry is not None and chosen is not None:
         yield f"[{header}]"
-        yield from table_lines(entry, names) if chosen is None else _entries(chosen, names, entry, {})
+        yield from _entries(chosen, names, entry, {}, root)
         return
-    yield f"#[{header}]" + ("   # FILL IN" if required else "")
+    if entry is not None:
+        yield from (f"[{header}]", *table_lines(entry, names))
+        return
+    yield f"#[{header}]{_FILL_IN if required else ''}"
     for at, (word, form) in enumerate(kind.tables.items()):
+        # One of them must be filled in: the first is marked, and whoever wants another takes its lines.
+        marked = required and not at
         chosen_by = f"{kind.tag} = {value_text(word)}"
         yield from _comment(f"{'or' if at else 'either'} {chosen_by}: {summary(form.cls)}")
-        yield f"#{chosen_by}"
+        yield f"#{chosen_by}{_FILL_IN if marked else ''}"
         for declared in (field for field in form.fields if field.key != kind.tag):
             yield from _told(declared, {})
-            yield f"#{key_of(declared.key)} = {_example(declared)}"
+            mark = _FILL_IN if marked and declared.required else ""
+            yield f"#{key_of(declared.key)} = {_example(declared, root)}{mark}"
 
 
 def _is_below(declared: Field) -> bool:
@@ -292,14 +379,11 @@ def _is_needed(declared: Field) -> bool:
     return declared.required and not isinstance(declared.kind, ListKind | KeyedKind)
 
 
-def _commented(declared: Field, inner: TableKind, names: tuple[str, ...]) -> Iterator[str]:
-    header = names
-    if isinstance(declared.kind, KeyedKind):
-        header = (*names, next(iter(declared.kind.example())))
-    left, right = ("[[", "]]") if isinstance(declared.kind, ListKind) else ("[", "]")
-    mark = "   # FILL IN" if declared.required else ""
-    yield f"#{left}{'.'.join(map(key_of, header))}{right}{mark}"
-    yield from _starter_table(inner, header, on=False)
+def _mark(declared: Field) -> str:
+    """Return the mark of an entry that must be stated, or of a table in which one must be."""
+    kind = declared.kind
+    asked = kind.entry.asked or (isinstance(kind, TableKind) and next(_asked(kind, {}, ""), None))
+    return _FILL_IN if declared.required or asked else ""
 
 
 def _told(declared: Field, notes: Notes) -> list[str]:

@@ -19,6 +19,10 @@ class Entry:
     make of the type and its bounds; ``rule`` the rule id of a fault in it; ``old`` are former spellings of
     the key, read but not written; ``output`` is False for a field that no file and no answer has; of a
     ``sparse`` one an answer has no key while it is None.
+
+    What a new file says of it: ``asked`` names who asks for an entry without which the file itself can be
+    read; ``together`` the other entry of its table, both or none of which stand there; an entry that a
+    command writes, ``by_command``, is not offered to people at all.
     """
 
     help: str = ""
@@ -29,6 +33,9 @@ class Entry:
     old: tuple[str, ...] = ()
     output: bool = True
     sparse: bool = False
+    asked: str = ""
+    together: str = ""
+    by_command: str = ""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from toolkit.declared.marks import Format
 from toolkit.errors import ConfigError
 from toolkit.files import as_written, parse_toml
 from toolkit.inputs import SETTINGS_FILE, read_input
+from toolkit.printable import check_entries
 
 T = TypeVar("T")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -38,8 +39,8 @@ def read(cls: type[T], path: Path) -> T:
     return read_text(cls, read_input(path, SETTINGS_FILE), where=path)
 
 
-def read_text(cls: type[T], data: bytes, *, where: object) -> T:
-    """Read the content of a file, whose name ``where`` is; errors as `read`."""
+def read_text(cls: type[T], data: bytes, *, where: object, entered: bool = False) -> T:
+    """Read the content of a file of the name ``where``; ``entered`` as of `parse_toml`, errors as `read`."""
     if str(where).endswith(".json"):
         try:
             table = json.loads(data.decode("utf-8"), parse_float=as_written)
@@ -48,8 +49,10 @@ def read_text(cls: type[T], data: bytes, *, where: object) -> T:
                 "a file is not JSON", where=where, got=error, expected="JSON in UTF-8",
                 next_step="mend the place that is named", rule="not-json",
             ) from error  # fmt: skip
+        if not entered:
+            check_entries(table, where=where, source=data.decode("utf-8"))
         return build(cls, table, Source(where=where))
-    table = parse_toml(data, where=where)
+    table = parse_toml(data, where=where, entered=entered)
     return build(cls, table, Source(where=where, text=data.decode("utf-8-sig")))
 
 

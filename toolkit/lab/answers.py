@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 from toolkit.calibration.records.use import signature_of
 from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError
+from toolkit.printable import escaped
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -135,12 +135,7 @@ def one_line(text: object) -> str:
     >>> print(one_line("a\nb\x1b[2J"))
     a\nb\x1b[2J
     """
-    return "".join(
-        character.encode("unicode_escape").decode("ascii")
-        if unicodedata.category(character) in ("Cc", "Zl", "Zp")
-        else character
-        for character in str(text)
-    )
+    return escaped(str(text), lines=False)
 
 
 def table(

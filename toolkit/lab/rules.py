@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.declared.answers import merged
 
@@ -77,8 +78,28 @@ class Explanations(TypedDict):
 EffectAndCharacteristic = merged(ExplainedCharacteristic, EffectFacts, name="EffectAndCharacteristic")
 
 
-ExplainForms = Explanations | RuleEntry | EffectFacts | ExplainedCharacteristic | EffectAndCharacteristic
-"""Of no name, of a rule, and of what is an effect, a characteristic or both."""
+AnswerSchema = TypedDict(
+    "AnswerSchema",
+    {
+        "$schema": str,
+        "type": NotRequired[str],
+        "description": NotRequired[str],
+        "properties": NotRequired[Mapping[str, Any]],
+        "required": NotRequired[list[str]],
+        "additionalProperties": NotRequired[bool],
+        "anyOf": NotRequired[
+            Annotated[list[Mapping[str, Any]], "of a command with answers of several forms"]
+        ],
+        "$defs": Mapping[str, Any],
+    },
+)
+AnswerSchema.__doc__ = "The JSON schema of a command's answer, for --answer."
+
+
+ExplainForms = (
+    Explanations | RuleEntry | EffectFacts | ExplainedCharacteristic | EffectAndCharacteristic | AnswerSchema
+)
+"""Of no name, of a rule, of what is an effect, a characteristic or both; of --answer."""
 
 
 RULES_FILE = Path(__file__).with_name("rules.toml")

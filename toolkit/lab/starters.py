@@ -18,10 +18,11 @@ from typing import Any
 
 from toolkit.channels import CHANNELS, channel_of
 from toolkit.declared import Source, refuse
-from toolkit.declared.describe import outline
+from toolkit.declared.describe import asked_of, outline
 from toolkit.declared.text import attempt, value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
 from toolkit.inputs import RECORDING_FILE, read_input
+from toolkit.printable import check_entries
 from toolkit.units import is_unit, split_header
 
 FORMS = {
@@ -36,6 +37,8 @@ FORMS = {
 _BOOKKEEPING = ("run", "direction", "rotation", "comment")
 _CASE_ROLES = {"t": "time", "T": "covariate"} | dict.fromkeys(("FX", "FY", "MX", "MY", "MZ"), "output")
 """What a channel is to a simulation; the others are inputs."""
+_READ_FROM_CELLS = ("bridge_ratio", "voltage", "count")
+_OF_SEVERAL_ROLES = ("force", "moment", "angle", "time", "ratio")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +119,7 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     RecordingError
         the recording cannot be read
     """
+    check_entries(entries, where=file)
     guess = Guess() if recording is None else guess_from(word, recording, file.parent)
     guess = replace(guess, values={key: guess.values[key] for key in guess.values if key not in entries})
     values, cls = {**guess.values, **entries}, form_of(word)
@@ -125,7 +129,7 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     refuse([fault for fault in attempt(cls, stated)[1] if fault.kind != "missing"], Source(where=file))
     text = outline(cls, values, {key: note for key, note in guess.notes.items() if key not in entries})
     _, faults = attempt(cls, tomllib.loads(text))
-    helps = {fault.name: fault.expected for fault in faults}
+    helps = {fault.name: fault.expected for fault in faults} | asked_of(cls, values)
     return Starter(text=text, guess=guess, helps=helps)
 
 
@@ -239,11 +243,20 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
         dimension = _dimension(unit)
         symbol = _symbol(plain)
         role = _role(symbol, dimension)
-        if dimension is None or role is None:
-            silent.append(f"{header}: " + ("no unit that is known" if dimension is None else "what it holds"))
+        if dimension is None:
+            silent.append(f"{header}: no unit that is known")
             continue
         # As the reader of recordings will see it: what stands in square brackets is a unit to it.
-        entries.append({"symbol": symbol, "header": split_header(header)[0], "unit": unit, "role": role})
+        entry = {"symbol": symbol, "header": split_header(header)[0], "unit": unit}
+        if role is None:
+            silent.append(f"{header}: what it holds; state its role")
+        entries.append(entry if role is None else entry | {"role": role})
+    stated = {entry.get("role") for entry in entries}
+    silent += [
+        f'no column is known as {what}: name it {symbol}, or state role = "{role}" for it'
+        for role, symbol, what in (("load", "FZ", "the load"), ("slip_angle", "SA", "the slip angle"))
+        if entries and role not in stated
+    ]
     silent += [
         "axes, rotations, drum and protocol: no header tells them",
         "drum.circumference: without it the road counts as flat, a belt's or a trailer's",
@@ -291,4 +304,7 @@ def _role(symbol: str, dimension: str | None) -> str | None:
         return roles[symbol]
     if symbol in CHANNELS:
         return "acquired" if dimension in ("force", "moment") else "covariate"
-    return "indication"
+    # A bridge's output is read from a cell, and a temperature goes along; a force may be anything.
+    if dimension in _READ_FROM_CELLS:
+        return "indication"
+    return None if dimension in _OF_SEVERAL_ROLES else "covariate"

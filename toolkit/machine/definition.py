@@ -89,7 +89,7 @@ class Drum:
     road: Annotated[
         Road | None,
         Entry("convex: outside a drum; concave: inside a drum; flat: a belt or a trailer's road; "
-              "default: convex with a circumference, flat without"),
+              "default: convex with a circumference, flat without", example="flat"),
     ] = None  # fmt: skip
     circumference_m: Annotated[
         float | None, Unit("m"), Above(0),
@@ -301,7 +301,8 @@ class Machine:
         Entry("standard uncertainties of what has no calibration record of its own"),
     ] = ()  # fmt: skip
     corrections: Annotated[
-        tuple[Correction, ...], Entry("what a reduction puts right, by decision", key="correction")
+        tuple[Correction, ...],
+        Entry("what a reduction puts right, by decision", key="correction", by_command="machine correct"),
     ] = ()
 
     @property

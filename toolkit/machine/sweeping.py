@@ -14,8 +14,17 @@ from toolkit.declared import Above, AtLeast, AtMost, Entry, Fault, Size, Unit
 class Delay:
     """By how much FY is later than the slip angle in the files [s], filters among it."""
 
-    value_s: Annotated[float, Unit("ms"), Entry("of FY behind the slip angle", key="value", example=0)]
-    u_s: Annotated[float, Unit("ms"), AtLeast(0), Entry("standard uncertainty", key="u", example=2)]
+    value_s: Annotated[
+        float,
+        Unit("ms"),
+        Entry("of FY behind the slip angle", key="value", example={"value": 0, "unit": "ms"}),
+    ]
+    u_s: Annotated[
+        float,
+        Unit("ms"),
+        AtLeast(0),
+        Entry("standard uncertainty", key="u", example={"value": 2, "unit": "ms"}),
+    ]
     source: Annotated[str, Entry("what it rests on")]
 
 

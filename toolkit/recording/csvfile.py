@@ -29,7 +29,7 @@ _EXPONENT = r"(?:[eE][+-]?[0-9]{1,4})?"
 _NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+{mark}?[0-9]*|{mark}[0-9]+){_EXPONENT}") for mark in (r"\.", ",")
 }
-_HINT = re.compile(r"\A\"?sep=[,;\t]\"?(?=\r?\n)", re.IGNORECASE)
+HINT = re.compile(r"\A\"?sep=[,;\t]\"?(?=\r?\n)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 _PLAIN = b"0123456789+-eE \n"
@@ -55,12 +55,12 @@ def decode(data: bytes, *, where: Path) -> str:
     """
     wide = data[:2] in _WIDE
     try:
-        return _HINT.sub("", data.decode("utf-16" if wide else "utf-8-sig"), count=1)
+        return HINT.sub("", data.decode("utf-16" if wide else "utf-8-sig"), count=1)
     except UnicodeDecodeError as error:
         # A file that begins with the mark of UTF-8 is no other encoding.
         if not wide and not data.startswith(codecs.BOM_UTF8):
             with contextlib.suppress(UnicodeDecodeError):
-                return _HINT.sub("", data.decode("cp1252"), count=1)
+                return HINT.sub("", data.decode("cp1252"), count=1)
         raise UnreadableError(
             f"the text file is not in UTF-{16 if wide else 8}",
             where=where,

@@ -44,6 +44,7 @@ from toolkit.units import from_si, si_scale, unit
 _Text = Annotated[str | None, Text(empty=True, strip=True, numbers="any")]
 _Statement = Annotated[str | None, Text(strip=True)]
 TEST_FILE = "test.toml"
+_PROCESS, _REPORT = "toolkit process", "the report template of a new home"
 _LITTER = ("Thumbs.db", "desktop.ini", "__MACOSX")  # what file managers leave behind
 
 
@@ -72,8 +73,10 @@ class ReportDetails:
     external: Annotated[_Statement, Entry("results that come from another laboratory (7.8.2.1 p)")] = None
     authorised_by: Annotated[_Statement, Entry("who authorises the report (7.8.2.1 o)")] = None
     function: Annotated[_Statement, Entry("of who authorises the report")] = None
-    amends: Annotated[_Statement, Entry("id of the report that this one replaces (7.8.8)")] = None
-    amendment: Annotated[_Statement, Entry("why it is replaced; with amends")] = None
+    amends: Annotated[
+        _Statement, Entry("id of the report that this one replaces (7.8.8)", together="amendment")
+    ] = None
+    amendment: Annotated[_Statement, Entry("why it is replaced", together="amends")] = None
     opinions: Annotated[
         tuple[Opinion, ...], Short("statement"),
         Entry("opinions and interpretations, each a text or a table", expected="a list of statements"),
@@ -101,10 +104,10 @@ def read_details(table: Any, *, where: object) -> ReportDetails:
 class TireLabel:
     """What stands on the tire."""
 
-    size: Annotated[_Text, Entry(example="205/55R16")] = None
-    company: Annotated[_Text, Entry("who made it")] = None
-    DOT: Annotated[_Text, Entry("its code")] = None
-    series: Annotated[_Text, Entry(example=55)] = None
+    size: Annotated[_Text, Entry(example="205/55R16", asked=_REPORT)] = None
+    company: Annotated[_Text, Entry("who made it", asked=_REPORT)] = None
+    DOT: Annotated[_Text, Entry("its code", asked=_REPORT)] = None
+    series: Annotated[_Text, Entry(example=55, asked=_REPORT)] = None
     construction: Annotated[_Text, Entry(example="radial")] = None
     rim: Annotated[_Text, Entry(example="16x6.5")] = None
     belt: Annotated[
@@ -144,9 +147,9 @@ class StatedTest:
             expected=f'machine = "{DEFAULT_MACHINE}", or the path of a machine definition',
         ),
     ]  # fmt: skip
-    date: Annotated[str | None, Day(moment=True), Entry("of the test")] = None
-    operator: Annotated[_Text, Entry("who tested")] = None
-    requestor: Annotated[_Text, Entry("who asked for the test")] = None
+    date: Annotated[str | None, Day(moment=True), Entry("of the test", asked=_PROCESS)] = None
+    operator: Annotated[_Text, Entry("who tested", asked=_REPORT)] = None
+    requestor: Annotated[_Text, Entry("who asked for the test", asked=_REPORT)] = None
     surface: Annotated[_Text, Entry("of the road")] = None
     special: Annotated[_Text, Entry("what was special")] = None
     mounting: Annotated[_Text, Entry("tells repeats apart")] = None
@@ -157,7 +160,7 @@ class StatedTest:
     ] = "drum"
     simulated: Annotated[bool, Entry("whether the recordings are simulated")] = False
     speed: Annotated[float | None, Unit("km/h"), Above(0), Entry("surface speed")] = None
-    pressure: Annotated[float | None, Unit("kPa"), Above(0), Entry("of inflation")] = None
+    pressure: Annotated[float | None, Unit("kPa"), Above(0), Entry("of inflation", asked=_REPORT)] = None
     rated_load: Annotated[float | None, Unit("N"), Above(0), Entry("of the tire")] = None
     protocol: Annotated[
         str | None, Text(empty=True, strip=True, numbers="any"),

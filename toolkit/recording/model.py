@@ -11,6 +11,7 @@ import numpy as np
 
 from toolkit.channels import Reversal
 from toolkit.errors import ColumnError
+from toolkit.printable import escaped
 from toolkit.units import to_si
 
 if TYPE_CHECKING:
@@ -70,8 +71,12 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """The file's name."""
-        return self.path.name
+        """The file's name, as text: a disk has names that no text and no document can hold."""
+        return escaped(self.path.name, lines=False)
+
+    def name_in(self, folder: Path) -> str:
+        """Return the file's name below a folder, as text."""
+        return escaped(self.path.relative_to(folder).as_posix(), lines=False)
 
     def has(self, symbol: str) -> bool:
         """Tell whether the recording has a channel."""

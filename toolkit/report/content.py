@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 from toolkit.calibration.records.use import UNSIGNED, CalibrationUse, mark_of, signature_of
 from toolkit.estimate import round_to_uncertainty
+from toolkit.printable import escaped, unprintable
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
 from toolkit.report.vocabulary import Column, Vocabulary
@@ -133,7 +135,7 @@ class ReportContent:
 
     def issued_by(self, issuer: str | None) -> ReportContent:
         """Return the content of a document that is issued, by somebody who signs or, None, unsigned."""
-        text = self.style.say(signature_text(self.calibrations, issuer))
+        text = escaped(self.style.say(signature_text(self.calibrations, issuer)))
         return replace(self, values=self.values | {SIGNATURE: Value(kind="text", value=text)}, symbol=True)
 
     @property
@@ -232,3 +234,36 @@ def _said_plot(plot: Plot, style: Style) -> Plot:
         names=tuple(style.say(name) for name in plot.names),
         curves=tuple(replace(curve, label=style.say(curve.label)) for curve in plot.curves),
     )
+
+
+# A document of texts that nobody can print: a ledger of former years may hold one, and so may a file's name.
+
+
+def in_print(content: ReportContent) -> ReportContent:
+    """Return a content whose texts can all be printed: what cannot be stands as its escape."""
+    plots = {name: _in_print(plot) for name, plot in content.plots.items()}
+    values = {path: _in_print(value) for path, value in content.values.items()}
+    tables = {
+        name: replace(table, rows=_in_print(table.rows)) if _unprintable_rows(table) else table
+        for name, table in content.tables.items()
+    }
+    names = ("calibrations", "title", "author", "identity", "subject", "marks")
+    texts = {name: _in_print(getattr(content, name)) for name in names}
+    return replace(content, plots=plots, values=values, tables=tables, **texts)
+
+
+def _unprintable_rows(table: Table) -> bool:
+    return any(isinstance(cell, str) and unprintable(cell) for row in table.rows for cell in row)
+
+
+def _in_print(value: Any) -> Any:
+    if isinstance(value, str):
+        return escaped(value)
+    if isinstance(value, tuple):
+        return tuple(map(_in_print, value))
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        parts = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
+        printed = {name: _in_print(part) for name, part in parts.items() if isinstance(part, str | tuple)}
+        changed = {name: part for name, part in printed.items() if part != parts[name]}
+        return replace(value, **changed) if changed else value
+    return value

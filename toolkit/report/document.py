@@ -27,6 +27,7 @@ from toolkit.report.content import (
     ReportContent,
     Table,
     Value,
+    in_print,
     in_words_of,
     signature_text,
 )
@@ -354,7 +355,7 @@ class Document(Generic[Source]):
             vocabulary=self.vocabulary,
             untranslated=_untranslated(tables, style),
         )
-        return in_words_of(content, style, people)
+        return in_print(in_words_of(content, style, people))
 
 
 def _untranslated(tables: Mapping[str, Table], style: Style) -> tuple[str, ...]:

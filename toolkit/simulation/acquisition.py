@@ -1,8 +1,8 @@
 """Acquisition stage: first-order filter, noise, the program's own Fy and Mz, and the digits of its files.
 
 Cells and slip angle pass the filter (their columns say so), the load does not. The acquisition program
-writes its own Fy and Mz from the filtered cells by the coefficients that it was once given: here, as on
-the real machine for years, with the E5 terms negative.
+writes its own Fy and Mz from the filtered cells by the coefficients that it was given. A plan may turn the
+signs of some, as the real machine had those of E5 for years: the packaged example does.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class AcquisitionTruth:
     )
     negated: Annotated[
         tuple[Literal["D51", "D52", "E5"], ...],
-        Entry("cells whose terms the program has with the wrong sign"),
-    ] = ("E5",)
+        Entry("cells whose terms the program has with the wrong sign", example=["E5"]),
+    ] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -155,8 +155,8 @@ class TireEntries:
 class CellEntries:
     """One cell; what is not stated is the virtual cell's own."""
 
-    rated_output: Annotated[_BridgeRatio, Above(0), Entry("at the capacity")] = None
-    capacity: Annotated[_Force, Above(0), Entry("force of the rated output")] = None
+    rated_output: Annotated[_BridgeRatio, Above(0), Entry("at the capacity", together="capacity")] = None
+    capacity: Annotated[_Force, Above(0), Entry("force of the rated output", together="rated_output")] = None
     zero_V_V: Annotated[_BridgeRatio, Entry("output without force", key="zero")] = None
     noise_V_V: Annotated[_BridgeRatio, Entry("1 sd of a sample before the filter", key="noise")] = None
     zero_offset_V_V: Annotated[_BridgeRatio, Entry("moved after the tare", key="zero_offset")] = None

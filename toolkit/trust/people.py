@@ -81,7 +81,12 @@ class Key:
     ]
     since: Annotated[_Moment, Entry("signs from", key="from", example="2026-11-22T10:11:12Z", expected=_TIME)]
     until: Annotated[
-        _Moment | None, Entry("signed nothing from this time on: replaced or lost", expected=_TIME)
+        _Moment | None,
+        Entry(
+            "signed nothing from this time on: replaced or lost",
+            example="2027-11-22T10:11:12Z",
+            expected=_TIME,
+        ),
     ] = None
 
     @property
@@ -130,7 +135,9 @@ class Person:
 class Demand:
     """Who must sign a decision, and how many."""
 
-    roles: Annotated[tuple[Role, ...], Size(1), Distinct(), Entry("one of which each signer has")]
+    roles: Annotated[
+        tuple[Role, ...], Size(1), Distinct(), Entry("one of which each signer has", example=["head"])
+    ]
     signatures: Annotated[int, AtLeast(1), Entry("of different people")] = 1
 
 
@@ -220,15 +227,15 @@ class People:
         return toml_text(self)
 
 
-def parse_people(data: bytes, *, where: object) -> People:
-    """Read the content of a ``people.toml``.
+def parse_people(data: bytes, *, where: object, entered: bool = False) -> People:
+    """Read the content of a ``people.toml``; ``entered``: a version that the laboratory has already.
 
     Raises
     ------
     ConfigError
         an entry that cannot be used; all are told at once
     """
-    return read_text(People, data, where=where)
+    return read_text(People, data, where=where, entered=entered)
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +257,7 @@ def version_of(data: bytes, since: str) -> Version:
     ConfigError
         an entry that cannot be used
     """
-    people = parse_people(data, where=FILE)
+    people = parse_people(data, where=FILE, entered=True)
     return Version(since=since, sha256=sha256_bytes(data), people=people, text=data.decode())
 
 

@@ -21,6 +21,7 @@ from typing import Any
 from toolkit.errors import ConfigError, ToolkitError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import REQUEST_FILE, read_input
+from toolkit.printable import unprintable
 from toolkit.trust.decisions import ACTIONS, action_of, signature_row, signer_of, stated, statement, unsigned
 from toolkit.trust.keys import Signer
 from toolkit.trust.people import ROOT_HEADS, Action, Person, Version, inability, moment, version_of
@@ -271,6 +272,8 @@ def _fault(request: Request, body: Mapping[str, Any]) -> str | None:
     texts = (request.message, request.people, *request.operators, *((request.file,) if request.file else ()))
     if not all(isinstance(text, str) for text in texts):
         return "a part that is no text"
+    if bad := next((name for name, text in _leaves(body) if isinstance(text, str) and unprintable(text)), ""):
+        return f"{bad}: a text with a character that no document can print"
     if _canonical(body) != request.message:
         return "a message that is not canonical JSON"
     subject = body["subject"]

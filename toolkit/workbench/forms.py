@@ -1,7 +1,8 @@
 """Forms as a browser sends them: fields, and files with the names that they had (RFC 7578).
 
 A form is whole or refused. Starlette's own parser takes one that was cut off for one with fewer fields, and
-reads text that is no UTF-8 as Latin-1: a decision must rest on neither.
+reads text that is no UTF-8 as Latin-1: a decision must rest on neither. Nor on a field that no document can
+print: what was typed is kept for ever, and may have been pasted from anywhere.
 """
 
 from __future__ import annotations
@@ -11,9 +12,13 @@ from dataclasses import dataclass, field
 from email.message import Message
 from urllib.parse import parse_qsl
 
+from toolkit.printable import check_text, escaped
+
 FORM_TYPE = "application/x-www-form-urlencoded"
 FILES_TYPE = "multipart/form-data"
 MOST_FIELDS = 50
+CONTENTS = frozenset(("session", "data", "check"))
+"""Fields that hold a file as it is typed: a draft keeps it whatever it says, and its reader judges it."""
 _BOUNDARY = re.compile(r"[0-9A-Za-z'()+_,./:=? -]{0,69}[0-9A-Za-z'()+_,./:=?-]")
 
 
@@ -42,11 +47,25 @@ def read_form(body: bytes, content_type: str) -> Form:
     Raises
     ------
     ValueError
-        it is none, or has too many fields
+        it is none, is no UTF-8, or has too many fields
+    ConfigError
+        ``unprintable``: a field has a character that no document can print
     """
+    form = _parsed(body, content_type)
+    for name, text in form.fields.items():
+        if name not in CONTENTS:
+            check_text(text, where=escaped(name, lines=False))
+    return form
+
+
+def _parsed(body: bytes, content_type: str) -> Form:
     if content_type.partition(";")[0].strip().lower() == FORM_TYPE:
         pairs = parse_qsl(
-            body.decode(), keep_blank_values=True, strict_parsing=True, max_num_fields=MOST_FIELDS
+            body.decode(),
+            keep_blank_values=True,
+            strict_parsing=True,
+            errors="strict",
+            max_num_fields=MOST_FIELDS,
         )
         return Form(dict(pairs))
     header = Message()

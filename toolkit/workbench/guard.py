@@ -27,6 +27,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import HTMLResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from toolkit.errors import ConfigError
 from toolkit.workbench.forms import FILES_TYPE, FORM_TYPE, read_form
 from toolkit.workbench.page import bare_page
 
@@ -165,6 +166,8 @@ class Guard:
             form = read_form(bytes(body), content_type)
         except ValueError:
             return _Refusal(400, "The form cannot be read.")
+        except ConfigError as error:
+            return _Refusal(400, f"{error.where}: {error.what}. Go back and write it again: {error.got}")
         if not compare_digest(form.fields.pop("form_key", "").encode(), self.keys.form.encode()):
             return _Refusal(403, "The form is not one of this run of the workbench. Load its page again.")
         scope.setdefault("state", {}).update(form=form.fields, files=form.files)

@@ -161,3 +161,16 @@ def test_a_mark_names_every_record_in_one_line() -> None:
 
 def _fields(use: CalibrationUse) -> dict[str, object]:
     return {"id": use.id, "sha256": "", "unverified": False, "draft_reasons": use.draft_reasons}
+
+
+def test_an_approval_after_the_day_of_knowledge_serves_where_no_earlier_one_does_and_says_so(
+    two: Registry,
+) -> None:
+    early = date(2026, 1, 15)  # before the first decision
+    late = standing(two, "hub", on=MARCH, known_at=early)
+    assert late.record.id == "hub-r1"
+    assert any("approved on 2026-02-01, after 2026-01-15" in text for text in late.since)
+    known = standing(two, "hub", on=MARCH, known_at=MARCH)
+    assert not any("approved on" in text for text in known.since)
+    assert two.status("hub-r1", known_at=early).approved_later == date(2026, 2, 1)
+    assert two.status("hub-r1", known_at=date(2026, 2, 1)).approved_later is None

@@ -145,11 +145,11 @@ def test_what_is_no_case_is_refused(tmp_path, content):
 
 def test_a_pipe_a_folder_and_nothing_are_no_recording(tmp_path):
     os.mkfifo(tmp_path / "pipe.csv")
-    for name in ("pipe.csv", ".", "absent.csv"):
+    for name, rule in (("pipe.csv", "no-file"), (".", "folder-for-file"), ("absent.csv", "no-file")):
         case = write_case(tmp_path, HEAD + f'[[recording.run]]\nfile = "{name}"\n')
-        with pytest.raises(ConfigError, match="cannot be read") as caught:
+        with pytest.raises(ConfigError, match=r"cannot be read|is a folder") as caught:
             read_case(case)
-        assert caught.value.rule == "no-file"
+        assert caught.value.rule == rule
 
 
 def test_a_simulator_that_is_a_pipe_is_refused_not_waited_for(tmp_path):

@@ -127,12 +127,12 @@ def test_points_and_their_curve_share_an_entry_of_the_legend_and_grid_lines_have
 def test_a_name_is_text_whatever_it_holds_and_what_is_no_number_is_left_blank() -> None:
     figure = plot(Curve(label='=A1&<b>"\x07', x=(0.0, 1.0), y=(math.nan, 2.0)), legend_title="x")
     chart = etree.fromstring(chart_xml(figure, "en-US"))
-    assert chart.find(f".//{C}tx//{C}v").text == 'x: =A1&<b>"\ufffd'
+    assert chart.find(f".//{C}tx//{C}v").text == 'x: =A1&<b>"\\x07'
     assert numbers(chart.find(f".//{C}yVal")) == [None, 2.0]
     sheet = openpyxl.load_workbook(
         io.BytesIO(chart_book(dataclasses.replace(figure, legend_title=None)))
     ).active
-    assert (sheet["B1"].value, sheet["B1"].data_type) == ('=A1&<b>"\ufffd', "s")
+    assert (sheet["B1"].value, sheet["B1"].data_type) == ('=A1&<b>"\\x07', "s")
     assert (sheet["B2"].value, sheet["B3"].value) == (None, 2)
 
 

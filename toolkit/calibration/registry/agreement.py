@@ -48,7 +48,7 @@ def check_agrees(record: CalibrationRecord, session: bytes, table: Table, dcc: b
     stored = record.data_file("session")
     file = "the session" if stored is None else stored.file
     try:
-        raw = parse_session(session, where=file)
+        raw = parse_session(session, where=file, entered=True)
         if dcc is not None and dcc_name(raw) is not None:
             # Few sessions have one: the others do not wait for cryptography.
             from toolkit.calibration.dcc.standard import with_standard

@@ -28,7 +28,7 @@ from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import sha256_bytes, write_atomic
 from toolkit.inputs import read_regular
 from toolkit.trust.keys import Signer
-from toolkit.trust.people import FILE, ROOT_HEADS, History, People, version_of
+from toolkit.trust.people import FILE, ROOT_HEADS, History, People, parse_people, version_of
 from toolkit.trust.signing import HERE, Signing, Travel
 from toolkit.trust.ssh import PublicKey
 
@@ -133,6 +133,7 @@ def enrol(
     data = people.text().encode()
     digest = sha256_bytes(data)
     time = travel.answers[0].time if travel.answers else now()
+    parse_people(data, where=FILE)  # which no longer lets every text in that it lets be read
     version = version_of(data, time)  # what nobody could read again is never entered
 
     with contextlib.ExitStack() as locks:

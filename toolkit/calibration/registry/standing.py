@@ -141,15 +141,25 @@ def standing(
     reasons = _reasons(registry, record, instrument, on, known_on)
     texts = {reason.text for reason in reasons}
     later = () if known_on >= today() else _reasons(registry, record, instrument, on, today())
+    status = registry.status(record.id, known_at=known_on)
+    approved = () if status.approved_later is None else (approved_after(status.approved_later, known_on),)
     return Standing(
         record=record,
         instrument=instrument,
         on=on,
         known_at=known_on,
         reasons=reasons,
-        since=tuple(reason.text for reason in later if reason.text not in texts),
-        discarded=registry.status(record.id, known_at=known_on).state == "discarded",
+        since=(*approved, *(reason.text for reason in later if reason.text not in texts)),
+        discarded=status.state == "discarded",
         signature=registry.signature(record.id),
+    )
+
+
+def approved_after(day: date, known_on: date) -> str:
+    """Return that an approval was not known on the day of knowledge, and serves all the same."""
+    return (
+        f"approved on {day.isoformat()}, after {known_on.isoformat()}: no earlier approval serves, and a "
+        "ledger may begin later than the calibrations that it tells of"
     )
 
 

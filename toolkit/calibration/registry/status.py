@@ -25,7 +25,8 @@ class RecordStatus:
     void; both None where there is none. ``void_always``: void on every day of its use, as a discarded
     candidate is. ``reason`` is that of the withdrawal or discard, else of the approval. ``unverifiable`` are
     the terms that its check loads could not verify, as "load: term". ``recall`` is the interval that the last
-    approval with one has set.
+    approval with one has set. ``approved_later`` is the day of its first approval where that lies after the
+    day of knowledge: nobody knew of it then, and it serves where no earlier approval does.
     """
 
     id: str
@@ -40,6 +41,7 @@ class RecordStatus:
     approved_by: str | None
     unverifiable: tuple[str, ...]
     recall: str | None = None
+    approved_later: date | None = None
 
     @property
     def ended(self) -> bool:
@@ -71,6 +73,7 @@ def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> Recor
     void_from = None
     if end is not None:
         void_from = end.since if end.since is not None else (since or date.min)
+    approved_on = min((e.known_on for e in approvals if e.known_on is not None), default=None)
     last = approvals[-1] if approvals else None
     state: State = "approved" if approvals else "candidate"
     if end is not None:
@@ -89,6 +92,7 @@ def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> Recor
         approved_by=last.approved_by if last else None,
         unverifiable=last.unverifiable if last else (),
         recall=next((entry.recall for entry in reversed(approvals) if entry.recall), None),
+        approved_later=None if approved_on is None or approved_on <= known_at else approved_on,
     )
 
 

@@ -30,11 +30,13 @@ from toolkit.calibration.registry.settled import JOURNAL, before, damaged, is_pa
 from toolkit.calibration.registry.signatures import signed_event, timed_event
 from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes, write_atomic
+from toolkit.printable import check_entries
 from toolkit.system import sync_folder
 from toolkit.trust.people import Action
 from toolkit.trust.signing import Signing
 
 _DECIDED = ".pending.json.part"
+_NAMES = ("by", "approved_by", "recall")
 # A folder that another writer removes while this one waits for its lock is made again.
 _ATTEMPTS = 100
 
@@ -72,6 +74,8 @@ def commit(
         instrument differs by case alone (``instrument-case``); ``no-locks``; ``locked``. Nothing is written
     OutputError
         the folder cannot be written to: the message says that nothing was changed, or what state it is in
+    ConfigError
+        ``unprintable``: a text of the event has a character that no document can print; nothing is written
     TrustError
         ``not-signed``, ``not-allowed``: the decision takes other keys; ``request``; nothing is written
     Requested
@@ -87,6 +91,8 @@ def commit(
         change = build(ledger)
         if change is None:
             return False
+        # A line stands for ever, and every document of its record prints what it says.
+        check_entries(change.event, where=change.event["id"], names=_NAMES)
         event = timed_event(change.event, ledger, signing)
         last = ledger.entries[-1].time if ledger.entries else None
         check_after(last, event["time"], folder / LEDGER)

@@ -156,7 +156,7 @@ def stored_session(registry: Path, record: CalibrationRecord) -> Session:
             next_step="see 'toolkit calibration show' for its coefficients and their source",
             rule="data",
         )
-    raw = parse_session(files["session"], where=folder / f"{record.id}.session.toml")
+    raw = parse_session(files["session"], where=folder / f"{record.id}.session.toml", entered=True)
     entry = raw.get("check")
     check = (
         entry if isinstance(entry, str) else (entry or {}).get("file", (entry or {}).get("data", "check.csv"))

@@ -35,6 +35,7 @@ from toolkit.declared import Source, refuse
 from toolkit.errors import SessionError
 from toolkit.files import real_path, sha256_bytes
 from toolkit.inputs import DATA_FILE, SETTINGS_FILE, TooLargeError, read_input, read_regular, unreadable
+from toolkit.printable import check_entries
 from toolkit.publication import settle
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ def read_session(path: Path, *, entered: bool = False, standards: Standards | No
     """
     settle(path.parent)
     session_bytes = read_input(path, SETTINGS_FILE)
-    raw = parse_session(session_bytes, where=path)
+    raw = parse_session(session_bytes, where=path, entered=entered)
     if not entered:
         refuse(session_faults(raw), Source(where=path, text=session_bytes.decode("utf-8-sig")))
     dcc_bytes = None
@@ -150,6 +151,9 @@ def read_session(path: Path, *, entered: bool = False, standards: Standards | No
         optional=uncertainties,
         labels=labels,
     )
+    if not entered:
+        for name, texts in recorded.labels:
+            check_entries(texts, where=f"{path.parent / str(raw['data'])}, column {name}")
     if settings.method == "wls":
         check_weights(recorded, loads, path)
     check_columns(recorded, loads, path)

@@ -197,10 +197,13 @@ class CellEntries:
         Entry("of the bridge", expected="volts above zero"),
     ] = None
     shunt_expected: Annotated[_Stated | None, Entry("the step that the shunt makes", expected=_PLAIN)] = None
-    shunt_measured: Annotated[_Stated | None, Entry("the step that was read", expected=_PLAIN)] = None
+    shunt_measured: Annotated[
+        _Stated | None, Entry("the step that was read", expected=_PLAIN, together="shunt_expected")
+    ] = None
     shunt_tolerance: Annotated[
         float | None, Unit("%", plain=True), Above(0),
-        Entry("of the expected step; default 0.1 %", expected="per cent, above zero"),
+        Entry("of the expected step; default 0.1 %", expected="per cent, above zero",
+              together="shunt_expected"),
     ] = None  # fmt: skip
     u: Annotated[_Stated | None, Above(0), Entry("standard uncertainty", expected=_POSITIVE)] = None
     temperature_coefficient: Annotated[
@@ -267,11 +270,13 @@ class Polarity:
     value: Annotated[Amount, Entry("the load that was applied", expected="{ value, unit }")]
     indications: Annotated[
         tuple[tuple[str, _WithUnit], ...], Keyed(), _INDICATIONS,
-        Entry("what it made", expected="{ NAME = { value, unit } }", example={}),
+        Entry("what it made", expected="{ NAME = { value, unit } }",
+              example={"D51": {"value": 0.1, "unit": "mV/V"}}),
     ]  # fmt: skip
     zero: Annotated[
         tuple[tuple[str, _WithUnit], ...], Keyed(), _INDICATIONS,
-        Entry("without load, where it is not zero", expected="{ NAME = { value, unit } }"),
+        Entry("without load, where it is not zero", expected="{ NAME = { value, unit } }",
+              example={"D51": {"value": 0.0, "unit": "mV/V"}}),
     ] = ()  # fmt: skip
     tolerance: Annotated[float, Above(0), AtMost(0.5), Entry("as a share of the load")] = 0.2
 
@@ -327,12 +332,21 @@ class SessionFile:
     phase: Annotated[Literal["as_found", "as_left"] | None, Entry("of the instrument", example="as_left")] = (
         None
     )
-    model: Annotated[Literal["linear", "polynomial", "balance"], Entry("of the loads")] = "linear"
+    model: Annotated[
+        Literal["linear", "polynomial", "balance"],
+        Entry("of the loads; a polynomial has a degree", example="polynomial", together="degree"),
+    ] = "linear"
     degree: Annotated[
-        int | None, AtLeast(1), AtMost(9), Entry("of a polynomial", expected="a whole number from 1 to 9")
+        int | None,
+        AtLeast(1),
+        AtMost(9),
+        Entry("of a polynomial", expected="a whole number from 1 to 9", example=2, together="model"),
     ] = None
     method: Annotated[Literal["ols", "wls", "gls", "odr"], Entry("of the fit")] = "ols"
-    drop: Annotated[tuple[str, ...], Entry("terms that are left out", expected="a list of term names")] = ()
+    drop: Annotated[
+        tuple[str, ...],
+        Entry("terms that are left out", expected="a list of term names", example=["intercept"]),
+    ] = ()
     temperature: Annotated[
         Amount | None,
         Entry("of the room", expected='{ value = 20, unit = "degC" }', example={"value": 20, "unit": "degC"}),

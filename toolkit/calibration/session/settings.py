@@ -79,16 +79,16 @@ class Settings:
         return tolerance
 
 
-def parse_session(data: bytes, *, where: object) -> dict[str, Any]:
-    """Parse the text of a SESSION.toml.
+def parse_session(data: bytes, *, where: object, entered: bool = False) -> dict[str, Any]:
+    """Parse the text of a SESSION.toml; ``entered``: it lies beside a record.
 
     Raises
     ------
     ConfigError
-        ``not-toml``, with a hint where ``check`` stands as a value and as a table
+        ``unprintable``; ``not-toml``, with a hint where ``check`` stands as a value and as a table
     """
     try:
-        return parse_toml(data, where=where)
+        return parse_toml(data, where=where, entered=entered)
     except ToolkitError as error:
         text = data.decode("utf-8", "replace")
         if not (_CHECK_VALUE.search(text) and _CHECK_TABLE.search(text)):

@@ -14,7 +14,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.lab.archives.audit_answer import AuditOutcome, files_of
+from toolkit.lab.archives.audit_answer import AuditOutcome, approved_later, files_of
 from toolkit.lab.archives.audit_headline import headline
 from toolkit.lab.faces import Face, Facts
 
@@ -120,6 +120,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
         drifted_tests=drifted_tests(results, drifted),
         copies=copies,
         amended=amended,
+        approved_later=approved_later(results, registry),
     )
     written = () if order.out is None else write_folder(order.out, answer, registry, opened)
     if order.parquet is not None:

@@ -5,21 +5,25 @@ from __future__ import annotations
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.audit.model import CLEAN
+from toolkit.calibration.registry.standing import approved_after
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import ErrorEntry, one_line, table
 from toolkit.lab.archives.audit_headline import headline
 from toolkit.lab.tire_tests.inspection_answer import RefusedRecord, Repair, Segment, SkippedRecord
 
 if TYPE_CHECKING:
+    import datetime as dt
+
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.corrected import Copy
     from toolkit.audit.linked import Linked
     from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.archives.amended import Amended
 
 
@@ -252,6 +256,10 @@ class AuditAnswer(TypedDict):
     summary: Grades
     tests: list[ArchivedTest]
     refused_records: list[RefusedRecord]
+    approved_later: Annotated[
+        Mapping[str, str],
+        "records in force by an approval after known_at, which serve where no earlier one does: its day",
+    ]
     heads: Annotated[Mapping[str, str], "of each instrument's ledger"]
     findings: list[FindingEntry]
     reports: NotRequired[Annotated[list[RestingReport], "with --reports"]]
@@ -277,6 +285,14 @@ class AuditOutcome:
     drifted_tests: tuple[DriftedTest, ...]
     copies: tuple[Copy, ...] | None
     amended: tuple[Amended, ...] = ()
+    approved_later: Mapping[str, dt.date] = field(default_factory=dict)
+
+
+def approved_later(audit: ArchiveAudit, registry: Registry) -> dict[str, dt.date]:
+    """Return the records in force on the tests' days whose approvals lie after the day of knowledge."""
+    used = {plain["in_force"] for plain in audit.files.plain() if plain["in_force"]}
+    days = {name: registry.status(name, known_at=audit.known_at).approved_later for name in sorted(used)}
+    return {name: day for name, day in days.items() if day is not None}
 
 
 def payload_of(answer: AuditOutcome) -> dict[str, Any]:
@@ -290,6 +306,7 @@ def payload_of(answer: AuditOutcome) -> dict[str, Any]:
         "summary": {"files": len(audit.files), "grades": dict(audit.grades), "undated": audit.undated},
         "tests": _tests(answer),
         "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in audit.refused],
+        "approved_later": {name: day.isoformat() for name, day in answer.approved_later.items()},
         "heads": dict(audit.heads),
         "findings": (finding.as_dict() for finding in audit.findings),
     }
@@ -336,6 +353,8 @@ def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
         lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
     counted = ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count)
     lines += ["", f"{len(audit.files)} files: {counted or 'none'}; known at {audit.known_at.isoformat()}"]
+    for name, day in answer.approved_later.items():
+        lines += textwrap.wrap(f"{name}: {approved_after(day, audit.known_at)}", width)
     notes = Counter(finding.rule for finding in audit.findings if finding.level == "note")
     if notes:
         lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))

@@ -295,7 +295,7 @@ def _session_text(session: bytes, plan: SessionPlan) -> str:
     from toolkit.declared import toml_text
     from toolkit.files import parse_toml
 
-    entries = parse_toml(session, where=plan.record)
+    entries = parse_toml(session, where=plan.record, entered=True)
     for key in ("creep", "polarity", "certificate", "phase", "temperature"):
         entries.pop(key, None)
     if isinstance(entries.get("zero"), list):

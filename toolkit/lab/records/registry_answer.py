@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import UNSIGNED
+from toolkit.calibration.registry.standing import approved_after
 from toolkit.declared.answers import entry_of
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import table
@@ -52,6 +53,10 @@ class RecordRow(TypedDict):
     reason: str | None
     unverifiable: Annotated[list[str], "terms that no check load verifies"]
     recall: str | None
+    approved_later: Annotated[
+        str | None,
+        "day of its approval, where that lies after --known-at: it serves where no earlier one does",
+    ]
     signature: str
 
 
@@ -175,6 +180,7 @@ def listed(
     """
     rows: list[RecordRow | RefusedRow] = []
     heads: dict[str, Head] = {}
+    known: dict[str, RecordStatus] = {}
     bad = hidden = 0
     for name in [instrument] if instrument else registry.instruments():
         ledger = registry.ledger(name)
@@ -182,6 +188,7 @@ def listed(
         good, refused = registry.usable(name)
         bad += len(refused) + (ledger.damage is not None)
         statuses = registry.statuses(name, known_at=known_at) if good else {}
+        known |= {record.id: statuses[record.id] for record in good}
         signatures = registry.signatures(name) if good else {}
         all_rows = [record_row(record, statuses[record.id], signatures[record.id]) for record in good]
         shown = [row for row in all_rows if everything or row["status"] != "discarded"]
@@ -200,8 +207,13 @@ def listed(
         align="<" * 8,
     )  # fmt: skip
     hidden_line = [f"discarded and not shown: {hidden} (--all)"] if hidden else []
+    later = [
+        f"{record_id}: {approved_after(status.approved_later, known_at)}"
+        for record_id, status in known.items()
+        if status.approved_later is not None and known_at is not None
+    ]
     heads_text = [f"head of {n}: {h['sha256']}" for n, h in heads.items()]
-    text = "\n".join([lines or "no records", *hidden_line, "", *heads_text])
+    text = "\n".join([lines or "no records", *later, *hidden_line, "", *heads_text])
     return {"records": rows, "heads": heads, "hidden": hidden}, text, not bad
 
 
@@ -335,6 +347,7 @@ def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) 
         "reason": status.reason,
         "unverifiable": list(status.unverifiable),
         "recall": status.recall,
+        "approved_later": _iso(status.approved_later),
         "signature": signature,
     }
 

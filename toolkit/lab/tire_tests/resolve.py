@@ -118,9 +118,7 @@ def _from_folder(
         result=result,
         record=stands.record,
         findings=(*_findings(use), *result.findings),
-        recordings=tuple(
-            (recording.path.relative_to(test).as_posix(), recording) for recording in recordings
-        ),
+        recordings=tuple((recording.name_in(test), recording) for recording in recordings),
     )
 
 

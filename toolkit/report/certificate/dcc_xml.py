@@ -10,6 +10,7 @@ from typing import Any
 from lxml import etree
 
 from toolkit.calibration.terms import INTERCEPT, parse_term
+from toolkit.printable import escaped
 from toolkit.report.word.xml import clean
 from toolkit.units import unit
 
@@ -27,7 +28,7 @@ def node(tag: str, *children: Node | str | None, **attributes: str) -> Node:
         if child is None or (isinstance(child, str) and not child):
             continue
         if isinstance(child, str):
-            element.text = " ".join(clean(child).split())
+            element.text = " ".join(escaped(clean(child)).split())
         else:
             element.append(child)
     return element

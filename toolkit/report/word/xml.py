@@ -11,6 +11,8 @@ from typing import Any
 
 from lxml import etree
 
+from toolkit.printable import escaped
+
 Element = Any  # lxml's own class; its stubs do not cover the custom classes of python-docx
 
 NS = {
@@ -118,8 +120,9 @@ def paragraph_text(paragraph: Element) -> str:
 
 
 def clean(text: str) -> str:
-    """Return text without the characters that XML cannot hold."""
-    return _ILLEGAL.sub("\ufffd", text.replace("\r\n", "\n").replace("\r", "\n"))
+    """Return text with the characters that XML cannot hold as escapes."""
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    return _ILLEGAL.sub(lambda match: escaped(match[0]), text)
 
 
 def right_to_left(text: str) -> bool:
