@@ -11,7 +11,9 @@ import numpy as np
 from toolkit.diagnosis.answer.answer import HeldOutFit
 from toolkit.diagnosis.fit.sensor_noise import NoiseParts, noise_parts
 from toolkit.diagnosis.fit.structure import groups
+from toolkit.diagnosis.law.trial import bracketed
 from toolkit.diagnosis.search.search import Search
+from toolkit.diagnosis.simulators.parameter_units import reduced
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,7 +42,7 @@ def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
         errors.append(
             HeldOutFit(
                 channel=output.name,
-                unit=f"({output.unit})/s" if output.name in problem.rates else output.unit,
+                unit=reduced(f"{bracketed(output.unit)}/s") if output.name in problem.rates else output.unit,
                 nominal_rmse=rmse(search.nominal.simulated[output.name]),
                 refitted_rmse=rmse(search.held_refitted.simulated[output.name]),
                 augmented_rmse=rmse(augmented.simulated[output.name]),

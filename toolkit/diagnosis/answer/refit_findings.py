@@ -28,9 +28,9 @@ def _drifting(case: Case, search: Search) -> tuple[Finding, ...]:
             where=f"{case.path.name}: {name}",
             level="note",
             message="an integrating plant that nothing leads back: its free simulation is limited by drift, "
-            f"and judged by its rates over {apart} rows",
+            f"and judged by its rates over {search.problem.rate_s(name):.3g} s",
         )
-        for name, apart in search.problem.rates.items()
+        for name in search.problem.rates
     )
 
 

@@ -76,11 +76,11 @@ class Problem:
 
     def judged_sd(self, name: str, sd: float) -> float:
         """Return the standard deviation of what is judged of an output by that of its values' white noise."""
-        apart = self.rates.get(name)
-        if apart is None:
-            return sd
-        row = float(np.median(np.concatenate([np.diff(run.t) for run in self.runs])))
-        return float(np.sqrt(2) * sd / (apart * row))
+        return float(np.sqrt(2) * sd / self.rate_s(name)) if name in self.rates else sd
+
+    def rate_s(self, name: str) -> float:
+        """Return the time over which the rates of a drifting output are taken [s]."""
+        return self.rates[name] * float(np.median(np.concatenate([np.diff(run.t) for run in self.runs])))
 
     def simulate(self, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
         """Return every output over all runs in their order; ``p`` are the free parameters."""

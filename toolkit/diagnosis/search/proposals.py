@@ -71,7 +71,7 @@ class Proposals:
         if not self.scored:
             return ()
         best = self.scored[0]
-        place = (f"the equation of {best.candidate.active.channel}",)
+        place = (f"{best.candidate.active.channel} (from row to row)",)
         return tuple(
             StructureFound(
                 output=name, variables=place, gain=best.gain, p_value=self.p_of[id(best)], rest=True
