@@ -76,5 +76,10 @@ def test_a_branch_that_relaxes_is_the_law_that_takes_most_of_every_unseen_run(tm
     assert np.sqrt(np.mean(left**2)) == pytest.approx(0.002, rel=0.1)
 
 
+def test_noise_has_no_law_even_where_unseen_runs_are_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr(unseen_runs, "asked_of_unseen_runs", lambda *_: True)
+    assert shown(tmp_path, noise=30.0) == []
+
+
 def test_what_noise_may_have_left_is_not_asked_of_unseen_runs(tmp_path):
     assert shown(tmp_path, noise=0.3) == []

@@ -8,6 +8,7 @@ fitted by ordinary least squares and judged by the runs that no fit has seen, si
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -58,7 +59,8 @@ def laws_on_unseen_runs(
     shown = []
     for trial in _ranked(problem, base, screen, trials, weight)[: UNSEEN.fitted]:
         made = joint_fit(problem, base, (trial.applied,), plain=True)
-        if made is None or at_bound(made.active[-1]):
+        # What does not take most of the rows that it was fitted to takes less of others.
+        if made is None or at_bound(made.active[-1]) or not takes_most(problem, base, made):
             continue
         try:
             held_out = hold_out(problem, folds, made.active, made)
@@ -66,6 +68,8 @@ def laws_on_unseen_runs(
             continue
         if takes_most(problem, held_base, held_out):
             shown.append((trial, made, held_out))
+    if not shown:
+        return []
     gains = gains_of(problem, held_base, [(made, held_out) for _, made, held_out in shown])
     return [ShownLaw(*each, gain) for each, gain in zip(shown, gains, strict=True)]
 
@@ -73,12 +77,17 @@ def laws_on_unseen_runs(
 def _ranked(
     problem: Problem, base: Fit, screen: LinearisedFit, trials: Sequence[Trial], weight: float
 ) -> list[Trial]:
-    """Return laws with the amplitudes of ordinary least squares, those first that leave the least."""
+    """Return laws with the amplitudes of ordinary least squares, those first that leave the least.
+
+    None that leaves more in proportion than it may of any run.
+    """
+    least = -screen.n * math.log(1 - UNSEEN.every)
     predicting = [trial for trial in trials if trial.form != "event"]
     best = likely(problem, base, screen.whitened(), predicting, weight)
     sized = []
     for trial, directions in zip(best, all_responses(problem, base, best), strict=True):
         if directions is not None:
             gain, coefficients = screen.plain_gain(directions)
-            sized.append(replace(at_coefficients(trial, coefficients), gain=gain))
+            if gain > least:
+                sized.append(replace(at_coefficients(trial, coefficients), gain=gain))
     return sorted(sized, key=lambda trial: -(trial.gain - 2 * weight * trial.cost))

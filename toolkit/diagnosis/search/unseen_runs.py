@@ -139,7 +139,7 @@ def asked_of_unseen_runs(problem: Problem, folds: Folds, base: Fit, screen: Line
     return enough and few and is_beyond_noise(problem, base)
 
 
-def takes_most(problem: Problem, before: HeldOut, after: HeldOut) -> bool:
+def takes_most(problem: Problem, before: HeldOut | Fit, after: HeldOut | Fit) -> bool:
     """Tell whether most of the error is gone: nearly all of it in the median run, and half in every one."""
     shares = 1 - _runs(problem, after.simulated) / np.maximum(_runs(problem, before.simulated), 1e-300)
     return bool(np.median(shares) > UNSEEN.usual and shares.min() > UNSEEN.every)
