@@ -49,12 +49,17 @@ def laws_on_unseen_runs(
 ) -> list[ShownLaw]:
     """Return laws that take most of the rest of whole unseen runs; none where noise may have left it.
 
+    Not asked of equations: there each of these fits takes many integrations, and prediction errors along the
+    recording, which have no long memory, have proposed what they show.
+
     Parameters
     ----------
     trials : what was looked at; what was met once foretells nothing and is passed over
     weight : what a parameter costs of the log-likelihood
     """
-    if not asked_of_unseen_runs(problem, folds, base, screen):
+    motion = problem.model.capability.motion
+    integrates = motion is not None and motion.integrates
+    if integrates or not asked_of_unseen_runs(problem, folds, base, screen):
         return []
     shown = []
     for trial in _ranked(problem, base, screen, trials, weight)[: UNSEEN.fitted]:
