@@ -65,7 +65,7 @@ def test_the_same_results_have_the_same_name_on_any_day_and_others_another() -> 
         ("de", "Laborvergleich: Konizität, Plysteer", "Ausreißer", "Konsens von 5 (Algorithmus A)",
          "D liegt abseits der übrigen"),
         ("fr", "Comparaison interlaboratoires: conicité, plysteer", "valeur aberrante",
-         "consensus de 5 (algorithme A)", "D s'écarte des autres"),
+         "consensus de 5 (algorithme A)", "D s’écarte des autres"),
     ],
 )  # fmt: skip
 def test_it_speaks_the_language_of_its_style(
