@@ -84,6 +84,15 @@ def test_only_a_driven_plant_that_nothing_leads_back_drifts(tmp_path, spring, dr
     assert bool(judged_by_rates(problem, fit(problem)).rates) is drifts
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_run_whose_position_was_not_read_says_nothing_of_drift(tmp_path):
+    tables = runs(3, zero=0.3)
+    tables["r1__csv"]["position"] = np.nan
+    case = written(tmp_path, tables)
+    problem = problem_of(case, model_of(case, None))
+    assert judged_by_rates(problem, fit(problem)).rates
+
+
 def test_a_rate_is_the_slope_of_what_was_recorded(tmp_path):
     case = written(tmp_path, runs(2, zero=0.3))
     problem = problem_of(case, model_of(case, None))

@@ -37,7 +37,11 @@ def judged_by_rates(problem: Problem, base: Fit) -> Problem:
     driven = bool(problem.case.drivers) and problem.case.has_time
     if motion is None or not motion.integrates or not driven:
         return problem
-    drifting = {name for name in _led_nowhere(problem, base) if _wanders(problem, base.residual[name], name)}
+    drifting = {
+        name
+        for name in _led_nowhere(problem, base)
+        if problem.kept[name].any() and _wanders(problem, base.residual[name], name)
+    }
     return replace(problem, rates={name: _rows_apart(problem, base, name) for name in sorted(drifting)})
 
 
@@ -74,14 +78,16 @@ def _rows_apart(problem: Problem, base: Fit, name: str) -> int:
 
 def _wanders(problem: Problem, residual: NDArray[np.float64], name: str) -> bool:
     """Tell whether most of an error is the sum of what came before, and not what happens there."""
-    variance = np.mean([residual[at][problem.kept[name][at]].var() for at in problem.slices])
+    parts = [residual[at][problem.kept[name][at]] for at in problem.slices]
+    variance = float(np.mean([part.var() for part in parts if len(part)]))
     moves = _moves(problem, residual, name, _part(problem, name))
     return bool(moves < DRIFT.wanders * 2 * variance)
 
 
 def _part(problem: Problem, name: str) -> int:
     """Return the rows of the longest part of a run over which a rate is taken."""
-    return max(min(int(problem.kept[name][at].sum()) for at in problem.slices) // DRIFT.parts, 1)
+    counts = [int(problem.kept[name][at].sum()) for at in problem.slices]
+    return max(min(count for count in counts if count) // DRIFT.parts, 1)
 
 
 def _moves(problem: Problem, residual: NDArray[np.float64], name: str, apart: int) -> float:

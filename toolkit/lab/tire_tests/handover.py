@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.findings import Finding
     from toolkit.lab.tire_tests.resolve import Resolved
-    from toolkit.lab.tire_tests.tire_files import TestTire
+    from toolkit.lab.tire_tests.tire_files import HandedTire
     from toolkit.recording.folder import ReportDetails
     from toolkit.report.diagnosis.answer import Told
 
@@ -43,7 +43,7 @@ def details_of(test: Path, file: Path | None) -> ReportDetails:
 
 
 def writers(
-    resolved: Resolved, test: Path, *, xlsx: bool, tydex: bool, tire: TestTire | None
+    resolved: Resolved, test: Path, *, xlsx: bool, tydex: bool, tire: HandedTire | None
 ) -> dict[str, Callable[[Path], object]]:
     """Return the functions that write the files asked for, by name; a ``tire`` is one of the test."""
     files: dict[str, Callable[[Path], object]] = {}

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.lab.signatures.issuing import Issuing
     from toolkit.lab.tire_tests.resolve import Resolved
-    from toolkit.lab.tire_tests.tire_files import TestTire
+    from toolkit.lab.tire_tests.tire_files import HandedTire
     from toolkit.report.deliver import Delivered, Job
     from toolkit.report.diagnosis.answer import Told
     from toolkit.report.drawer import Drawer
@@ -229,7 +229,7 @@ def _compared(test: Path, resolved: Resolved, models: tuple[str, ...]) -> tuple[
     return replace(resolved, findings=(*resolved.findings, *fit_findings)), fitted.comparison
 
 
-def _with_tire(resolved: Resolved, options: Options) -> tuple[Resolved, TestTire | None]:
+def _with_tire(resolved: Resolved, options: Options) -> tuple[Resolved, HandedTire | None]:
     """Return the tire that is handed over, if one is, and the test with what was found of its fit."""
     from toolkit.lab.tire_tests.tire_files import fit_test_tire
 
@@ -245,7 +245,7 @@ def _job(
     folder: Path,
     options: Options,
     comparison: Comparison | None,
-    tire: TestTire | None = None,
+    tire: HandedTire | None = None,
 ) -> Job:
     from toolkit.calibration.registry.registry import instrument_of
     from toolkit.lab.tire_tests.handover import details_of, provenance, writers

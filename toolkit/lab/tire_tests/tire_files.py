@@ -136,10 +136,8 @@ def _road_note(road: Drum, radius_m: float | None) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TestTire:
+class HandedTire:
     """MF 6.1 over all loads of a test's first direction, and the rows that it was fitted to."""
-
-    __test__ = False  # not a pytest class
 
     fit: ModelFit
     data: Measured
@@ -161,7 +159,7 @@ class TestTire:
         )
 
 
-def fit_test_tire(reduced: ReducedTest) -> TestTire:
+def fit_test_tire(reduced: ReducedTest) -> HandedTire:
     """Return MF 6.1 over all loads of a test's first direction.
 
     The radius is that of the tire's size.
@@ -203,4 +201,4 @@ def fit_test_tire(reduced: ReducedTest) -> TestTire:
             rule="one-load",
         )
     fit = fit_global(MODEL, data, predict=False)
-    return TestTire(fit=fit, data=data, rotation=run[0].rotation)
+    return HandedTire(fit=fit, data=data, rotation=run[0].rotation)
