@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,9 @@ def mostly_unknown(search: Search) -> bool:
     parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
     what was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with
     a size that no cell has.
+
+    Nothing outweighs effects that take more of an output's unseen rows than they leave there: a coloured
+    noise weighs slow errors little, however large they are.
     """
     if search.steps and implausible(search) and not _takes_nearly_all(search):
         return True
@@ -39,7 +42,7 @@ def mostly_unknown(search: Search) -> bool:
         return False
     if outsized(search):
         return True
-    if any(removed > VERDICT.nearly * above for removed, above in shown):
+    if any(each.removed > min(VERDICT.nearly * each.above, each.left) for each in shown):
         return False
     unexplained = max(
         (structure.gain / 2 for structure in search.structure if not structure.rest), default=0.0
@@ -49,7 +52,7 @@ def mostly_unknown(search: Search) -> bool:
         return True
     if all(step.active.effect.from_digits for step in search.steps):
         return not search.steps  # read off the digits: it does not imitate anything
-    return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
+    return bool(shown) and all(each.removed < VERDICT.taken * each.above for each in shown)
 
 
 def _is_smooth(search: Search) -> bool:
@@ -128,8 +131,16 @@ def _foretells_zeros(search: Search) -> bool:
     return free > 0 and tests * float(beta.sf(max(shares), taken / 2, free / 2)) < SCREENING.alpha
 
 
-def _taken(search: Search) -> list[tuple[float, float]]:
-    """Return what effects take of each output's held-out mean square, and what of it is above the noise.
+class _Share(NamedTuple):
+    """Of an output's held-out mean square: what effects take, what is above the noise, what they leave."""
+
+    removed: float
+    above: float
+    left: float
+
+
+def _taken(search: Search) -> list[_Share]:
+    """Return what effects take of each output.
 
     Outputs that show nothing but noise do not count: of nothing, nothing is two thirds. Where the runs have
     zeros of their own, these are no effect's to take, and every run counts about its own mean.
@@ -146,7 +157,7 @@ def _taken(search: Search) -> list[tuple[float, float]]:
             )
             before, after, floor = (_within_runs(problem, name, error) for error in errors)
         if before > VERDICT.shown * floor:
-            shown.append((before - after, before - floor))
+            shown.append(_Share(before - after, before - floor, after))
     return shown
 
 

@@ -16,6 +16,9 @@ from toolkit.effects.catalogue import effects as catalogue
 if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
 
+_OF_CELLS = (None, "force", "moment", "pressure", "bridge_ratio", "voltage", "counts", "ratio")
+"""Dimensions of what strain gauges read; None, of a unit that is not known, may be one."""
+
 # Classes of effects that a recording cannot tell apart, and the measurement that would.
 
 
@@ -77,17 +80,17 @@ def implausible(search: Search) -> tuple[str, ...]:
 def outsized(search: Search) -> bool:
     """Tell whether a law of a cell stands with a size that no cell has: something else bends the answer.
 
-    Asked of what acts by the value that a cell carries. A zero may be any, where nobody tared.
+    Asked of what acts by the value that a cell carries, on what a cell can read: an iron's loop is no cell's.
+    A zero may be any, where nobody tared.
     """
-    return any(
-        active.effect.stage == "load_cells"
-        and active.effect.on_channel is not None
-        and active.effect.on_channel.by_value
-        and active.is_unusual(
-            CaseView(search.problem, active.channel, active.source), log_density=PRIORS.within**2 / 2
-        )
-        for active in (step.active for step in search.steps)
-    )
+    for active in (step.active for step in search.steps):
+        by_value = active.effect.on_channel is not None and active.effect.on_channel.by_value
+        if active.effect.stage != "load_cells" or not by_value:
+            continue
+        view = CaseView(search.problem, active.channel, active.source)
+        if view.dimension() in _OF_CELLS and active.is_unusual(view, log_density=PRIORS.within**2 / 2):
+            return True
+    return False
 
 
 def next_measurements(search: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:

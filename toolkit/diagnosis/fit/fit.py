@@ -135,6 +135,7 @@ def fit(
     rounds: int = _OUTER,
     plain: bool | None = None,
     derivatives: Derivatives | None = None,
+    least: float = -math.inf,
 ) -> Fit:
     """Fit a hypothesis.
 
@@ -146,6 +147,8 @@ def fit(
     noise : from which the whitening starts; None for white noise first
     plain : ordinary least squares, or not; None lets a specification test decide
     derivatives : those at the start, of a fit to other rows; then nobody asks for a covariance
+    least : log-posterior below which nobody asks for the fit: one that cannot reach it is not ended, and has
+        no covariance
     """
     intervals = derivatives is None
     if derivatives is None:
@@ -153,8 +156,10 @@ def fit(
     space = derivatives.space
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
-    solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives)
+    solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives, least)
     alternative = None
+    if solved.score < least:  # ordinary least squares are no likelier: the plain solution cannot reach it
+        plain, intervals = False, False
     if plain is None:
         alternative = _plain(space, layouts, solved, derivatives)
         plain = alternative is not None and _absorbs(solved, alternative, layouts)
@@ -189,8 +194,12 @@ def _coloured(
     noise: dict[str, Autoregression] | None,
     rounds: int,
     derivatives: Derivatives,
+    least: float,
 ) -> _Solved:
-    """Return generalised least squares, the noise estimated anew in every round."""
+    """Return generalised least squares, the noise estimated anew in every round.
+
+    Each round gains less than the one before: where as much again does not reach ``least``, it is the last.
+    """
     best: _Solved | None = None
     noise_now = noise
     for turn in range(max(rounds, 1)):
@@ -199,6 +208,8 @@ def _coloured(
         solved = _solve(space, layouts, x, noise_now, derivatives)
         if best is not None and solved.score < best.score + _BETTER:
             return solved if solved.score > best.score else best
+        if best is not None and 2 * solved.score - best.score < least:
+            return solved
         best, x, noise_now = solved, solved.x, solved.noise
         if not len(x) and turn:
             break
@@ -208,8 +219,13 @@ def _coloured(
 def _plain(
     space: Space, layouts: dict[str, Layout], from_: _Solved, derivatives: Derivatives
 ) -> _Solved | None:
-    """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise."""
-    if not len(from_.x) or not any(autoregression.reflection for autoregression in from_.noise.values()):
+    """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise.
+
+    None as well where an output only drifts: its squares are the sum of all that pushed it before, and the
+    smallest sum says nothing of what each push was.
+    """
+    coloured = any(autoregression.reflection for autoregression in from_.noise.values())
+    if not len(from_.x) or not coloured or space.problem.rates:
         return None
     weights = {
         name: Autoregression(

@@ -73,18 +73,21 @@ def step_groups(
     return [(first, least), *([(behind, STEP.least_behind)] if behind else []), *last]
 
 
-def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tuple[Joint, ...]:
+def joint_fits(
+    problem: Problem, base: Fit, promising: Sequence[Scored], *, least: float = -math.inf
+) -> tuple[Joint, ...]:
     """Return candidates fitted jointly with what is there, the best first; of equals the likeliest.
 
     The data do not prefer one of two that are nearly as good: then the likelier is the one that has a size as
     it is usually met, by likelihood times prior. A sensor's zero is a small share of its range, a drift that
-    takes half of it is none.
+    takes half of it is none. What cannot reach the score ``least`` is left out, and not fitted to its end.
     """
     joints = []
     for scored in promising:
-        fitted = joint_fit(problem, base, (scored.active,), begin=scored.p)
-        if fitted is not None:
-            score = fitted.log_posterior - cost(problem, (scored.active,))
+        dear = cost(problem, (scored.active,))
+        fitted = joint_fit(problem, base, (scored.active,), begin=scored.p, least=least + dear)
+        if fitted is not None and fitted.log_posterior - dear >= least:
+            score = fitted.log_posterior - dear
             joints.append(Joint(scored=scored, fit=fitted, score=score))
     return ranked(problem, joints)
 
@@ -205,7 +208,16 @@ def score_in_place(problem: Problem, made: Fit, active: AppliedEffect) -> float:
 
     Parameters that only shape an effect make it no less able to imitate another.
     """
-    return made.log_posterior - cost(problem, (active,)) + _weight(problem) * _shapes(active)
+    return made.log_posterior - _cost_in_place(problem, active)
+
+
+def least_in_place(problem: Problem, score: float, active: AppliedEffect) -> float:
+    """Return the log-posterior with which an effect comes so near to a score that the two are one class."""
+    return score - VERDICT.close + _cost_in_place(problem, active)
+
+
+def _cost_in_place(problem: Problem, active: AppliedEffect) -> float:
+    return cost(problem, (active,)) - _weight(problem) * _shapes(active)
 
 
 def _weight(problem: Problem) -> float:
@@ -220,29 +232,36 @@ def joint_fit(
     *,
     plain: bool | None = None,
     begin: tuple[float, ...] | None = None,
+    least: float = -math.inf,
 ) -> Fit | None:
     """Return the joint fit with effects more, None where the simulation runs with no part of them.
 
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
     true one is not. An effect that changes an answer's shape begins at the declared parameters as well, where
     a refit without it has moved them: they may have gone where it no longer helps. Where it was seen with
-    parameters of its own, it begins at these (``begin``).
+    parameters of its own, it begins at these (``begin``). A fit whose log-posterior cannot reach ``least`` is
+    not ended.
     """
     starts = [base.p if begin is None else begin]
     moved = float(np.abs(problem.off_priors(base.p)).max(initial=0.0))
     if begin is None and moved > PRIORS.moved and any(effect.effect.misleads for effect in added):
         starts.append(tuple(parameter.value for parameter in problem.free))
-    fits = [_fitted(problem, base, added, start, plain) for start in starts]
+    fits = [_fitted(problem, base, added, start, plain, least) for start in starts]
     return max((fitted for fitted in fits if fitted), key=lambda fitted: fitted.log_posterior, default=None)
 
 
 def _fitted(
-    problem: Problem, base: Fit, added: Sequence[AppliedEffect], start: tuple[float, ...], plain: bool | None
+    problem: Problem,
+    base: Fit,
+    added: Sequence[AppliedEffect],
+    start: tuple[float, ...],
+    plain: bool | None,
+    least: float,
 ) -> Fit | None:
     for share in (1.0, 0.5, 0.25, 0.125) if any(effect.searched for effect in added) else (1.0,):
         try:
             active = (*base.active, *(_shared(effect, share) for effect in added))
-            return fit(problem, active, start=start, plain=plain)
+            return fit(problem, active, start=start, plain=plain, least=least)
         except FitError:
             continue
     return None

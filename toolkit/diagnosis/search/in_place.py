@@ -17,7 +17,13 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, jacobian
 from toolkit.diagnosis.fit.noise import whiten
 from toolkit.diagnosis.policy import FOLLOWING
-from toolkit.diagnosis.search.forward_step import Rival, at_bound, joint_fit, score_in_place
+from toolkit.diagnosis.search.forward_step import (
+    Rival,
+    at_bound,
+    joint_fit,
+    least_in_place,
+    score_in_place,
+)
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
@@ -43,11 +49,13 @@ def best_in_place(
     """
     others = tuple(each for each in joint.active if each.key != applied.key)
     fits = {applied.key: (joint, applied)}
+    scores = {applied.key: score_in_place(problem, joint, applied)}
     for candidate in _alike(problem, joint, applied, listed)[: FOLLOWING.in_place]:
-        instead = joint_fit(problem, replace(joint, active=others), (candidate,))
+        least = least_in_place(problem, max(scores.values()), candidate)
+        instead = joint_fit(problem, replace(joint, active=others), (candidate,), least=least)
         if instead is not None and not any(at_bound(each) for each in instead.active):
             fits[candidate.key] = (instead, instead.active[-1])
-    scores = {key: score_in_place(problem, *there) for key, there in fits.items()}
+            scores[candidate.key] = score_in_place(problem, *fits[candidate.key])
     best = max(scores, key=lambda key: scores[key])
     rivals = tuple(
         Rival(active=active, difference=scores[key] - scores[best])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -146,16 +147,10 @@ def beside_rivals(
     if not promising:
         return led.outcome
     tell(promising)
-    joint = ranked(problem, (*led.joint, *joint_fits(problem, base, promising)))
+    made, _, steps = led.outcome
+    # What one effect could stand for several with has to explain as much as they do.
+    needed = made.log_posterior - cost(problem, made.active[-len(steps) :]) if len(steps) > 1 else -math.inf
+    joint = ranked(problem, (*led.joint, *joint_fits(problem, base, promising, least=needed)))
     p_of = led.proposed.p_of | view.p_of
     single = best_step(problem, folds, base, held_base, joint, p_of, least, refitted)
-    made, _, steps = led.outcome
-    if single is None or (
-        len(steps) > 1 and _score(problem, single[0], 1) < _score(problem, made, len(steps))
-    ):
-        return led.outcome  # several terms explain more than any one that could stand for them
-    return (*single[:2], (single[2],))
-
-
-def _score(problem: Problem, made: Fit, added: int) -> float:
-    return made.log_posterior - cost(problem, made.active[-added:])
+    return led.outcome if single is None else (*single[:2], (single[2],))

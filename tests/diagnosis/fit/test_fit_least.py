@@ -1,0 +1,74 @@
+"""A fit that cannot reach what it is compared with is not carried to its end."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.diagnosis.cases import write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.simulators.build_simulator import model_of
+
+CASE = """schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters]
+gain = { value = 1.0, unit = "1", sd = 1.0 }
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+L = { unit = "N", role = "input" }
+F = { unit = "N", role = "output" }
+[[recording.run]]
+file = "r0.csv"
+"""
+SIMULATOR = """
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"F": p["gain"] * inputs["L"]})
+"""
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory):
+    """A gain of two under noise that is correlated from row to row: the noise is estimated in rounds."""
+    rng = np.random.default_rng(4)
+    noise = np.zeros(400)
+    for i in range(1, 400):
+        noise[i] = 0.9 * noise[i - 1] + rng.normal(0, 0.1)
+    load = np.sin(np.arange(400) / 9)
+    frame = pd.DataFrame({"t": np.arange(400) * 0.01, "L": load, "F": 2.0 * load + noise})
+    case = read_case(write_case(tmp_path_factory.mktemp("c"), CASE, simulator=SIMULATOR, r0__csv=frame))
+    return problem_of(case, model_of(case, None))
+
+
+@pytest.fixture
+def simulations(monkeypatch):
+    """Count the simulations of a problem."""
+    counted = []
+    simulate = Problem.simulate
+    monkeypatch.setattr(Problem, "simulate", lambda *a, **k: counted.append(1) or simulate(*a, **k))
+    return counted
+
+
+def test_a_fit_that_reaches_the_least_is_the_fit_without_one(problem):
+    free = fit(problem)
+    held = fit(problem, least=free.log_posterior - 1)
+    assert (held.p, held.log_posterior) == (free.p, free.log_posterior)
+    assert held.covariance.tolist() == free.covariance.tolist()
+
+
+def test_a_fit_that_cannot_reach_the_least_ends_early_and_claims_no_uncertainty(problem, simulations):
+    free = fit(problem)
+    whole = len(simulations)
+    simulations.clear()
+    hopeless = fit(problem, least=free.log_posterior + 1e4)
+    assert len(simulations) < whole
+    assert hopeless.covariance.size == 0
+    assert hopeless.log_posterior <= free.log_posterior + 1e-6
+    assert math.isfinite(hopeless.log_posterior)
