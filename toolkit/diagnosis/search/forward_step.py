@@ -74,15 +74,22 @@ def step_groups(
 
 
 def joint_fits(
-    problem: Problem, base: Fit, promising: Sequence[Scored], *, least: float = -math.inf
+    problem: Problem,
+    base: Fit,
+    promising: Sequence[Scored],
+    *,
+    least: float = -math.inf,
+    beside: Sequence[Joint] = (),
 ) -> tuple[Joint, ...]:
     """Return candidates fitted jointly with what is there, the best first; of equals the likeliest.
 
     The data do not prefer one of two that are nearly as good: then the likelier is the one that has a size as
     it is usually met, by likelihood times prior. A sensor's zero is a small share of its range, a drift that
     takes half of it is none. What cannot reach the score ``least`` is left out, and not fitted to its end.
+    What was fitted before stands ``beside`` them: it may explain the same, though it was not chosen.
     """
-    joints = []
+    looked_at = {scored.candidate.key for scored in promising}
+    joints = [joint for joint in beside if joint.scored.candidate.key not in looked_at]
     for scored in promising:
         dear = cost(problem, (scored.active,))
         fitted = joint_fit(problem, base, (scored.active,), begin=scored.p, least=least + dear)

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProposedStep:
-    """What stands on unseen rows: its outcome, the joint fits that it was chosen of, and the proposals."""
+    """What stands on unseen rows (None: nothing), the joint fits that it was chosen of, and the proposals."""
 
-    outcome: Outcome
+    outcome: Outcome | None
     joint: tuple[Joint, ...]
     proposed: Proposals
 
@@ -54,7 +54,7 @@ def proposed_step(
     listed: Sequence[CandidateEffect],
     tell: Callable[[Sequence[Scored]], None],
 ) -> ProposedStep | None:
-    """Return the step that the recording proposes, None where it proposes none that stands.
+    """Return the step that the recording proposes, None where it proposes none.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def proposed_step(
     tell(promising)
     joint = joint_fits(problem, base, promising)
     single = best_step(problem, folds, base, held_base, joint, proposed.p_of, least, refitted)
-    return None if single is None else ProposedStep((*single[:2], (single[2],)), joint, proposed)
+    return ProposedStep(None if single is None else (*single[:2], (single[2],)), joint, proposed)
 
 
 def _joined(
@@ -131,26 +131,27 @@ def beside_rivals(
     base: Fit,
     held_base: HeldOut,
     led: ProposedStep,
+    outcome: Outcome,
     view: Look,
     *,
     least: float,
     refitted: HeldOut,
     tell: Callable[[Sequence[Scored]], None],
 ) -> Outcome:
-    """Return a proposed step, or a better one, with what free simulations promise in its place."""
+    """Return an ``outcome`` as proposed, or a better one, with what free simulations promise in its place."""
+    made, _, steps = outcome
     fitted = {joint.scored.candidate.key for joint in led.joint}
     promising = [
         scored
         for scored in view.significant
-        if scored.candidate.key not in fitted and scored.gain > 2 * FOLLOWING.rival * led.outcome[2][-1].gain
+        if scored.candidate.key not in fitted and scored.gain > 2 * FOLLOWING.rival * steps[-1].gain
     ][: STEP.refined]
     if not promising:
-        return led.outcome
+        return outcome
     tell(promising)
-    made, _, steps = led.outcome
     # What one effect could stand for several with has to explain as much as they do.
     needed = made.log_posterior - cost(problem, made.active[-len(steps) :]) if len(steps) > 1 else -math.inf
     joint = ranked(problem, (*led.joint, *joint_fits(problem, base, promising, least=needed)))
     p_of = led.proposed.p_of | view.p_of
     single = best_step(problem, folds, base, held_base, joint, p_of, least, refitted)
-    return led.outcome if single is None else (*single[:2], (single[2],))
+    return outcome if single is None else (*single[:2], (single[2],))

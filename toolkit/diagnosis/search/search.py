@@ -184,7 +184,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                     problem, folds, base, held_base, proposed,
                     least=share, refitted=held_refitted, listed=listed, tell=fitting,
                 )  # fmt: skip
-                if led is not None:
+                if led is not None and led.outcome is not None:
                     sought = tuple(candidate for candidate in listed if proposed.is_worth(candidate))
             budget.check(f"step {turn + 1}: screening {len(sought)} candidates")
             view = look(problem, base, sought, turn=turn, seed=seed + turn)
@@ -197,9 +197,9 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 before = structure
             if turn == STEP.most_effects:
                 break
-            if led is not None:
+            if led is not None and led.outcome is not None:
                 base, held_base, more = beside_rivals(
-                    problem, folds, base, held_base, led, view,
+                    problem, folds, base, held_base, led, led.outcome, view,
                     least=share, refitted=held_refitted, tell=fitting,
                 )  # fmt: skip
                 steps += [step for step in more if not _is_nuisance(step, steps)]
@@ -215,8 +215,9 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             groups = step_groups(significant, hinted, hidden, share) if outcome is None else []
             for promising, least in groups:
                 fitting(promising)
-                joint = joint_fits(problem, base, promising)
-                outcome = best_step(problem, folds, base, held_base, joint, view.p_of, least, held_refitted)
+                joint = joint_fits(problem, base, promising, beside=() if led is None else led.joint)
+                p_of = proposed.p_of | view.p_of
+                outcome = best_step(problem, folds, base, held_base, joint, p_of, least, held_refitted)
                 if outcome is not None:
                     break
             if outcome is not None:
