@@ -40,7 +40,8 @@ class Filled:
     ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them;
     ``in_margins`` the figures that stand in headers and footers alone; ``page_mark`` the line that every page
     carries; ``charts`` those of the figures that are charts of Word's own, in their order; ``to_be_read`` the
-    tags of the manifest whose text people must be able to read in the PDF.
+    tags of the manifest whose text people must be able to read in the PDF; ``demanded`` the tags that a page
+    must show, and ``drawn_in`` the parts that hold each figure.
     """
 
     docx: bytes
@@ -61,6 +62,8 @@ class Filled:
     page_mark: str | None = None
     charts: tuple[Chart, ...] = ()
     to_be_read: frozenset[str] = frozenset()
+    demanded: tuple[str, ...] = ()
+    drawn_in: tuple[tuple[str, str], ...] = ()
 
 
 # A Word file as it was written, read back piece by piece: its tables may be of any length.

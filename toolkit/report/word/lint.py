@@ -22,6 +22,7 @@ RULES = {
     "unknown-tag": "a tag is not in the catalogue",
     "malformed-tag": "a literal tag is not closed or has no path",
     "missing-required": "a required tag is not in the template",
+    "unprinted-required": "a required tag stands only where a report may not print it",
     "not-as-chart": "a figure cannot be a chart of Word's own",
     "doubled-tag": "a figure or table stands twice in the body",
     "bad-format": "the format after the bar does not fit the tag",

@@ -44,8 +44,9 @@ def text_checks(text: str, filled: Filled) -> list[Check]:
     unfilled = [tag for tag in re.findall(r"\{\{tk:[^{}]{0,60}", page) if tag not in printed_text]
     lost, unreadable = [], []
     hidden = _not_printed(filled, page)
-    for entry in dict.fromkeys(filled.manifest):
-        if entry.text in printed or entry.part in hidden:
+    shown = [entry for entry in filled.manifest if entry.part not in hidden]
+    for entry in dict.fromkeys(shown):
+        if entry.text in printed:
             continue
         value = squeeze(entry.text)
         if not value or value in page or _in_pieces(value, page, entry.text, sheets):
@@ -59,8 +60,9 @@ def text_checks(text: str, filled: Filled) -> list[Check]:
         Check(
             name="values",
             ok=not lost,
-            message="; ".join(lost[:5]) or f"{len(filled.manifest)} values found in the PDF",
+            message="; ".join(lost[:5]) or f"{len(shown)} values found in the PDF",
         ),
+        *_required(filled, hidden),
         Check(name="literals", ok=not unfilled, message=", ".join(unfilled[:5]) or "no tag is printed"),
         Check(
             name="cells",
@@ -101,6 +103,33 @@ def _not_printed(filled: Filled, page: str) -> set[str]:
         if not any(word_text in page for word_text in texts):
             hidden.add(part)
     return hidden
+
+
+def _required(filled: Filled, hidden: set[str]) -> list[Check]:
+    """Check that each tag that the document must show stands in a part that the pages show.
+
+    Whether it is found there is asked of every value alike; a part that no page shows is not asked.
+    """
+    if not filled.demanded:
+        return []
+    places = [(entry.tag, entry.part) for entry in filled.manifest] + list(filled.drawn_in)
+    shown = {tag for tag, part in places if part not in hidden}
+    # A table is in the manifest by its columns; a condition, and the pattern of a row, print nothing.
+    absent = [
+        tag
+        for tag in filled.demanded
+        if not tag.startswith(("tk:if.", "tk:row."))
+        and tag not in shown
+        and not any(name.startswith(f"{tag}.") for name in shown)
+    ]
+    message = f"no page shows the required {', '.join(absent)}" if absent else ""
+    return [
+        Check(
+            name="required",
+            ok=not absent,
+            message=message or f"{len(filled.demanded)} required tags stand on the pages",
+        )
+    ]
 
 
 def _absent_rows(
@@ -237,7 +266,7 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
             *_contents(pdf, text, filled),
             *_margins(filled),
             *_charts(text, filled),
-            _legible(pdf, filled),
+            _legible(pdf, filled, _not_printed(filled, squeeze(text))),
             _fonts(listing),
             Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
             Check(
@@ -257,11 +286,11 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     )
 
 
-def _legible(pdf: Path, filled: Filled) -> Check:
+def _legible(pdf: Path, filled: Filled, hidden: set[str]) -> Check:
     texts = {
         entry.text: entry.tag
         for entry in filled.manifest
-        if entry.tag in filled.to_be_read and entry.text != filled.page_mark
+        if entry.tag in filled.to_be_read and entry.text != filled.page_mark and entry.part not in hidden
     }
     unreadable = [
         f"{texts.get(text, PAGE_MARK)} {text[:40]!r} cannot be read: {why}"
