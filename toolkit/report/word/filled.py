@@ -75,7 +75,7 @@ _RELATIONS = "{http://schemas.openxmlformats.org/package/2006/relationships}Rela
 def text_elements(docx: bytes, main_part: str) -> Iterator[Element]:
     """Yield each paragraph, control and drawing of the parts with text; a row is let go when it ends."""
     with zipfile.ZipFile(io.BytesIO(docx)) as archive:
-        for name in _parts(archive, main_part):
+        for name in parts_of(archive, main_part):
             with archive.open(name) as part:
                 yield from _elements(part)
 
@@ -92,7 +92,7 @@ def _elements(part: object) -> Iterator[Element]:
             element.clear()
 
 
-def _parts(archive: zipfile.ZipFile, main: str) -> list[str]:
+def parts_of(archive: zipfile.ZipFile, main: str) -> list[str]:
     """Return the main part, and the headers, footers and notes that it refers to."""
     folder, name = posixpath.split(main)
     relations = posixpath.join(folder, "_rels", f"{name}.rels")

@@ -28,6 +28,7 @@ RULES = {
     "bad-format": "the format after the bar does not fit the tag",
     "wrong-place": "a tag stands where it cannot be filled",
     "overlapping-tags": "a tag stands inside a control that will be filled as a whole",
+    "cut-by-condition": "a condition holds a part of a field or of a section",
     "no-table": "a table tag has no table",
     "prototype": "a table has no prototype row, or more than one",
     "unknown-column": "a prototype row names a column that the table has not",
