@@ -8,6 +8,7 @@ from toolkit.errors import ConfigError
 from toolkit.tires.tir import parse_tir
 from toolkit.tires.tir_checks import file_findings
 from toolkit.tires.tir_evaluate import evaluate_tir
+from toolkit.tires.tir_write import in_si
 
 # Of the size of published sets (Pacejka 2012, appendix 3).
 ENTRIES = {
@@ -90,3 +91,24 @@ def test_a_trail_that_leaves_the_contact_patch_is_told():
     assert "tir-trail" in [finding.rule for finding in findings]
     _, findings = evaluate_tir(tire(), SA=[-0.2, -0.01, 0.0, 0.01, 0.2], FZ=4000.0)
     assert [finding.rule for finding in findings] == []
+
+
+def test_a_file_of_uncombined_forces_is_told_where_both_slips_are_asked_for():
+    def rules(SA: float, KAPPA: float, mode: int) -> list[str]:
+        text = f"[MODEL]\nUSE_MODE = {mode}\n"
+        _, findings = evaluate_tir(tire(more=text), SA=SA, FZ=4000.0, KAPPA=KAPPA)
+        return [finding.rule for finding in findings]
+
+    assert rules(0.05, 0.02, 3) == rules(0.05, 0.02, 13) == ["tir-use-mode"]
+    assert rules(0.05, 0.0, 3) == rules(0.0, 0.02, 3) == rules(0.05, 0.02, 4) == rules(0.05, 0.02, 14) == []
+
+
+def test_coefficients_have_no_unit_in_a_section_of_any_name():
+    text = (
+        "[UNITS]\nLENGTH = 'mm'\nFORCE = 'kN'\n[MODEL]\nFITTYP = 61\n[VERTICAL]\nFNOMIN = 4\n"
+        "UNLOADED_RADIUS = 310\nQ_OWN = 3\n[COEFFS]\nPCY1 = 1.3\nPKY1 = -18\nLMUY = 0.9\n"
+    )
+    file, (finding,) = in_si(parse_tir(text))
+    assert "Q_OWN" in finding.message
+    assert not any(name in finding.message for name in ("PCY1", "PKY1", "LMUY"))
+    assert (file.number("FNOMIN"), file.number("PKY1")) == (4000.0, -18.0)

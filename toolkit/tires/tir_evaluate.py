@@ -27,6 +27,7 @@ _RANGES = (
     ("KAPPA", "KPUMIN", "KPUMAX", "1"),
     ("P", "PRESMIN", "PRESMAX", "Pa"),
 )
+_COMBINED = 4  # the last digit of USE_MODE from which slips are combined; 1 to 3 are pure slips
 _SLIGHT = 0.2  # of the load
 _EDGE = 1e-6  # of the range: limits are printed with five or six digits
 
@@ -86,7 +87,7 @@ def evaluate_tir(
     inputs = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
     findings += [
         *file_findings(tir), *_beyond(tir, inputs), *_beyond_friction(tir, FZ, result),
-        *_beyond_trail(tir, FZ, result, radius),
+        *_beyond_trail(tir, FZ, result, radius), *_combined(tir, SA, KAPPA),
     ]  # fmt: skip
     return result, tuple(findings)
 
@@ -153,6 +154,18 @@ def _beyond(tir: TirFile, array_likes: Mapping[str, ArrayLike]) -> list[Finding]
             )
             findings.append(Finding(rule="tir-range", where=tir.where, message=text))
     return findings
+
+
+def _combined(tir: TirFile, SA: ArrayLike, KAPPA: ArrayLike) -> list[Finding]:
+    """Return a note where both slips are asked of a file that its programs take without combined slip."""
+    mode = tir.get("USE_MODE")
+    if not isinstance(mode, float) or mode % 10 >= _COMBINED or not np.any(np.multiply(SA, KAPPA)):
+        return []
+    text = (
+        f"the file's USE_MODE is {mode:g}, without combined slip; here slip angle and slip ratio "
+        "act together by its coefficients"
+    )
+    return [_note("tir-use-mode", tir, text)]
 
 
 def _beyond_friction(tir: TirFile, FZ: ArrayLike, forces: Forces) -> list[Finding]:
