@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import hashlib
+import json
 import math
 import os
 import stat
@@ -114,6 +115,33 @@ def read_toml(path: Path) -> dict[str, Any]:
         ``no-file``: missing or unreadable; ``not-toml``
     """
     return parse_toml(read_input(path, SETTINGS_FILE), where=path)
+
+
+def parse_json(data: bytes | str) -> Any:
+    """Return the values of a JSON text, in which no object may state a name twice.
+
+    Which of the two counts is open (RFC 8259, section 4): what was signed or hashed of such a text need not
+    be what the next program reads of it.
+
+    Raises
+    ------
+    ValueError
+        no JSON, or a name that stands twice
+
+    >>> parse_json('{"a": {"b": 1, "b": 2}}')
+    Traceback (most recent call last):
+    ValueError: 'b' stands twice in one object
+    """
+    return json.loads(data, object_pairs_hook=_each_once)
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{twice!r} stands twice in one object")
+    return entries
 
 
 class _Beyond(float):

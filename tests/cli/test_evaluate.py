@@ -231,3 +231,13 @@ def test_names_that_change_nothing_anyway_are_not_told(tmp_path):
     (tmp_path / "x.tir").write_text(tire_of(5, neutral))
     code, out = run(tmp_path / "x.tir", tmp_path / "g.csv", "--json")
     assert (code, json.loads(out)["findings"]) == (0, [])
+
+
+@pytest.mark.parametrize(("column", "number"), [("SA [rad]", "3"), ("SA [deg]", "91"), ("IA [deg]", "80")])
+def test_an_angle_of_no_tire_is_told(files, tmp_path, column, number):
+    grid = tmp_path / "angles.csv"
+    other = "SA [deg]," if column.startswith("IA") else ""
+    grid.write_text(f"{other}FZ [N],{column}\n{'3,' * bool(other)}4000,{number}\n")
+    code, out = run(files[0], grid, "--json")
+    assert code == 1
+    assert "unusual-condition" in [finding["rule"] for finding in json.loads(out)["findings"]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -94,6 +95,35 @@ def test_a_record_of_another_hash_is_another_record(run: Run, tmp_path: Path) ->
     file.write_bytes(_issued("m15-virtual-r1", "0" * 64))
     code, answer = run(file)
     assert (code, answer["still_holds"]) == (1, False)
+
+
+def _sign_turned(text: str) -> str:
+    """Return a record with a second content before its own, in which a sign is turned."""
+    start = text.index('"content":') + len('"content":')
+    content = text[start : text.index('\n },\n "schema"') + len("\n }")]
+    turned = re.sub(r'("coefficients": \[\s*)-?', r"\g<1>-", content, count=1)
+    assert turned != content
+    return text[:start] + turned + ',\n "content":' + text[start:]
+
+
+ALTERED: dict[str, Callable[[str], str]] = {
+    "a second content": _sign_turned,
+    "another software": lambda text: text.replace('"numpy": "', '"numpy": "9.', 1),
+    "one key more": lambda text: text.replace('{\n "content"', '{\n "approved": true,\n "content"', 1),
+    "a space": lambda text: text + " ",
+}
+
+
+@pytest.mark.parametrize("name", ALTERED)
+def test_a_record_of_which_a_byte_differs_is_invalid(run: Run, home: Path, tmp_path: Path, name: str) -> None:
+    path = next((home / "calibrations").rglob("m15-virtual-r1.json"))
+    file = tmp_path / "m15-virtual-r1.json"
+    file.write_text(ALTERED[name](path.read_text()))
+    assert file.read_bytes() != path.read_bytes()
+    code, answer = run(file)
+    assert (code, answer["signature"]) == (2, "invalid"), answer["why"]
+    file.write_bytes(path.read_bytes())
+    assert run(file)[1]["still_holds"] is True
 
 
 def test_the_worst_of_several_files_is_the_exit_code(run: Run, tmp_path: Path) -> None:

@@ -362,6 +362,9 @@ def _judged(
             heads.append((instrument, registry.head(instrument)))
         except RegistryError as error:
             troubles.append(Finding(rule="registry-damaged", where=instrument, message=error.what))
+        if (doubt := registry.ledger(instrument).doubt) is not None:
+            message = f"of the ledger {doubt}"
+            troubles.append(Finding(rule="ledger-time", where=instrument, message=message))
     return ArchiveAudit(
         archive=archive,
         known_at=day,

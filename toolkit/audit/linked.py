@@ -8,7 +8,6 @@ test's folder as whole words.
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
 from toolkit.errors import ConfigError, UnreadableError
-from toolkit.files import check_keys, real_path
+from toolkit.files import check_keys, parse_json, real_path
 from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
 from toolkit.publication import ENTERING, PENDING, settle
 from toolkit.recording.csvfile import read_lines
@@ -225,7 +224,7 @@ def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
     if path.is_symlink():
         return None
     try:
-        manifest = json.loads(read_regular(path, RECORDING_FILE))
+        manifest = parse_json(read_regular(path, RECORDING_FILE))
     except (OSError, ValueError, RecursionError):
         return None
     if not isinstance(manifest, dict) or manifest.get("generator") != GENERATOR or "inputs" not in manifest:

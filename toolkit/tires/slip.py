@@ -90,23 +90,28 @@ def state(
     Parameters
     ----------
     p : scale factors by their names in a tire file
-    V : its sign turns alpha*, trail and residual moment; zero counts as forward
+    V : speed along the wheel's own direction of travel; Vx = V cos(alpha), whose sign turns alpha*, trail and
+        residual moment, so that Vy goes on beyond a quarter turn; zero counts as forward
     V0 : the file's LONGVL [m/s]; with it and LMUV (4.E7) friction falls with the slip speed
     """
     s = Reader(p, 1.0)
     angle, load, camber = (as_array(column, np.float64) for column in (SA, FZ, IA))
     speed, kappa = as_array(V, np.float64), as_array(KAPPA, np.float64)
-    a = np.tan(angle) if angles == "star" else angle
     F0 = FNOMIN * s("LFZO")
     # LMUV is the one scale that is off when it is absent: it divides by 1 + LMUV Vs / V0.
     decay = p.get("LMUV", 0.0)
     fade: Array = np.asarray(1.0)
     if decay and V0:
         fade = 1 / (1 + decay * np.abs(speed) * np.hypot(kappa, np.tan(angle)) / abs(V0))
-    direction = np.where(speed < 0, -1.0, 1.0)
+    # Vx / V by 4.E6: beyond a quarter turn the wheel rolls the other way, though V keeps its sign.
+    ahead = np.where(speed < 0, -1.0, 1.0) * np.cos(angle)
+    direction = np.where(ahead < 0, -1.0, 1.0)
+    a = direction * np.tan(angle)
+    if angles == "raw":
+        a = np.where(np.cos(angle) < 0, np.arctan(a), direction * angle)
     return State(
-        a=direction * a,
-        cosine=direction * np.cos(angle),
+        a=a,
+        cosine=ahead,
         g=np.sin(camber) if angles == "star" else camber,
         kappa=kappa,
         FZ=load,

@@ -279,7 +279,7 @@ class TirFile:
         return {
             _ALIASES.get(line.key, line.key): line.value
             for line in self.lines
-            if line.key and _is_coefficient(line.section, line.key) and isinstance(line.value, float)
+            if line.key and is_coefficient(line.section, line.key) and isinstance(line.value, float)
         }
 
 
@@ -331,7 +331,7 @@ def _no_tir(where: object, actual: str) -> UnreadableError:
     )  # fmt: skip
 
 
-def _is_coefficient(section: str, key: str) -> bool:
+def is_coefficient(section: str, key: str) -> bool:
     """Tell whether an entry is a number of the equations: programs name the sections as they like."""
     if section.endswith("COEFFICIENTS"):
         return True
@@ -339,7 +339,7 @@ def _is_coefficient(section: str, key: str) -> bool:
 
 
 def _value(text: str, where: str, key: str, section: str) -> str | float:
-    coefficient = _is_coefficient(section, key)
+    coefficient = is_coefficient(section, key)
     if text[:1] in ("'", '"'):
         if not coefficient:
             return text[1:-1]
@@ -364,7 +364,7 @@ def _refuse_contradictions(tir: TirFile) -> None:
     for line in tir.lines:
         if not isinstance(line.value, float):
             continue
-        coefficient = _is_coefficient(line.section, line.key)
+        coefficient = is_coefficient(line.section, line.key)
         key = _ALIASES.get(line.key, line.key)
         first = entries.setdefault(("COEFFICIENTS" if coefficient else line.section, key), line.value)
         if first != line.value:

@@ -8,12 +8,12 @@ import numpy as np
 
 from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
-from toolkit.reduction.limits import FRICTION, LEAST_LOAD_N
+from toolkit.reduction.limits import FRICTION, LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.tires.mf import Forces
 from toolkit.tires.models import mf52, mf61
-from toolkit.tires.plausibility import LARGEST
 from toolkit.tires.slip import ANGLES, Angles, state
 from toolkit.tires.tir import TirFile, factors, scale, si_number
+from toolkit.tires.tir_checks import RADIUS_M, demanded, file_findings, nominal_pressure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,12 +27,8 @@ _RANGES = (
     ("KAPPA", "KPUMIN", "KPUMAX", "1"),
     ("P", "PRESMIN", "PRESMAX", "Pa"),
 )
-# Without these the Magic Formula gives nothing of that channel.
-_MAKES = {
-    "FX": ("PCX1", "PDX1", "PKX1"),
-    "FY": ("PCY1", "PDY1", "PKY1", "PKY2"),
-    "MZ": ("QCZ1", "QDZ1", "QBZ1"),
-}
+_COMBINED = 4  # the last digit of USE_MODE from which slips are combined; 1 to 3 are pure slips
+_SLIGHT = 0.2  # of the load
 _EDGE = 1e-6  # of the range: limits are printed with five or six digits
 
 
@@ -61,7 +57,7 @@ def evaluate_tir(
     Raises
     ------
     ConfigError
-        FITTYP is not known, or FNOMIN, UNLOADED_RADIUS are missing or not positive
+        FITTYP is not known, FNOMIN, UNLOADED_RADIUS are missing or not positive, or NOMPRES is negative
     UnitError
         a unit of the file is not known
     FitError
@@ -74,7 +70,7 @@ def evaluate_tir(
         )  # fmt: skip
     version = tir.version
     p = tir.coefficients()
-    FNOMIN, radius = positive(tir, "FNOMIN"), positive(tir, "UNLOADED_RADIUS")
+    FNOMIN, radius = demanded(tir, "FNOMIN"), demanded(tir, "UNLOADED_RADIUS")
     speed = si_number(tir, "LONGVL", 0.0) or None
     change, findings = _pressure_change(tir, version, P)
     with np.errstate(all="ignore"):
@@ -90,8 +86,8 @@ def evaluate_tir(
     _refuse_infinite(tir, result)
     inputs = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
     findings += [
-        *tir.findings(), *lacking_findings(tir, p), *_nominal_load(tir, FNOMIN), *_beyond(tir, inputs),
-        *_beyond_friction(tir, FZ, result),
+        *file_findings(tir), *_beyond(tir, inputs), *_beyond_friction(tir, FZ, result),
+        *_beyond_trail(tir, FZ, result, radius), *_combined(tir, SA, KAPPA),
     ]  # fmt: skip
     return result, tuple(findings)
 
@@ -123,22 +119,11 @@ def forces_of(
     return forces(p, q, UNLOADED_RADIUS=UNLOADED_RADIUS)
 
 
-def positive(tir: TirFile, key: str) -> float:
-    """Return an entry in SI; ConfigError where it is absent or not above zero."""
-    value = si_number(tir, key)
-    if value <= 0:
-        raise ConfigError(
-            f"the tire file's {key} is not positive", where=tir.where, got=value, expected=f"{key} > 0",
-            next_step="correct the entry", rule="tir-number",
-        )  # fmt: skip
-    return value
-
-
 def _pressure_change(
     tir: TirFile, version: str, P: ArrayLike | None
 ) -> tuple[NDArray[np.float64] | float, list[Finding]]:
-    nominal = si_number(tir, "NOMPRES", 0.0)
-    if version == "5.2" or nominal <= 0:
+    nominal = nominal_pressure(tir)
+    if version == "5.2" or nominal is None:
         why = "MF 5.2 has no pressure terms" if version == "5.2" else "the file has no NOMPRES"
         if P is None:
             return 0.0, []
@@ -150,20 +135,6 @@ def _pressure_change(
         return 0.0, []
     text = f"no column P: the file's INFLPRES of {inflation:.6g} Pa is used, NOMPRES is {nominal:.6g} Pa"
     return inflation / nominal - 1, [_note("tir-pressure", tir, text)]
-
-
-def lacking_findings(tir: TirFile, p: Mapping[str, float]) -> list[Finding]:
-    """Return which forces of a file hold nothing, or little, for want of coefficients."""
-    findings = []
-    for channel, names in _MAKES.items():
-        absent = [name for name in names if name not in p]
-        if len(absent) == len(names):
-            text = f"the file has none of {', '.join(names)}: {channel} holds nothing of pure slip"
-            findings.append(_note("tir-no-coefficients", tir, text))
-        elif absent:
-            text = f"the file has no {', '.join(absent)}, which count as zero: {channel} is doubtful"
-            findings.append(Finding(rule="tir-no-coefficients", where=tir.where, message=text))
-    return findings
 
 
 def _beyond(tir: TirFile, array_likes: Mapping[str, ArrayLike]) -> list[Finding]:
@@ -185,12 +156,16 @@ def _beyond(tir: TirFile, array_likes: Mapping[str, ArrayLike]) -> list[Finding]
     return findings
 
 
-def _nominal_load(tir: TirFile, FNOMIN: float) -> list[Finding]:
-    """Return a finding where the nominal load is no tire's: kN that count as N, or the reverse."""
-    if LEAST_LOAD_N <= FNOMIN <= LARGEST["force"]:
+def _combined(tir: TirFile, SA: ArrayLike, KAPPA: ArrayLike) -> list[Finding]:
+    """Return a note where both slips are asked of a file that its programs take without combined slip."""
+    mode = tir.get("USE_MODE")
+    if not isinstance(mode, float) or mode % 10 >= _COMBINED or not np.any(np.multiply(SA, KAPPA)):
         return []
-    text = f"FNOMIN is {FNOMIN:.6g} N by [UNITS]; tires have {LEAST_LOAD_N:g} to {LARGEST['force']:g} N"
-    return [Finding(rule="tir-nominal-load", where=tir.where, message=text)]
+    text = (
+        f"the file's USE_MODE is {mode:g}, without combined slip; here slip angle and slip ratio "
+        "act together by its coefficients"
+    )
+    return [_note("tir-use-mode", tir, text)]
 
 
 def _beyond_friction(tir: TirFile, FZ: ArrayLike, forces: Forces) -> list[Finding]:
@@ -205,6 +180,27 @@ def _beyond_friction(tir: TirFile, FZ: ArrayLike, forces: Forces) -> list[Findin
         f"{over.size} rows; no tire exceeds {FRICTION.high:g}"
     )
     return [Finding(rule="tir-friction", where=tir.where, message=text)]
+
+
+def _beyond_trail(tir: TirFile, FZ: ArrayLike, forces: Forces, radius: float) -> list[Finding]:
+    """Return a finding where the moment has a longer arm than the force could have on any tire.
+
+    The force acts within the contact patch: its arm is shorter than the tire's radius. Near zero slip, where
+    there is hardly a force, what the tire's build makes of moment is held against a part of the load.
+    """
+    low, high = RADIUS_M
+    longest = min(LARGEST_TRAIL_M, radius) if low <= radius <= high else LARGEST_TRAIL_M
+    load = np.broadcast_to(np.asarray(FZ, dtype=np.float64), forces.MZ.shape)
+    force = np.maximum(np.hypot(forces.FX, forces.FY), _SLIGHT * np.maximum(load, LEAST_LOAD_N))
+    trail = np.abs(forces.MZ) / force
+    over = trail > longest
+    if not over.any():
+        return []
+    text = (
+        f"MZ is up to {trail.max():.3g} m times the force in the road's plane, in {int(over.sum())} of "
+        f"{over.size} rows; no tire of this radius has a trail of more than {longest:.3g} m"
+    )
+    return [Finding(rule="tir-trail", where=tir.where, message=text)]
 
 
 def _refuse_infinite(tir: TirFile, result: Forces) -> None:

@@ -17,7 +17,7 @@ from toolkit.findings import Finding
 from toolkit.publication import write_result
 from toolkit.tires.global_data import Measured
 from toolkit.tires.global_model import GlobalModel, GlobalParameter, ModelFit
-from toolkit.tires.tir import SI, TirFile, TirLine, factors, scale
+from toolkit.tires.tir import SI, TirFile, TirLine, factors, is_coefficient, scale
 
 FITTYP = {"mf52": 6.0, "mf61": 61.0, "mf62": 61.0}
 SIDES = ("LEFT", "RIGHT", "SYMMETRIC", "UNKNOWN")
@@ -198,7 +198,7 @@ _PURE = ("MODEL", "MDI_HEADER", "SHAPE", "LONG_SLIP_RANGE")
 
 
 def _may_have_a_unit(line: TirLine) -> bool:
-    if line.section.endswith("COEFFICIENTS") or line.section in _PURE or line.key == "ASPECT_RATIO":
+    if line.section in _PURE or line.key == "ASPECT_RATIO" or is_coefficient(line.section, line.key):
         return False
     if line.key:
         return isinstance(line.value, float)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.errors import ConfigError, ToolkitError, TrustError
-from toolkit.files import sha256_bytes
+from toolkit.files import parse_json, sha256_bytes
 from toolkit.inputs import REQUEST_FILE, read_input
 from toolkit.printable import unprintable
 from toolkit.trust.decisions import ACTIONS, action_of, signature_row, signer_of, stated, statement, unsigned
@@ -156,9 +156,9 @@ def parse_request(data: bytes, path: Path) -> Request:
         ``request``
     """
     try:
-        entries = json.loads(data)
+        entries = parse_json(data)
         parts = {key: entries[key] for key in ("message", "people", "file", "operators", "signatures")}
-        body = json.loads(parts["message"])
+        body = parse_json(parts["message"])
         request = Request(
             **{**parts, "operators": tuple(parts["operators"]), "signatures": tuple(parts["signatures"])},
             path=path,

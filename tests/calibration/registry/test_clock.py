@@ -20,6 +20,7 @@ from toolkit.calibration.registry.candidate import import_legacy
 from toolkit.calibration.registry.clock import clock_state
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.standing import standing
 from toolkit.calibration.registry.store import Change
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RegistryError
@@ -97,6 +98,50 @@ def test_a_clock_that_was_set_back_writes_nothing(entered: Registry, monkeypatch
     assert (error.got, error.expected) == (before, f"a time from {last} on")
     monkeypatch.setattr(approval, "now", lambda: last)
     assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B").done
+
+
+def of_a_fast_clock(registry: Registry) -> str:
+    """Let the last line be signed in five years; return its time."""
+    last = registry.ledger("cell").entries[-1].seq
+    late = (dt.datetime.now(tz=dt.UTC) + dt.timedelta(days=5 * 365)).strftime("%Y-%m-%dT%H:%M:%SZ")
+    rewrite(registry, lambda seq, event: event.update(time=late) if seq == last else None)
+    return late
+
+
+def test_a_line_after_this_computers_clock_is_told_and_moves_no_day(entered: Registry) -> None:
+    assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B", reason="late").done
+    late = of_a_fast_clock(entered)
+    assert late in str(entered.ledger("cell").doubt)
+    assert entered.ledger("cell").known_on() == TODAY
+    (row,) = [row for row in verify_registry(entered) if not row.ok]
+    assert row.id == LEDGER
+    assert late in str(row.reason)
+    assert any(late in text for text in standing(entered, "cell", on=TODAY).since)
+
+
+def test_a_ledger_of_the_past_is_told_of_nothing(entered: Registry) -> None:
+    assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B").done
+    assert entered.ledger("cell").doubt is None
+    assert all(row.ok for row in verify_registry(entered))
+    assert standing(entered, "cell", on=TODAY).since == ()
+
+
+def test_a_withdrawal_is_entered_after_a_line_of_a_fast_clock_and_the_ledger_goes_on(
+    entered: Registry,
+) -> None:
+    assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B", reason="late").done
+    of_a_fast_clock(entered)
+    error = refused(
+        entered,
+        lambda: approve(
+            entered, "cell-r1", in_force_from=SESSION, checked_by="B", reason="x", recall="1 year"
+        ),
+    )
+    assert "before that of the entry before it" in error.what
+    withdraw(entered, "cell-r1", on=TODAY, reason="its line is of a fast clock", by="B")
+    assert entered.status("cell-r1").state == "withdrawn"
+    assert entered.ledger("cell").damage is None
+    assert entered.ledger("cell").doubt is not None
 
 
 def test_a_clock_that_was_set_back_brings_no_withdrawn_record_back(

@@ -55,6 +55,43 @@ def test_a_literal_split_over_runs_keeps_the_first_runs_look(tmp_path: Path) -> 
     assert holder.getparent().find(f"{{{W}}}rPr/{{{W}}}b") is not None
 
 
+def _bookmarked(result: Filled) -> str:
+    """Return the text between the beginning and the end of the bookmark b."""
+    inside, text = False, ""
+    for element in root(result).iter(f"{{{W}}}bookmarkStart", f"{{{W}}}bookmarkEnd", f"{{{W}}}t"):
+        if element.tag.endswith("}t"):
+            text += (element.text or "") if inside else ""
+        else:
+            inside = element.tag.endswith("Start")
+    return text
+
+
+START, STOP = '<w:bookmarkStart w:id="7" w:name="b"/>', '<w:bookmarkEnd w:id="7"/>'
+
+
+@pytest.mark.parametrize(
+    "runs",
+    [
+        ("before {{tk:tire.", START, "size}}", STOP),
+        ("before ", "{{tk:", START, "tire.", STOP, "size}}", " after"),
+        ("before {{", "tk:tire", START, ".size}}", STOP),
+        (START, "{{tk:tire", STOP, ".size}}"),
+        ("before ", START, "{{tk:tire.size", STOP, "}}"),
+        ("{{tk:tire.rim}} {{tk:tire.", START, "size}}", STOP),
+    ],
+)
+def test_a_bookmark_of_a_part_of_a_tag_holds_the_whole_value(tmp_path: Path, runs: tuple[str, ...]) -> None:
+    result = filled(tmp_path, p(*runs))
+    size = next(entry.text for entry in result.manifest if entry.tag == "tk:tire.size")
+    assert _bookmarked(result) == size
+
+
+def test_what_a_bookmark_holds_beside_a_part_of_a_tag_stays_in_it(tmp_path: Path) -> None:
+    result = filled(tmp_path, p("x {{tk:", START, "tire.size}} and more", STOP))
+    size = next(entry.text for entry in result.manifest if entry.tag == "tk:tire.size")
+    assert _bookmarked(result) == f"{size} and more"
+
+
 def test_every_level_of_control_is_filled_and_loses_its_placeholder_state(tmp_path: Path) -> None:
     showing = '<w:lock w:val="sdtContentLocked"/><w:showingPlcHdr/><w:dataBinding w:xpath="/a" w:storeItemID="x"/><w:text/>'
     prompt = '<w:r><w:rPr><w:rStyle w:val="PlaceholderText"/><w:i/></w:rPr><w:t>click</w:t></w:r>'

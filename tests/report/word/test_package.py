@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import io
 import zipfile
+from pathlib import Path
 
 import pytest
 
-from toolkit.report.word.package import undated
+from tests.report.template_factory import make, p
+from toolkit.errors import TemplateError
+from toolkit.report.word.package import read_template, undated
 
 
 def _package(year: int, method: int) -> bytes:
@@ -32,3 +35,22 @@ def test_the_same_content_is_the_same_bytes(method: int) -> None:
         assert {(part.extra, part.comment) for part in archive.infolist()} == {
             (b"\x99\x99\x02\x00xy", b"a comment")
         }
+
+
+def test_a_strict_document_is_refused_with_the_way_to_save_it(tmp_path: Path) -> None:
+    # ISO/IEC 29500 Strict names its relationships and namespaces otherwise.
+    def strict(members: dict[str, bytes]) -> None:
+        for name, data in list(members.items()):
+            if name.endswith((".rels", ".xml")):
+                members[name] = data.replace(
+                    b"http://schemas.openxmlformats.org/officeDocument/2006/relationships",
+                    b"http://purl.oclc.org/ooxml/officeDocument/relationships",
+                ).replace(
+                    b"http://schemas.openxmlformats.org/wordprocessingml/2006/main",
+                    b"http://purl.oclc.org/ooxml/wordprocessingml/main",
+                )
+
+    with pytest.raises(TemplateError) as caught:
+        read_template(make(tmp_path, p("x"), edit=strict))
+    assert (caught.value.rule, caught.value.exit_code) == ("strict-word", 2)
+    assert "Word document (.docx)" in str(caught.value.next_step)

@@ -14,7 +14,7 @@ from typing import Any, Literal, cast
 
 from toolkit.calibration.records.scatter import MODELS, UNTOLD, RunScatter
 from toolkit.errors import RecordError
-from toolkit.files import sha256_bytes
+from toolkit.files import parse_json, sha256_bytes
 
 Zero = Literal["included", "tared", "run"]
 ZEROS: tuple[Zero, ...] = ("included", "tared", "run")
@@ -303,7 +303,7 @@ def from_bytes(data: bytes, *, where: object) -> CalibrationRecord:
     """
     try:
         text = data.decode("utf-8")
-        document = json.loads(text)
+        document = parse_json(text)
         _check_schema(document, where)
         content = document["content"]
         stated = {SCHEMA: document["sha256"]}[document["schema"]]

@@ -37,6 +37,7 @@ def clock_state() -> ClockState:
     return "not synchronised" if answer == _ERROR else "synchronised"
 
 
+_FAST = timedelta(minutes=5)  # by which clocks of computers differ
 _EARLIEST_ZONE = timedelta(hours=14)  # UTC+14, Kiribati: where a day begins first
 
 
@@ -79,6 +80,11 @@ def begun(day: date, at: datetime | None = None) -> bool:
     True
     """
     return day <= ((at or datetime.now(tz=UTC)) + _EARLIEST_ZONE).date()
+
+
+def ahead(time: str) -> bool:
+    """Tell whether an entry's time lies after this computer's clock: one of the two is wrong."""
+    return moment(time) - datetime.now(tz=UTC) > _FAST
 
 
 def in_future(day: date) -> str:

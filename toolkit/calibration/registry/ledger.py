@@ -25,7 +25,7 @@ from functools import cached_property
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
-from toolkit.calibration.registry.clock import day_of, moment, today
+from toolkit.calibration.registry.clock import ahead, moment, today
 from toolkit.days import parse_day
 from toolkit.files import sha256_bytes
 from toolkit.trust.decisions import SIGNATURE
@@ -212,6 +212,7 @@ class Entry:
     signatures: tuple[Mapping[str, str], ...] = ()
 
 
+_SECONDS = len("2026-11-22T10:11:12Z")
 _LISTS = frozenset(("unverifiable", "evidence", "signatures"))
 _DAYS = frozenset(("known_on", "since"))
 _TYPES: Mapping[str, tuple[type, ...]] = {
@@ -258,10 +259,22 @@ class Ledger:
     def known_on(self, known_at: date | None = None) -> date:
         """Return the day of knowledge: the one that is asked for, else today.
 
-        What the ledger tells of is known: where this computer's clock was set back, the day of the last
-        entry counts. A withdrawn record would come back into force otherwise.
+        What was decided is known: where this computer's clock was set back, the last day of a decision
+        counts. A withdrawn record would come back into force otherwise. The times of entries do not: one of a
+        clock that was fast would be the day of everything for years.
         """
-        return known_at or max([today(), *(day_of(entry.time) for entry in self.entries[-1:])])
+        return known_at or max(today(), self._decided_on)
+
+    @property
+    def doubt(self) -> str | None:
+        """Say which line's time lies after this computer's clock; None where none does."""
+        latest = self._latest
+        if latest is None or not ahead(latest.time):
+            return None
+        return (
+            f"line {latest.seq} ({latest.event} {latest.id}) states {latest.time}, which lies after this "
+            "computer's clock: one of the two is wrong"
+        )
 
     def of(self, record_id: str) -> tuple[Entry, ...]:
         """Return the events of one record, oldest first."""
@@ -308,6 +321,16 @@ class Ledger:
             about = (max(entry.seq for entry in self.of(record_id) if entry.seq < line), record_id)
             last = about if last is None else max(last, about)
         return None if last is None else last[1]
+
+    @cached_property
+    def _decided_on(self) -> date:
+        return max((e.known_on for e in self.decisions if e.known_on is not None), default=date.min)
+
+    @cached_property
+    def _latest(self) -> Entry | None:
+        # Times of one spelling compare as texts do.
+        alike = all(len(entry.time) == _SECONDS and entry.time[-1] == "Z" for entry in self.entries)
+        return max(self.entries, key=lambda e: e.time if alike else moment(e.time), default=None)
 
     @cached_property
     def _events(self) -> dict[str, tuple[Entry, ...]]:

@@ -122,10 +122,14 @@ def misplaced(ledger: Ledger, instrument: str) -> str | None:
 
 
 def disorder(ledger: Ledger) -> str | None:
-    """Say which line's time lies before that of the one before it; None where none does."""
+    """Say which line's time lies before that of the one before it; None where none does.
+
+    A withdrawal may: it can always be entered, after a line of a clock that was fast too, and the lines after
+    it follow its time.
+    """
     last: Entry | None = None
     for entry in ledger.entries:
-        if last is not None and _earlier(entry.time, last.time):
+        if last is not None and entry.event != "withdrawn" and _earlier(entry.time, last.time):
             return (
                 f"line {entry.seq} was entered at {entry.time}, before line {last.seq} at {last.time}: "
                 "a clock was set back"

@@ -131,7 +131,8 @@ def standing(
     RegistryError, RecordError
         no record is in force on that day; the named record or the ledger cannot be used
     """
-    known_on = registry.ledger(instrument).known_on(known_at)
+    ledger = registry.ledger(instrument)
+    known_on = ledger.known_on(known_at)
     if named is None:
         if on is None:
             raise TypeError("a record is chosen by its name or by the test's day")
@@ -143,13 +144,14 @@ def standing(
     later = () if known_on >= today() else _reasons(registry, record, instrument, on, today())
     status = registry.status(record.id, known_at=known_on)
     approved = () if status.approved_later is None else (approved_after(status.approved_later, known_on),)
+    doubts = () if ledger.doubt is None else (f"{_OF_THE_LEDGER}{ledger.doubt}",)
     return Standing(
         record=record,
         instrument=instrument,
         on=on,
         known_at=known_on,
         reasons=reasons,
-        since=(*approved, *(reason.text for reason in later if reason.text not in texts)),
+        since=(*doubts, *approved, *(reason.text for reason in later if reason.text not in texts)),
         discarded=status.state == "discarded",
         signature=registry.signature(record.id),
     )
@@ -197,6 +199,7 @@ def failed_gates(
     return judge_stored(registry, record, registry.ledger(record.instrument), machine=machine).failed
 
 
+_OF_THE_LEDGER = "of the ledger "
 _VERIFY = "see 'toolkit calibration verify'"
 
 

@@ -95,7 +95,8 @@ def commit(
         check_entries(change.event, where=change.event["id"], names=_NAMES)
         event = timed_event(change.event, ledger, signing)
         last = ledger.entries[-1].time if ledger.entries else None
-        check_after(last, event["time"], folder / LEDGER)
+        if event["event"] != "withdrawn":
+            check_after(last, event["time"], folder / LEDGER)
         if signing is not None:
             event = signed_event(event, ledger, signing, action=change.action, file=_text_of(change))
         line, digest = next_line(len(ledger.entries) + 1, ledger.head, event)

@@ -75,6 +75,9 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
             rows.append(VerifyRow(id=HEAD, ok=False, verified=False, reason=f"ledger: {damage}"))
     for instrument, ledger in ledgers.items():
         rows += _instrument(registry.folder / instrument, ledger)
+        if ledger.damage is None and ledger.doubt is not None:
+            reason = f"time: of the ledger of {instrument} {ledger.doubt}"
+            rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=reason))
     for instrument in sorted(_attested(registry) - {*ledgers, FOLDER}):
         reason = "missing: people or witnesses have signed entries of its ledger"
         rows.append(VerifyRow(id=instrument, ok=False, verified=False, reason=reason))

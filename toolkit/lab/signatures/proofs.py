@@ -7,7 +7,6 @@ alone, and its signer is nobody that is known here.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from toolkit.calibration.records.use import UNSIGNED
 from toolkit.calibration.registry.witnessed import ORIGIN, witnessed
 from toolkit.errors import ToolkitError
+from toolkit.files import parse_json
 from toolkit.trust.anchor import COMPACT, Anchor, compare, parse_anchor, parse_compact
 from toolkit.trust.seal.check import Signature
 
@@ -56,7 +56,7 @@ def _anchor(text: str, where: object) -> Anchor | None:
     if text.startswith(COMPACT):
         return parse_compact(text, where=where)
     try:
-        document = json.loads(text)
+        document = parse_json(text)
     except (ValueError, RecursionError):
         return None
     entries = document.get("ledger", document) if isinstance(document, dict) else None
@@ -67,10 +67,11 @@ def _anchor(text: str, where: object) -> Anchor | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Named:
-    """A record that a document names, with its hash."""
+    """A record that a document names, with its hash; ``file``: that of the bytes, of a record's own file."""
 
     record: str
     sha256: str
+    file: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +79,8 @@ class LedgerState:
     """What a ledger says of a document: whether it continues it, and whether its records still hold.
 
     ``signature``, ``issued_by`` and ``issued_at`` are those of the document's entry; ``unsigned`` and None
-    where it has none. ``decided_by``: who signed the decisions that its record rests on.
+    where it has none. ``decided_by``: who signed the decisions that its record rests on. ``changed``: why a
+    record's file is not the one that was entered, None where it is.
     """
 
     ledger: Continuity = "unknown"
@@ -88,6 +90,7 @@ class LedgerState:
     issued_by: str | None = None
     issued_at: str | None = None
     decided_by: str | None = None
+    changed: str | None = None
 
 
 Ledger = Callable[[Sequence[Named], Anchor | None], LedgerState]
@@ -97,7 +100,7 @@ Ledger = Callable[[Sequence[Named], Anchor | None], LedgerState]
 def entry_of(anchor: Anchor) -> Mapping[str, Any]:
     """Return the entry of a proof as JSON values; empty where the proof holds its hash alone."""
     try:
-        body = json.loads(anchor.line or "{}")
+        body = parse_json(anchor.line or "{}")
     except (ValueError, RecursionError):
         return {}
     return body if isinstance(body, dict) else {}
@@ -154,6 +157,7 @@ def _joined(states: Sequence[LedgerState], nothing: LedgerState) -> LedgerState:
         issued_by=proof.issued_by,
         issued_at=proof.issued_at,
         decided_by=None if worst is None else worst.decided_by,
+        changed=next((state.changed for state in held if state.changed is not None), None),
     )
 
 
@@ -164,7 +168,8 @@ def _continuity(registry: Registry, anchor: Anchor) -> LedgerState:
         return LedgerState()
     comparison = compare(raw_lines(registry, instrument), anchor.checkpoint, anchor)
     if comparison.continuity != "continues":
-        return LedgerState(ledger=comparison.continuity, why=f"the ledger of {instrument}: {comparison.why}")
+        why = f"the ledger of {instrument}: {comparison.why}"
+        return LedgerState(ledger=comparison.continuity, still_holds=False, why=why)
     if instrument not in registry.instruments():
         registry.people()  # every version of it is proved
         why = f"entry {anchor.index + 1} of the log of people"
@@ -235,18 +240,22 @@ def ledger_file_state(path: Path) -> LedgerState:
     continuity, compared = _witnessed(registry, folder.name)
     if continuity not in ("continues", "unknown"):
         # What was cut off or rewritten is told as that, not as damage: its own chain may be in order.
-        return LedgerState(ledger=continuity, signature="untrusted", why=compared)
+        return LedgerState(ledger=continuity, signature="untrusted", still_holds=False, why=compared)
     signature: Signature = "valid"
     if of_people:
-        why = f"{len(registry.people().history.versions)} versions, each signed"
+        why, doubt = f"{len(registry.people().history.versions)} versions, each signed", None
     else:
         ledger = registry.ledger(folder.name)
         if ledger.damage is not None:
             raise damaged(folder, ledger.damage)
+        doubt = ledger.doubt
         signed = sum(bool(entry.signatures) for entry in ledger.entries)
         why = f"{len(ledger.entries)} entries, {signed} of them signed by people who were enrolled then"
         signature = "valid" if signed and registry.people().history.now else "unsigned"
-    return LedgerState(ledger=continuity, signature=signature, why="; ".join(filter(None, (why, compared))))
+    return LedgerState(
+        ledger=continuity, signature=signature, still_holds=None if doubt is None else False,
+        why="; ".join(filter(None, (doubt, why, compared))),
+    )  # fmt: skip
 
 
 def _witnessed(registry: Registry, name: str) -> tuple[Continuity, str]:
@@ -259,6 +268,20 @@ def _witnessed(registry: Registry, name: str) -> tuple[Continuity, str]:
         if continuity != "continues":
             break
     return continuity, "; ".join(whys)
+
+
+def _not_entered(registry: Registry, record_id: str, digest: str) -> str | None:
+    """Return why a file is not the one that the ledger's entry of a record holds the hash of."""
+    from toolkit.calibration.registry.registry import instrument_of
+
+    entry = registry.ledger(instrument_of(record_id)).entered().get(record_id)
+    entered = None if entry is None else entry.file
+    if entered is None or entered == digest:
+        return None
+    return (
+        f"it is not the file of {record_id} that was entered: the SHA-256 of its bytes is {digest[:12]}, "
+        f"the ledger holds {entered[:12]}"
+    )
 
 
 def _standing(registry: Registry, name: Named) -> LedgerState:
@@ -279,6 +302,8 @@ def _standing(registry: Registry, name: Named) -> LedgerState:
     decided_by = None if signed == UNSIGNED else signed
     if record.sha256 != name.sha256:
         return LedgerState(still_holds=False, why=f"record {name.record} here is another one")
+    if name.file is not None and (changed := _not_entered(registry, name.record, name.file)) is not None:
+        return LedgerState(still_holds=False, why=changed, changed=changed)
     if status.state in ("withdrawn", "discarded"):
         reason = f": {status.reason}" if status.reason else ""
         why = f"record {name.record} was {status.state} since{reason}"

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError, ToolkitError
+from toolkit.files import parse_json
 from toolkit.inputs import CERTIFICATE_FILE, REQUEST_FILE, read_input
 from toolkit.lab.home import find_home
 from toolkit.trust.anchor import parse_anchor
@@ -153,7 +154,7 @@ def stamp_of(document: Path, trust: Trust) -> Stamp | None:
         ``time-stamp``: it is not of the proof's checkpoint, or none
     """
     try:
-        entries = json.loads(read_input(document, REQUEST_FILE))
+        entries = parse_json(read_input(document, REQUEST_FILE))
     except (ToolkitError, ValueError, RecursionError):
         return None  # a checkpoint or a PDF: nothing in them is a time stamp of a checkpoint
     if not isinstance(entries, dict) or STAMP not in entries:

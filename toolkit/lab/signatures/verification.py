@@ -18,7 +18,7 @@ from typing import Annotated, Any, TypedDict
 from toolkit.declared import Entry
 from toolkit.declared.answers import merged
 from toolkit.errors import ToolkitError, TrustError
-from toolkit.files import sha256_bytes
+from toolkit.files import parse_json, sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
 from toolkit.lab.signatures.proofs import (
     PROOF,
@@ -148,7 +148,7 @@ def carried(attachments: Mapping[str, bytes], *, where: object) -> Carried:
         ``anchor``, ``checkpoint``: its proof cannot be read
     """
     try:
-        document = json.loads(attachments.get(PROOF, b"{}"))
+        document = parse_json(attachments.get(PROOF, b"{}"))
         names = tuple(
             Named(record=str(r["id"]), sha256=str(r["sha256"])) for r in document.get("records", ())
         )
@@ -203,7 +203,7 @@ def _dcc(path: Path, data: bytes, trust: Trust, ledger: Ledger) -> Verdict:
 
 def _json(path: Path, data: bytes, trust: Trust, ledger: Ledger) -> Verdict:
     try:
-        document = json.loads(data)
+        document = parse_json(data)
     except (ValueError, RecursionError) as error:
         raise _unreadable(path, str(error)) from error
     if isinstance(document, dict) and isinstance(document.get("outputs"), list):
@@ -222,7 +222,9 @@ def _record(path: Path, data: bytes, ledger: Ledger) -> Verdict:
         record = from_bytes(data, where=path)
     except ToolkitError as error:
         return Verdict(file=str(path), kind="record", why=f"{error.what}: {error.got}")
-    state = ledger((Named(record=record.id, sha256=record.sha256),), None)
+    state = ledger((Named(record=record.id, sha256=record.sha256, file=sha256_bytes(data)),), None)
+    if state.changed is not None:
+        return Verdict(file=str(path), kind="record", over=record.id, why=state.changed)
     signed = state.decided_by is not None
     return Verdict(
         file=str(path), kind="record", signature="valid" if signed else "unsigned", over=record.id,
@@ -237,7 +239,7 @@ def _ledger(path: Path) -> Verdict:
     state = ledger_file_state(path)
     return Verdict(
         file=str(path), kind="ledger", signature=state.signature, ledger=state.ledger, why=state.why,
-        issued_by=state.issued_by, issued_at=state.issued_at,
+        issued_by=state.issued_by, issued_at=state.issued_at, still_holds=state.still_holds,
     )  # fmt: skip
 
 

@@ -348,11 +348,11 @@ def file_fmu(source: Path, target: Path, *, fmi: str) -> tuple[bytes, tuple[Find
     from toolkit.tires.fmu.archive import fmu_of
     from toolkit.tires.fmu.equations import equations_of_file
     from toolkit.tires.tir import read_tir
-    from toolkit.tires.tir_evaluate import lacking_findings
+    from toolkit.tires.tir_checks import file_findings
 
     file = read_tir(source)
     mark = file.comment(DRAFT_MARK)
-    findings = (*file.findings(), *lacking_findings(file, file.coefficients()))
+    findings = file_findings(file)
     fmu = fmu_of(
         equations_of_file(file), name=target.stem, fmi=fmi,
         notes="; ".join([f"Of {source.name}", *([mark] if mark else [])]),

@@ -31,8 +31,8 @@ def evaluate_grid(
     forces, findings = evaluate_tir(
         file, SA=turn["SA"] * table["SA"], FZ=table["FZ"], angles=angles, **optional
     )
-    # A grid may ask for any slip, load and speed; a pressure in another unit is no question.
-    findings = (*findings, *condition_findings(table, only=("P",)))
+    # A grid may ask for any slip ratio, load and speed; angles and pressures of no tire are a wrong unit.
+    findings = (*findings, *condition_findings(table, only=("P", "SA", "IA")))
     turned = forces.in_axes(table.axes)
     if mark is not None:
         findings = (*findings, Finding(rule="draft", where=file.where, message=mark, level="error"))

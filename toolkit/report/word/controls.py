@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -17,6 +17,7 @@ from toolkit.report.word.xml import (
     W_P,
     W_R,
     W_SDT,
+    W_T,
     W_TBL,
     W_TC,
     W_TR,
@@ -147,11 +148,57 @@ def fill_literals(paragraph: Element, resolve: Callable[[Tag], str]) -> None:
         before = (texts[first].text or "")[:head]
         if first == last:
             set_text(texts[first], before + text + after)
+            continue
+        value = texts[first]
+        if marks := _marks_between(paragraph, texts[first], texts[last]):
+            # What marks a part of the tag marks the whole value, and nothing of what is before it.
+            value, before = (_after(value, before), "") if before else (value, "")
+            _around(value.getparent(), marks)
+        for middle in texts[first + 1 : last]:
+            middle.text = ""
+        set_text(texts[last], after)
+        set_text(value, before + text)
+
+
+_STARTS = ("bookmarkStart", "commentRangeStart", "permStart")
+_ENDS = ("bookmarkEnd", "commentRangeEnd", "permEnd")
+
+
+def _marks_between(paragraph: Element, first: Element, last: Element) -> list[Element]:
+    """Return the beginnings and ends of bookmarks and the like that stand between two texts."""
+    inside, marks = False, []
+    wanted = tuple(q(f"w:{name}") for name in (*_STARTS, *_ENDS))
+    for element in paragraph.iter(W_T, *wanted):
+        if element is first:
+            inside = True
+        elif element is last:
+            break
+        elif inside and element.tag in wanted:
+            marks.append(element)
+    return marks
+
+
+def _after(text: Element, before: str) -> Element:
+    """Leave a text in its run, and return an empty one in a run of the same look after it."""
+    run = text.getparent()
+    properties = run.find(R_PR)
+    fresh = new_run("", properties)
+    set_text(text, before)
+    run.addnext(fresh)
+    return fresh.find(W_T)
+
+
+def _around(run: Element, marks: Sequence[Element]) -> None:
+    """Put beginnings before a run and ends after it; a bookmark of another level of the line stays."""
+    for mark in marks:
+        if mark.getparent() is not run.getparent():
+            continue
+        name = mark.tag.rpartition("}")[2]
+        mark.tail = None
+        if name in _STARTS:
+            run.addprevious(mark)
         else:
-            for middle in texts[first + 1 : last]:
-                middle.text = ""
-            set_text(texts[last], after)
-            set_text(texts[first], before + text)
+            run.addnext(mark)
 
 
 def set_cell(cell: Element, text: str) -> None:

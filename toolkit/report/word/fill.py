@@ -119,6 +119,7 @@ class _Log:
     in_margins: set[str] = field(default_factory=set)
     elsewhere: set[str] = field(default_factory=set)
     charts: list[Chart] = field(default_factory=list)
+    drawn_in: list[tuple[str, str]] = field(default_factory=list)
 
 
 class _Filler:
@@ -204,6 +205,8 @@ class _Filler:
             to_be_read=must_be_read(self.content.vocabulary, self.content.style)
             | {entry.tag for entry in self.log.manifest if not entry.tag.startswith("tk:")},
             in_margins=frozenset(self.log.in_margins - self.log.elsewhere),
+            demanded=self.content.vocabulary.demanded(self.content.style.required),
+            drawn_in=tuple(self.log.drawn_in),
         )
 
     def _conditions(self) -> None:
@@ -353,6 +356,7 @@ class _Filler:
             )  # fmt: skip
         if not site.fallback:
             self.log.figures.append((f"tk:{tag.path}", plot.alt))
+            self.log.drawn_in.append((f"tk:{tag.path}", site.story.name))
             margin = site.story.root.tag in (q("w:hdr"), q("w:ftr"))
             (self.log.in_margins if margin else self.log.elsewhere).add(f"tk:{tag.path}")
             self.log.pictures.append(f"{tag.name} {sha256_bytes(drawn)}")

@@ -40,7 +40,8 @@ class Filled:
     ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them;
     ``in_margins`` the figures that stand in headers and footers alone; ``page_mark`` the line that every page
     carries; ``charts`` those of the figures that are charts of Word's own, in their order; ``to_be_read`` the
-    tags of the manifest whose text people must be able to read in the PDF.
+    tags of the manifest whose text people must be able to read in the PDF; ``demanded`` the tags that a page
+    must show, and ``drawn_in`` the parts that hold each figure.
     """
 
     docx: bytes
@@ -61,6 +62,8 @@ class Filled:
     page_mark: str | None = None
     charts: tuple[Chart, ...] = ()
     to_be_read: frozenset[str] = frozenset()
+    demanded: tuple[str, ...] = ()
+    drawn_in: tuple[tuple[str, str], ...] = ()
 
 
 # A Word file as it was written, read back piece by piece: its tables may be of any length.
@@ -72,7 +75,7 @@ _RELATIONS = "{http://schemas.openxmlformats.org/package/2006/relationships}Rela
 def text_elements(docx: bytes, main_part: str) -> Iterator[Element]:
     """Yield each paragraph, control and drawing of the parts with text; a row is let go when it ends."""
     with zipfile.ZipFile(io.BytesIO(docx)) as archive:
-        for name in _parts(archive, main_part):
+        for name in parts_of(archive, main_part):
             with archive.open(name) as part:
                 yield from _elements(part)
 
@@ -89,7 +92,7 @@ def _elements(part: object) -> Iterator[Element]:
             element.clear()
 
 
-def _parts(archive: zipfile.ZipFile, main: str) -> list[str]:
+def parts_of(archive: zipfile.ZipFile, main: str) -> list[str]:
     """Return the main part, and the headers, footers and notes that it refers to."""
     folder, name = posixpath.split(main)
     relations = posixpath.join(folder, "_rels", f"{name}.rels")

@@ -123,10 +123,14 @@ def open_package(template: Template) -> Any:
 
 
 # What is no Word file, or a broken one, holds nothing that could be removed.
-_NEXT = dict.fromkeys(
-    ("not-word", "zip-damaged"),
-    "copy it again, or open it in Word and save it as .docx or .dotx",
-)
+_NEXT = {
+    **dict.fromkeys(
+        ("not-word", "zip-damaged"),
+        "copy it again, or open it in Word and save it as .docx or .dotx",
+    ),
+    "strict-word": "open it in Word and save it as 'Word document (.docx)', not as 'Strict Open XML'",
+}
+_MAIN = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument"
 
 
 def _refuse(
@@ -253,6 +257,11 @@ def _main_part(path: Path, members: dict[str, bytes], root_of: RootOf) -> str:
             raise _refuse(path, "macros", "the template can run macros", got=kind)
     for rel in root_of("_rels/.rels").iter(_REL):
         if (rel.get("Type") or "").endswith("/officeDocument"):
+            if rel.get("Type") != _MAIN:
+                raise _refuse(
+                    path, "strict-word", "the template is a Strict Open XML document", got=rel.get("Type"),
+                    expected=f"a Word document, whose main part is of {_MAIN}",
+                )  # fmt: skip
             name = (rel.get("Target") or "").lstrip("/")
             kind = overrides.get(name, "")
             if kind in (DOCUMENT, TEMPLATE):

@@ -24,21 +24,23 @@ _OFF = ("0", "false", "off")
 
 
 def headers_shown(
-    package: Any, parts: list[Story]
+    package: Any, parts: list[Story], sections: Sequence[Element] | None = None
 ) -> tuple[tuple[str, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
     """Return the headers, footers and notes that no page shows, and the headers that some page may show.
 
     Call it before the template is filled: the words are its own, without tags.
 
     A section's first page has a header of its own only with ``titlePg``, even pages only where the settings
-    ask for them; the others then depend on how many pages there are.
+    ask for them; the others then depend on how many pages there are. ``sections`` are the properties of those
+    that count, by default of all.
     """
     main = package.main_document_part
+    sections = list(main.element.iter(q("w:sectPr"))) if sections is None else sections
     even = switched_on(getattr(settings_of(main), "element", None), "w:evenAndOddHeaders")
     certain: set[str] = set()
     possible: set[str] = set()
-    title_somewhere = any(switched_on(s, "w:titlePg") for s in main.element.iter(q("w:sectPr")))
-    for section in main.element.iter(q("w:sectPr")):
+    title_somewhere = any(switched_on(section, "w:titlePg") for section in sections)
+    for section in sections:
         for reference in section.iter(q("w:headerReference"), q("w:footerReference")):
             rel = main.rels.get(reference.get(q("r:id")))
             if rel is None or rel.is_external:

@@ -144,14 +144,14 @@ def squeeze(text: str) -> str:
     return _SPACE.sub("", unicodedata.normalize("NFKC", text))
 
 
-def pdf_text(pdf: Path) -> str:
-    """Return a PDF's text, a form feed after each page."""
+def pdf_text(pdf: Path, *, layout: bool = False) -> str:
+    """Return a PDF's text, a form feed after each page, as it was painted or as its ``layout`` has it."""
     with tempfile.TemporaryDirectory(prefix="toolkit-verify-") as folder:
         # The text is the same without PDF/A's colour profile, which pdftotext sets up anew for each page:
         # 50 ms a page. The name is blotted out in place, so that every offset stays right.
         plain = Path(folder) / "text.pdf"
         plain.write_bytes(read_input(pdf, PDF_FILE).replace(b"/OutputIntents", b"/OutputIntent_"))
-        return poppler(["pdftotext", "-raw", "-enc", "UTF-8", str(plain), "-"])
+        return poppler(["pdftotext", "-layout" if layout else "-raw", "-enc", "UTF-8", str(plain), "-"])
 
 
 def poppler(command: list[str]) -> str:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import codecs
 import io
 import re
-import unicodedata
 import zipfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.filled import Filled, text_elements
 from toolkit.report.word.legible import seen
 from toolkit.report.word.pages import PAGE_MARK
+from toolkit.report.word.printed import hard_to_extract, unprinted
 from toolkit.report.word.scan import BROKEN, LITERAL, control_tag
 from toolkit.report.word.toc_pages import pdf_outline, pdf_text, poppler, printed_pages, squeeze, titles_of
 from toolkit.report.word.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
@@ -44,13 +45,14 @@ def text_checks(text: str, filled: Filled) -> list[Check]:
     unfilled = [tag for tag in re.findall(r"\{\{tk:[^{}]{0,60}", page) if tag not in printed_text]
     lost, unreadable = [], []
     hidden = _not_printed(filled, page)
-    for entry in dict.fromkeys(filled.manifest):
-        if entry.text in printed or entry.part in hidden:
+    shown = [entry for entry in filled.manifest if entry.part not in hidden]
+    for entry in dict.fromkeys(shown):
+        if entry.text in printed:
             continue
         value = squeeze(entry.text)
         if not value or value in page or _in_pieces(value, page, entry.text, sheets):
             continue
-        plain = "".join(ch for ch in value if not _hard_to_extract(ch))
+        plain = "".join(ch for ch in value if not hard_to_extract(ch))
         if plain != value and all(squeeze(w) in page for w in _plain_words(entry.text)):
             unreadable.append(entry.tag)
         else:
@@ -59,8 +61,9 @@ def text_checks(text: str, filled: Filled) -> list[Check]:
         Check(
             name="values",
             ok=not lost,
-            message="; ".join(lost[:5]) or f"{len(filled.manifest)} values found in the PDF",
+            message="; ".join(lost[:5]) or f"{len(shown)} values found in the PDF",
         ),
+        *_required(filled, hidden),
         Check(name="literals", ok=not unfilled, message=", ".join(unfilled[:5]) or "no tag is printed"),
         Check(
             name="cells",
@@ -103,6 +106,33 @@ def _not_printed(filled: Filled, page: str) -> set[str]:
     return hidden
 
 
+def _required(filled: Filled, hidden: set[str]) -> list[Check]:
+    """Check that each tag that the document must show stands in a part that the pages show.
+
+    Whether it is found there is asked of every value alike; a part that no page shows is not asked.
+    """
+    if not filled.demanded:
+        return []
+    places = [(entry.tag, entry.part) for entry in filled.manifest] + list(filled.drawn_in)
+    shown = {tag for tag, part in places if part not in hidden}
+    # A table is in the manifest by its columns; a condition, and the pattern of a row, print nothing.
+    absent = [
+        tag
+        for tag in filled.demanded
+        if not tag.startswith(("tk:if.", "tk:row."))
+        and tag not in shown
+        and not any(name.startswith(f"{tag}.") for name in shown)
+    ]
+    message = f"no page shows the required {', '.join(absent)}" if absent else ""
+    return [
+        Check(
+            name="required",
+            ok=not absent,
+            message=message or f"{len(filled.demanded)} required tags stand on the pages",
+        )
+    ]
+
+
 def _absent_rows(
     page: str, rows: Sequence[Sequence[str]], sheets: Sequence[str]
 ) -> tuple[list[str], set[str]]:
@@ -123,7 +153,7 @@ def _absent_rows(
             if (
                 value not in page
                 and not _in_pieces(value, page, cell, sheets)
-                and not any(map(_hard_to_extract, value))
+                and not any(map(hard_to_extract, value))
             ):
                 lost.append(cell[:60])
     return lost, cells_in_rows
@@ -151,25 +181,8 @@ def _in_pieces(value: str, page: str, original: str, sheets: Sequence[str]) -> b
     return False
 
 
-def _hard_to_extract(character: str) -> bool:
-    return (
-        unicodedata.bidirectional(character) in ("R", "AL", "AN")
-        or unicodedata.category(character)
-        in (
-            "So",
-            "Sk",
-            "Cn",
-            "Co",
-            "Mn",
-            "Me",
-            "Cf",
-        )
-        or ord(character) > 0xFFFF
-    )
-
-
 def _plain_words(text: str) -> list[str]:
-    return [word for word in text.split() if not any(map(_hard_to_extract, word))]
+    return [word for word in text.split() if not any(map(hard_to_extract, word))]
 
 
 def verify_docx(filled: Filled) -> tuple[Check, ...]:
@@ -224,6 +237,8 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
         text = pdf_text(pdf)
         listing = fonts.result()
     pictures = data.count(b"/Subtype/Image")
+    readings = _Readings(pdf, text)
+    hidden = _not_printed(filled, squeeze(text))
     # Headers and footers are artifacts of a tagged PDF: nothing in them has a text beside it.
     mute = [
         tag
@@ -233,11 +248,12 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     drawn = {tag for tag, _ in filled.figures} - {chart.tag for chart in filled.charts}
     return (
         (
-            *text_checks(text, filled),
+            *_in_some_reading(readings, filled),
+            _printed(readings, filled, hidden),
             *_contents(pdf, text, filled),
             *_margins(filled),
             *_charts(text, filled),
-            _legible(pdf, filled),
+            _legible(pdf, filled, hidden),
             _fonts(listing),
             Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
             Check(
@@ -257,11 +273,42 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     )
 
 
-def _legible(pdf: Path, filled: Filled) -> Check:
+class _Readings(Sequence[str]):
+    """A PDF's text in the order in which it was painted, then as it lies on the page, read when needed.
+
+    A glyph of another font, which a line of one font lacks, is painted after the line.
+    """
+
+    def __init__(self, pdf: Path, text: str) -> None:
+        self._pdf, self._texts = pdf, [text]
+
+    def __len__(self) -> int:
+        return 2
+
+    def __getitem__(self, index: Any) -> Any:
+        if index == 1 and len(self._texts) == 1:
+            self._texts.append(pdf_text(self._pdf, layout=True))
+        return self._texts[index]
+
+
+def _in_some_reading(readings: Sequence[str], filled: Filled) -> list[Check]:
+    checks = text_checks(readings[0], filled)
+    if all(check.ok or check.warning for check in checks):
+        return checks
+    return text_checks(readings[0] + readings[1], filled)
+
+
+def _printed(readings: Sequence[str], filled: Filled, hidden: set[str]) -> Check:
+    problems = unprinted(filled, hidden, readings)
+    message = "; ".join(problems[:5]) or "each text of the Word file has its place in the PDF"
+    return Check(name="texts", ok=not problems, message=f"not printed: {message}" if problems else message)
+
+
+def _legible(pdf: Path, filled: Filled, hidden: set[str]) -> Check:
     texts = {
         entry.text: entry.tag
         for entry in filled.manifest
-        if entry.tag in filled.to_be_read and entry.text != filled.page_mark
+        if entry.tag in filled.to_be_read and entry.text != filled.page_mark and entry.part not in hidden
     }
     unreadable = [
         f"{texts.get(text, PAGE_MARK)} {text[:40]!r} cannot be read: {why}"
@@ -293,7 +340,7 @@ def _charts(text: str, filled: Filled) -> list[Check]:
         f"{chart.tag} {name[:40]!r}"
         for chart in filled.charts
         for name in chart.texts
-        if squeeze(name) not in page and not any(map(_hard_to_extract, name))
+        if squeeze(name) not in page and not any(map(hard_to_extract, name))
     ]
     message = f"the axes and series of {len(filled.charts)} charts are in the PDF"
     return [Check(name="charts", ok=not lost, message="; ".join(lost[:5]) or message)]

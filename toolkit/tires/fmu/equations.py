@@ -14,7 +14,8 @@ from toolkit.tires.global_model import Rows
 from toolkit.tires.mf import MF52, MF61
 from toolkit.tires.recorded import NotRecordedError, Program, record
 from toolkit.tires.tir import si_number
-from toolkit.tires.tir_evaluate import forces_of, positive
+from toolkit.tires.tir_checks import demanded, nominal_pressure
+from toolkit.tires.tir_evaluate import forces_of
 
 if TYPE_CHECKING:
     from toolkit.tires.global_data import Measured
@@ -76,16 +77,16 @@ def equations_of_file(tir: TirFile) -> TireEquations:
     Raises
     ------
     ConfigError
-        FITTYP is not known, or FNOMIN, UNLOADED_RADIUS are missing or not positive
+        FITTYP is not known, FNOMIN, UNLOADED_RADIUS are missing or not positive, or NOMPRES is negative
     """
     version, p = tir.version, tir.coefficients()
-    speed, nominal = si_number(tir, "LONGVL", 0.0) or None, si_number(tir, "NOMPRES", 0.0)
+    speed, nominal = si_number(tir, "LONGVL", 0.0) or None, nominal_pressure(tir) or 0.0
     pressed = version == "6.x" and nominal > 0
     inflation = si_number(tir, "INFLPRES", nominal)
-    starts = {"SA": 0.0, "FZ": positive(tir, "FNOMIN"), "IA": 0.0, "KAPPA": 0.0, "V": speed or 1.0}
+    starts = {"SA": 0.0, "FZ": demanded(tir, "FNOMIN"), "IA": 0.0, "KAPPA": 0.0, "V": speed or 1.0}
     if pressed:
         starts["P"] = inflation if inflation > 0 else nominal
-    parameters = {"FNOMIN": starts["FZ"], "UNLOADED_RADIUS": positive(tir, "UNLOADED_RADIUS"), **p}
+    parameters = {"FNOMIN": starts["FZ"], "UNLOADED_RADIUS": demanded(tir, "UNLOADED_RADIUS"), **p}
     if pressed:
         parameters["NOMPRES"] = nominal
 
