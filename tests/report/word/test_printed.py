@@ -32,6 +32,8 @@ def lost(folder: Path, body: str, *readings: str) -> list[str]:
         (tbl(["1.5", "21.54"], ["4", "14.5"]), "14.5 4 21.54 1.5"),
         (p("12.5 kN") * 2, "12.5 kN 12.5 kN"),
         (p("• first") + p("– second"), "first second"),
+        (p("non\u2011breaking 10\u207b\u00b3, so\u00adft"), "non-breaking 10-3, soft"),
+        (p("final flow"), "\ufb01nal \ufb02ow"),
     ],
 )
 def test_what_stands_there_is_found(tmp_path: Path, body: str, reading: str) -> None:

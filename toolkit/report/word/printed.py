@@ -9,6 +9,7 @@ lists and notes), and what nobody sees in Word either, is left out.
 from __future__ import annotations
 
 import io
+import re
 import unicodedata
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -27,6 +28,8 @@ _WHOLE = 20  # characters of a text, half of which must stand together
 _UNBROKEN, _HEAD = 20, 8  # characters of one word that the end of a page may cut, and of its beginning
 _FIELD = q("w:fldChar")
 _TAKEN = "\0"
+# Hyphens, dashes and minus signs, what has no width, and marks that are combined with a letter.
+_COMES_AND_GOES = re.compile("[-\u00ad\u0300-\u036f\u200b-\u200f\u2010-\u2015\u2060\u2212\ufeff]")
 # What interrupts the text of a paragraph, or is written by the program that prints it.
 _BETWEEN = tuple(
     q(name)
@@ -192,7 +195,6 @@ class _Print:
         self.all = self.left = "".join(words)
         # Where a word begins; the end of one is where the next one does.
         self.edges = frozenset(accumulate(map(len, words), initial=0))
-        self.unhyphened = self.all.replace("-", "").replace("\u2010", "")
 
     def without(self, passages: Sequence[Passage]) -> dict[tuple[int, int], str]:
         """Return the texts that find no place, by passage and number, with the words that are lost.
@@ -284,8 +286,13 @@ class _Print:
             return True
         if any(map(str.isdecimal, plain)):
             return False
-        return plain in self.all or plain.replace("-", "") in self.unhyphened
+        return plain in self.all
 
 
 def _plain(text: str) -> str:
-    return squeeze(text).casefold()
+    """Return a text by what every reader of a PDF gives alike.
+
+    Ligatures and raised figures are read as letters and figures; hyphens come and go with the ends of lines,
+    and the sign of a value is asked for with its value.
+    """
+    return _COMES_AND_GOES.sub("", squeeze(text).casefold())
