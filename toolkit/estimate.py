@@ -62,19 +62,29 @@ def coverage_factor(dof: float, probability: float = 0.95) -> float:
     return float(ndtri(tail)) if math.isinf(dof) else float(stdtrit(math.floor(dof * (1 + 1e-9)), tail))
 
 
-_MANY = 1e6  # from which Student's t is the normal quantile to six digits
-
-
 def effective_dof(contributions: list[tuple[float, float]]) -> float:
-    """Return the Welch-Satterthwaite degrees of freedom of (u_i, dof_i) (GUM G.4.1); so many are infinite.
+    """Return the Welch-Satterthwaite degrees of freedom of (u_i, dof_i) (GUM G.4.1).
 
     >>> effective_dof([(3.0, 10.0), (4.0, math.inf)])
     77.16049382716...
     """
     total = sum(u * u for u, _ in contributions)
     bottom = sum(u**4 / dof for u, dof in contributions if not math.isinf(dof))
-    dof = math.inf if bottom == 0 else total * total / bottom
-    return math.inf if dof > _MANY else dof
+    return math.inf if bottom == 0 else total * total / bottom
+
+
+_MANY = 1e6  # degrees of freedom from which Student's t is the normal quantile to six digits
+
+
+def dof_text(dof: float) -> str:
+    """Return degrees of freedom for people: more than a million are infinite.
+
+    >>> [dof_text(dof) for dof in (7.5, 28461.3, 7.5e19, math.inf)]
+    ['7.5', '28461', 'inf', 'inf']
+    """
+    if dof > _MANY:
+        return "inf"
+    return f"{dof:.3g}" if dof < 1000 else f"{dof:.0f}"
 
 
 _MOST_LOWERED = Decimal("0.05")

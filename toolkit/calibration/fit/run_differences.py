@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _RISK = 1e-4
 _ODD = 5.0  # times what the other runs are from each other
+_FORETOLD = 0.5  # of a row's variance: what the other runs foretell of its mean
 _FEWEST_DOF = 5
 _COPIED = 5.0  # times less than what else the rows scatter by, as standard deviations
 _FEWEST_PAIRS = 10
@@ -127,9 +128,9 @@ def odd_run(session: Session, load: LoadResult) -> OddRun | None:
         c = (solution / np.where(length > 0, length, 1.0))[: design.shape[1]]
         predicted = design[own] @ c
         about = np.column_stack([np.ones(len(predicted)), predicted])
-        if len(predicted) < about.shape[1] + 2 or not _spans(design[~own], design[own]):
-            return None
-        off.append(_rms(about, rows.load[own]))
+        # Runs that load other axes tell nothing of each other.
+        comparable = len(predicted) > about.shape[1] + 2 and _leverage(design[~own], design[own]) < _FORETOLD
+        off.append(_rms(about, rows.load[own]) if comparable else 0.0)
         rest = rows.load[~own] - scaled @ solution
         within.append(float(np.sqrt(rest @ rest / max(len(rest) - rank, 1))))
     ratio = np.array(off) / np.maximum(within, 1e-300)
@@ -190,8 +191,12 @@ def copied_runs(session: Session) -> CopiedRuns | None:
 
 
 def _rows(session: Session, load: LoadResult) -> SessionRows | None:
-    """Return the rows of a load where its runs can be told apart and all of them are at hand."""
-    if load.exact or load.fit.weights is not None or INTERCEPT not in load.fit.terms:
+    """Return the rows of a load where its runs can be told apart and all of them are at hand.
+
+    Of an equation that bends, a zero or a tare of a run moves more than a zero and a gain of the load.
+    """
+    straight = set(load.fit.terms) == {*session.indications, INTERCEPT}
+    if load.exact or load.fit.weights is not None or not straight:
         return None
     reference = session.table.column(load.setting.name)
     design = term_matrix(load.fit.terms, session.table.columns(session.indications))
@@ -227,16 +232,15 @@ def _rms(design: NDArray[np.float64], load: NDArray[np.float64]) -> float:
     return float(np.sqrt(_left(design, load)[0] / (len(load) - design.shape[1])))
 
 
-def _spans(design: NDArray[np.float64], at: NDArray[np.float64]) -> bool:
-    """Tell whether the rows of a design determine what it gives at other rows."""
+def _leverage(design: NDArray[np.float64], at: NDArray[np.float64]) -> float:
+    """Return the mean variance of what the rows of a design foretell at other rows, by that of a row."""
     length = np.linalg.norm(design, axis=0)
     if not length.all():
-        return False
-    right = np.linalg.svd(design / length)[1:]
-    null = right[1][int(np.sum(right[0] > 1e-3 * right[0][0])) :]
-    return (
-        bool((np.abs(at / length @ null.T) <= 1e-6 * np.abs(at / length).max()).all()) if len(null) else True
-    )
+        return np.inf
+    _, values, right = np.linalg.svd(design / length, full_matrices=False)
+    if values[-1] <= 1e-8 * values[0]:
+        return np.inf
+    return float(np.mean(np.sum((at / length @ right.T / values) ** 2, axis=1)))
 
 
 def _pairs(
