@@ -73,6 +73,20 @@ def effective_dof(contributions: list[tuple[float, float]]) -> float:
     return math.inf if bottom == 0 else total * total / bottom
 
 
+_MANY = 1e6  # degrees of freedom from which Student's t is the normal quantile to six digits
+
+
+def dof_text(dof: float) -> str:
+    """Return degrees of freedom for people: more than a million are infinite.
+
+    >>> [dof_text(dof) for dof in (7.5, 28461.3, 7.5e19, math.inf)]
+    ['7.5', '28461', 'inf', 'inf']
+    """
+    if dof > _MANY:
+        return "inf"
+    return f"{dof:.3g}" if dof < 1000 else f"{dof:.0f}"
+
+
 _MOST_LOWERED = Decimal("0.05")
 
 

@@ -23,6 +23,8 @@ class Finding:
 
     ``rule`` is a short id that ``toolkit explain`` knows, ``where`` names file, block, channel or
     record, ``message`` is one sentence with the numbers. A ``note`` informs and leaves the exit code at 0.
+    An ``error`` is what cannot be, or makes the result worthless: of a calibration session it refuses the
+    approval of the record.
     """
 
     rule: str

@@ -77,9 +77,9 @@ def judged(
     return made, decision
 
 
-def rules(made: Candidate, level: str = "warning") -> set[str]:
-    """Return the rules of a candidate's findings."""
-    return {one.rule for one in made.findings if one.level == level}
+def rules(made: Candidate, *levels: str) -> set[str]:
+    """Return the rules of a candidate's findings; without levels, of those that ask for attention."""
+    return {one.rule for one in made.findings if one.level in (levels or ("warning", "error"))}
 
 
 def failed(decision: Decision) -> set[str]:

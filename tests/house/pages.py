@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
@@ -148,12 +148,17 @@ def _answers_text() -> str:
     return "\n".join(parts).rstrip() + "\n"
 
 
+def _meaning(entry: Mapping[str, str]) -> str:
+    refuses = entry.get("refuses")
+    return f"{entry['means']} Refuses an approval: {refuses}" if refuses else entry["means"]
+
+
 def _rules_text() -> str:
     def row(*cells: str) -> str:
         return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
 
     lines = [row("rule", "what it means", "what to do"), "|---|---|---|"]
-    lines += [row(f"`{rule}`", entry["means"], entry["do"]) for rule, entry in rules_catalogue().items()]
+    lines += [row(f"`{rule}`", _meaning(entry), entry["do"]) for rule, entry in rules_catalogue().items()]
     return "\n".join(lines) + "\n"
 
 

@@ -98,7 +98,7 @@ def command(
         from toolkit.calibration.standards.evaluation import evaluations
 
         payload["standards"] = [row.as_dict() for row in evaluations(candidate.fit)]
-        report = fit_report(candidate.fit, title=candidate.record.id, full=full, figures=figures)
+        report = fit_report(candidate.fit, candidate.record, full=full, figures=figures)
         for name, load in report.loads.items():
             payload["loads"][name]["report"] = load
         payload |= report.payload

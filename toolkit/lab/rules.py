@@ -20,6 +20,7 @@ class RuleEntry(TypedDict):
 
     rule: str
     means: str
+    refuses: NotRequired[Annotated[str, "when, as an error, it refuses the approval of a calibration record"]]
     do: str
 
 
@@ -161,7 +162,14 @@ def explained(name: str | None) -> tuple[dict[str, Any], str]:
             rule="unknown-rule",
         )
     entry = rules[name]
-    return {"rule": name, **entry}, f"{name}\n  means: {entry['means']}\n  do:    {entry['do']}"
+    return {"rule": name, **entry}, _rule_text(name, entry)
+
+
+def _rule_text(name: str, entry: Mapping[str, str]) -> str:
+    lines = [name, f"  means: {entry['means']}"]
+    if "refuses" in entry:
+        lines.append(f"  refuses an approval: {entry['refuses']}")
+    return "\n".join([*lines, f"  do:    {entry['do']}"])
 
 
 def _characteristic_text(characteristic: Characteristic) -> str:

@@ -115,7 +115,7 @@ def _fit(bench: Bench, record_id: str) -> dict[str, Any]:
 
     stored = bench.registry.load(record_id)
     fit = fit_session(stored_session(bench.registry.folder, stored))
-    loads = fit_report(fit, title=record_id, full=True, figures=None).loads
+    loads = fit_report(fit, stored, full=True, figures=None).loads
     units = {load.load: load.unit for load in stored.loads}
     return {
         "loads": loads,

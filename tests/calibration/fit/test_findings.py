@@ -146,9 +146,12 @@ def test_a_run_with_exchanged_cells_is_named(make_session: Make) -> None:
     # No row stands out from a fit that all of them tilt, and no check load is asked.
     values = in_runs(81, 3, 5)
     values[27:54, :2] = values[27:54, 1::-1]
-    told_of = {one.where: one for one in session_findings(session_in_runs(make_session, values))}
-    assert {one.rule for one in told_of.values() if one.level == "warning"} == {"robust", "check-load"}
-    assert "of the 27 rows of run 2" in told_of["FY"].message
+    findings = session_findings(session_in_runs(make_session, values))
+    assert {one.rule for one in findings if one.level == "warning"} == {"robust"}
+    assert {one.rule for one in findings if one.level == "error"} == {"run-apart", "check-load"}
+    told_of = {(one.rule, one.where): one.message for one in findings}
+    assert "of the 27 rows of run 2" in told_of["robust", "FY"]
+    assert told_of["run-apart", "FY"].startswith("run 2 lies")
 
 
 def test_exchanged_cells_in_scattered_rows_are_named(make_session: Make) -> None:

@@ -33,8 +33,9 @@ def included(text: str) -> str:
 
 def test_a_bridge_that_was_not_tared_blocks(empty: Registry, tmp_path: Path) -> None:
     made, decision = judged(empty, write_virtual(tmp_path / "s", shifted("D51", 0.7)))
-    assert rules(made) == {"tared"}
-    assert failed(decision) == {"tared"}
+    # What it would read of nothing is in U, too.
+    assert rules(made) == {"tared", "coarse-uncertainty"}
+    assert failed(decision) == {"tared", "coarse-uncertainty"}
     assert {one.where for one in decision.failed} >= {"FY, intercept", "D51"}
     # What it would have cost: a tared test of an unloaded machine reads the intercept.
     record = made.record
@@ -108,4 +109,4 @@ def test_the_claim_is_judged_in_any_unit(empty: Registry, tmp_path: Path) -> Non
         return columns(D51=1e-3, D52=1e-3, E5=1e-3)(shifted("D51", 0.7)(text)).replace("mV/V", "V/V")
 
     _, decision = judged(empty, write_virtual(tmp_path / "s", volts))
-    assert failed(decision) == {"tared"}
+    assert failed(decision) == {"tared", "coarse-uncertainty"}

@@ -19,6 +19,7 @@ from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop
 from toolkit.calibration.fit.robust import contradicting, deviating
 from toolkit.calibration.fit.run_scale import RunScale, run_scales
 from toolkit.calibration.fit.scatter_findings import (
+    difference_findings,
     method_findings,
     run_findings,
     scatter_findings,
@@ -26,6 +27,7 @@ from toolkit.calibration.fit.scatter_findings import (
 )
 from toolkit.calibration.fit.session_fit import fit_session, session_statements
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
+from toolkit.calibration.fit.statement_findings import statement_findings
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
 from toolkit.errors import SessionError
@@ -37,14 +39,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from toolkit.calibration.fit.readings import SessionReadings, ShuntCheck
     from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
     from toolkit.calibration.session.read import Session
     from toolkit.calibration.session.table import Table
 
 FEW_POINTS = 30
 REPEATED = 0.1
-COARSE_REFERENCE = 0.05
+COARSE = 0.05  # of the largest load, a standard uncertainty: nothing is calibrated
 MOST_NAMED = 10
 # A standard uncertainty itself, and Student's t for 95.45 % at one degree of freedom (13.97).
 _LEAST_K, _MOST_K = 1.0, 14.0
@@ -60,7 +61,12 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
     doubted = {row for rows in wrong.values() for row in rows}
     doubted |= {row for runs in scales.values() for run in runs if run.most for row in run.rows}
     sound = _without(fit, doubted)
-    findings = [*_data_findings(fit), *_model_findings(sound), *balance_findings(fit)]
+    findings = [
+        *_data_findings(fit),
+        *statement_findings(fit),
+        *_model_findings(sound),
+        *balance_findings(fit),
+    ]
     if fit.condition_number > COLLINEAR_FINDING:
         message = (
             f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
@@ -71,6 +77,8 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         findings += method_findings(session, judged)
         findings += stated_findings(load)
         findings += scatter_findings(judged)
+    alone = _single(fit.session, doubted.union(*(load.diagnostics.outliers for load in fit.loads)))
+    findings += difference_findings(_without(fit, alone))
     findings += _robust_findings(fit, wrong)
     findings += [
         finding for load in fit.loads for finding in _scale_findings(load, scales[load.setting.name])
@@ -100,6 +108,14 @@ def contradicting_rows(session: Session, load: LoadResult) -> tuple[int, ...]:
     fitted = reference - load.fit.residuals
     mean = mean_of(design, fitted / float(np.abs(fitted).max()), session.table.up).columns
     return deviating(mean, within, wrong)
+
+
+def _single(session: Session, rows: set[int]) -> set[int]:
+    """Return the rows that are wrong by themselves: not those of a run of which most are."""
+    group = groups_of(session.table, session.zero)[1]
+    among = np.bincount(group[np.array(sorted(rows), dtype=np.int64) - 1], minlength=int(group.max()) + 1)
+    whole = among > np.bincount(group) / 2
+    return {row for row in rows if not whole[group[row - 1]]}
 
 
 def _without(fit: SessionFit, rows: set[int]) -> SessionFit:
@@ -185,7 +201,11 @@ def _data_findings(fit: SessionFit) -> list[Finding]:
         equations = [(fit.session.terms, load.fit.coefficients, load.fit.residual_sd) for load in fit.loads]
         scatter = own_scatter(fit.session.indications, equations) + [0.0] * len(fit.loads)
         for at, row in copies(check, rows, scatter).items():
-            message = f"equals row {row + 1} of the fit, digit by digit: it checks nothing"
+            message = (
+                f"equals row {row + 1} of the fit, digit by digit: it checks nothing"
+                if np.allclose(check[at], rows[row], rtol=1e-6, atol=0)
+                else f"repeats row {row + 1} of the fit far below its scatter: it checks nothing"
+            )
             findings.append(Finding(rule="check-not-apart", where=f"check row {at + 1}", message=message))
     if session.reference_due is not None and session.reference_due < session.date:
         message = f"the reference standard was due on {session.reference_due.isoformat()}"
@@ -193,12 +213,12 @@ def _data_findings(fit: SessionFit) -> list[Finding]:
     stated = session_statements(session).reference
     for load in session.loads:
         largest = float(np.abs(table.column(load.name)).max())
-        if (u := stated.u(load.name)) is not None and u > COARSE_REFERENCE * largest:
+        if (u := stated.u(load.name)) is not None and u > COARSE * largest:
             message = (
                 f"the reference's standard uncertainty is {100 * u / largest:.3g} % of the largest load: "
                 "with such a standard nothing is calibrated; is its unit right?"
             )
-            findings.append(Finding(rule="coarse-reference", where=load.name, message=message))
+            findings.append(Finding(rule="coarse-reference", where=load.name, message=message, level="error"))
         if (part := stated.of(load.name)) is not None and not _LEAST_K <= part.k <= _MOST_K:
             message = (
                 f"coverage factor k = {part.k:g}, where certificates state {_LEAST_K:g} to {_MOST_K:g}: the "
@@ -233,7 +253,8 @@ def _load_findings(load: LoadResult, wrong: tuple[int, ...]) -> list[Finding]:
         for row in np.flatnonzero(np.abs(load.check_residuals) > load.setting.tolerance).tolist():
             off, tolerance = load.check_residuals[row], load.setting.tolerance
             message = f"off by {off:+.4g} {unit}, tolerance {tolerance:.4g} {unit}"
-            findings.append(Finding(rule="check-load", where=f"{name}, check row {row + 1}", message=message))
+            where = f"{name}, check row {row + 1}"
+            findings.append(Finding(rule="check-load", where=where, message=message, level="error"))
     return findings
 
 
@@ -326,7 +347,7 @@ def _scale_findings(load: LoadResult, scales: tuple[RunScale, ...]) -> list[Find
         )
         if scale.units is not None:
             message += f", the ratio of {scale.units}: was it recorded in another unit?"
-        findings.append(Finding(rule="run-scale", where=load.setting.name, message=message))
+        findings.append(Finding(rule="run-scale", where=load.setting.name, message=message, level="error"))
     return findings
 
 
@@ -354,73 +375,3 @@ def _some(rows: list[int]) -> str:
 
 def _inline(lines: str) -> str:
     return "; ".join(lines.split("\n"))
-
-
-# Findings of a session's readings: what a person should look at before the candidate is approved.
-
-
-LARGEST_RATIO_MV_V = 10.0  # metal foil bridges give 1 to 4 mV/V at capacity
-TEMPERATURE_C = (18.0, 28.0)  # ISO 376
-
-
-def readings_findings(readings: SessionReadings, where: str) -> tuple[Finding, ...]:
-    """Return the findings of a session's readings; ``where`` names the session."""
-    findings = [
-        Finding(
-            rule="bridge-range",
-            where=name,
-            message=f"a bridge output of {ratio:.4g} mV/V, over {LARGEST_RATIO_MV_V:g}: is its unit, "
-            "excitation or scale right?",
-        )
-        for name, ratio in readings.largest_ratio
-        if ratio > LARGEST_RATIO_MV_V
-    ]
-    findings += [
-        Finding(
-            rule="zero-drift",
-            where=zero.load,
-            message=f"the zeros of {', '.join(zero.cells)} moved by {zero.drift:+.4g} {zero.unit} "
-            f"({zero.percent_fs:+.3g} % of full scale), tolerance {zero.tolerance:.4g} {zero.unit}",
-        )
-        for zero in readings.zero_loads
-        if abs(zero.drift) > zero.tolerance
-    ]
-    findings += [finding for shunt in readings.shunts if (finding := _shunt(shunt)) is not None]
-    findings += [
-        Finding(
-            rule="creep",
-            where=f"creep at {load}",
-            message="two readings of one indication, or of the load, are needed: nothing was evaluated",
-            level="note",
-        )
-        for load in readings.creep_left_out
-    ]
-    findings += [
-        Finding(
-            rule="scale-unit",
-            where=name,
-            message='a scale without a unit is not applied: write scale = { value, unit = "mV/V" }',
-            level="note",
-        )
-        for name in readings.unscaled
-    ]
-    low, high = TEMPERATURE_C
-    if readings.temperature_C is not None and not low <= readings.temperature_C <= high:
-        message = f"{readings.temperature_C:.4g} degC; ISO 376 asks for {low:g} to {high:g} degC"
-        findings.append(Finding(rule="temperature", where=where, message=message, level="note"))
-    return tuple(findings)
-
-
-def _shunt(shunt: ShuntCheck) -> Finding | None:
-    where = f"{shunt.name}, {shunt.source}"
-    if shunt.difference_percent is None or shunt.expected is None:
-        message = f"a shunt step of {shunt.measured:.6g} {shunt.unit} without an expected one in that unit"
-        return Finding(rule="shunt", where=where, message=message, level="note")
-    if shunt.within:
-        return None
-    zero = "" if shunt.zero is not None or shunt.source == "shunt_measured" else ", no zero reading before it"
-    message = (
-        f"the shunt gives {shunt.measured:.6g} {shunt.unit} for {shunt.expected:.6g}: "
-        f"{shunt.difference_percent:+.3g} %, tolerance {shunt.tolerance_percent:g} %{zero}"
-    )
-    return Finding(rule="shunt", where=where, message=message)

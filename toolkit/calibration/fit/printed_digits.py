@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 _CHANCE = 0.01  # that check loads which were measured anew are taken for copies
 _FITTED = 2.0  # a row's own rounding, and that of the rows which drew the equation
 _NOMINAL = 3  # digits
+_REPLICATES = 3
+_CHANGED = 0.2  # of the scatter: what a copy may have been changed by
+_JOINT = 1e-3
 _SIX_DIGITS = 5e-7  # of a value whose digits a conversion has hidden
 
 
@@ -76,7 +79,8 @@ def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Seque
 
     ``check`` and ``rows`` (rows, columns) have the same columns; ``scatter`` is the standard deviation of
     each column where a loading is repeated, 0 of what is exact or not known. Rows that agree in every digit
-    are always told; others only where so many would agree by chance once in a hundred sessions or less.
+    are always told; others only where so many would agree by chance once in a hundred sessions or less, or
+    where they lie nearer to rows of their loading than those lie to each other, oftener than chance allows.
     """
     same: dict[int, int] = {}
     near: dict[int, int] = {}
@@ -104,4 +108,40 @@ def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Seque
 
         if pdtrc(len(near) - 1, expected) < _CHANCE:
             same |= near
-    return same
+    return _nearest(check, rows, sd) | same
+
+
+def _nearest(
+    check: NDArray[np.float64], rows: NDArray[np.float64], sd: NDArray[np.float64]
+) -> dict[int, int]:
+    """Return check loads (from 0) that lie far nearer to a row of the fit (from 0) than its replicates do.
+
+    Among k rows of one loading and a reading taken apart, the reading is the one with the nearest neighbour
+    once in k + 1 times, and all check loads of a session far more seldom. What a copy was changed by is
+    small beside the scatter, and beside what the replicates are apart: readings in one run may well be nearer
+    to each other than to those of other runs, but by their noise.
+    """
+    noisy = sd > 0
+    found: dict[int, int] = {}
+    ratios: list[float] = []
+    count, chances = 0, np.ones(1)  # of so many first places by chance
+    for at, values in enumerate(check):
+        loads = np.abs(rows[:, ~noisy] - values[~noisy]) <= _SIX_DIGITS * np.abs(values[~noisy])
+        reach = (np.abs(rows[:, noisy] - values[noisy]) <= 4 * math.sqrt(2) * sd[noisy]).all(axis=1)
+        around = np.flatnonzero(loads.all(axis=1) & reach)
+        if len(around) < _REPLICATES:
+            continue
+        place = rows[np.ix_(around, np.flatnonzero(noisy))] / (math.sqrt(2) * sd[noisy])
+        own = np.sqrt(np.mean((place - values[noisy] / (math.sqrt(2) * sd[noisy])) ** 2, axis=1))
+        apart = np.sqrt(np.mean((place[:, None] - place) ** 2, axis=2))
+        np.fill_diagonal(apart, np.inf)
+        nearest = apart.min(axis=1)
+        closest = float(own.min())
+        chance = 1 / (len(around) + 1)
+        chances = np.convolve(chances, [1 - chance, chance])
+        count += bool((nearest > closest).all())
+        ratios.append(closest / min(1.0, float(np.median(nearest)) or 1.0))
+        if ratios[-1] < _CHANGED:
+            found[at] = int(around[own.argmin()])
+    told = bool(found) and chances[count:].sum() < _JOINT and np.median(ratios) < _CHANGED
+    return found if told else {}

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
 
 CREEP_FROM_S, CREEP_TO_S = 30.0, 300.0
+# Metal foil bridges give 1 to 4 mV/V at capacity, semiconductor bridges some ten times that.
+LARGEST_RATIO_MV_V = {"foil": 10.0, "semiconductor": 100.0}
 SAME_LOAD = 2e-3  # of full scale: reference loads that are called equal
 _NO_LOAD = 1e-6
 
@@ -133,8 +135,9 @@ class Reversibility:
 class SessionReadings:
     """A session's readings. ``full_scale`` is X_N by indication, in its unit.
 
-    ``largest_ratio`` is the largest |output| [mV/V] by indication that is one; ``unscaled`` are indications
-    in counts with a scale that has no unit; ``creep_left_out`` are loads whose creep readings give nothing.
+    ``largest_ratio`` is the largest |output| [mV/V] by indication that is one, with the largest that its
+    bridge can give; ``unscaled`` are indications in counts with a scale that has no unit; ``creep_left_out``
+    are loads whose creep readings give nothing.
     """
 
     full_scale: tuple[tuple[str, float], ...]
@@ -145,7 +148,7 @@ class SessionReadings:
     creep_left_out: tuple[str, ...]
     reversibility: tuple[Reversibility, ...]
     temperature_C: float | None
-    largest_ratio: tuple[tuple[str, float], ...]
+    largest_ratio: tuple[tuple[str, float, float], ...]
     unscaled: tuple[str, ...]
 
 
@@ -177,7 +180,11 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
         reversibility=_reversibility(record, loads),
         temperature_C=statements_of(record).temperature_C,
         largest_ratio=tuple(
-            (name, 1e3 * unit(text).factor * float(np.abs(columns[name]).max()))
+            (
+                name,
+                1e3 * unit(text).factor * float(np.abs(columns[name]).max()),
+                LARGEST_RATIO_MV_V[cells.get(name, {}).get("bridge") or "foil"],
+            )
             for name, text in zip(record.indications, record.indication_units, strict=True)
             if unit(text).dimension == "bridge_ratio"
         ),

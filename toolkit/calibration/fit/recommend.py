@@ -6,6 +6,8 @@ on which no wider one improves, that of the least Bayesian information criterion
 linear ones are candidates to drop where they are worth under 0.05 % of full scale in every load (AIAA R-091),
 or are significant in none.
 
+Where the residuals show that the scatter grows with the indications, all models weigh the rows by it.
+
 References: Holm, Scandinavian Journal of Statistics 6 (1979); AIAA R-091A-2020; Draper and Smith, Applied
 Regression Analysis (1998), ch. 6.
 """
@@ -20,6 +22,7 @@ import numpy as np
 
 from toolkit.calibration.fit.adequacy import NOISE_SHARE, RANK, noise_shares, terms_condition_number
 from toolkit.calibration.fit.basis import build_basis
+from toolkit.calibration.fit.profile import shown_profile
 from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix
 
 if TYPE_CHECKING:
@@ -103,11 +106,12 @@ def recommend_wider(fit: SessionFit) -> Wider | None:
     models = [m for m in _models(session) if _determined(m.terms, columns, applied)]
     if not models or not loads:
         return None
-    solved = {(current.name, load.setting.name): _sum_of(load.fit) for load in loads}
+    own = _refit(fit, loads, current.terms, columns)
+    solved = {(current.name, load.setting.name): total for load, total in zip(loads, own, strict=True)}
     for model in models:
         sums = _refit(fit, loads, model.terms, columns)
         solved |= {(model.name, load.setting.name): total for load, total in zip(loads, sums, strict=True)}
-    better = _better(current, models, loads, solved)
+    better = _sound(fit, _better(current, models, loads, solved), models, loads)
     enough = [
         m
         for m in models
@@ -159,9 +163,10 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
     if not out:
         return None
     remaining = tuple(t for t in session.terms if t not in out)
+    own = _refit(fit, loads, session.terms, columns)
     ratios = [
-        _f_test(narrow, _sum_of(load.fit))
-        for narrow, load in zip(_refit(fit, loads, remaining, columns), loads, strict=True)
+        _f_test(narrow, wide)
+        for narrow, wide in zip(_refit(fit, loads, remaining, columns), own, strict=True)
     ]
     if idle and min(p for _, p in ratios) < RISK / len(loads):
         # Parallel terms share their effect: each seems idle while the other is there.
@@ -171,8 +176,8 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
             return None
         remaining = tuple(t for t in session.terms if t not in out)
         ratios = [
-            _f_test(narrow, _sum_of(load.fit))
-            for narrow, load in zip(_refit(fit, loads, remaining, columns), loads, strict=True)
+            _f_test(narrow, wide)
+            for narrow, wide in zip(_refit(fit, loads, remaining, columns), own, strict=True)
         ]
     base = model_terms(session.model, session.indications, degree=session.degree)
     dropped = [t for t in base if t not in session.terms]
@@ -230,6 +235,57 @@ def _better(
     return {name: row for name, row in rows.items() if min(p for _, p, _ in row) < RISK}
 
 
+def _sound(
+    fit: SessionFit,
+    better: Mapping[str, list[tuple[float, float, str]]],
+    models: Sequence[_Model],
+    loads: Sequence[LoadResult],
+) -> dict[str, list[tuple[float, float, str]]]:
+    """Return the better models that are so whatever the rows scatter by, where they show that it grows.
+
+    Weights by the scatter that rows show are estimates. Of the terms that a model adds, the coefficients must
+    differ from zero by a covariance that takes each row's own residual for its scatter, too (HC3: MacKinnon
+    and White, J. Econometrics 29 (1985) 305).
+    """
+    growing = {
+        load.setting.name for load in loads if load.fit.weights is None and _root(fit, load) is not None
+    }
+    if not growing or not better:
+        return dict(better)
+    columns = fit.session.table.columns(fit.session.indications)
+    narrow = build_basis(fit.session.terms, columns).design
+    kept, tests = {}, len(models) * len(loads)
+    for model in models:
+        rows = better.get(model.name, [])
+        wide = build_basis(model.terms, columns).design
+        sound = [
+            (ratio, max(p, tests * _robust(narrow, wide, fit.session.table.column(load))), load)
+            if load in growing
+            else (ratio, p, load)
+            for ratio, p, load in rows
+        ]
+        if any(p < RISK for _, p, _ in sound):
+            kept[model.name] = sound
+    return kept
+
+
+def _robust(narrow: NDArray[np.float64], wide: NDArray[np.float64], load: NDArray[np.float64]) -> float:
+    """Return the probability of a wide design's further coefficients where rows scatter each by its own."""
+    from scipy.special import fdtrc
+
+    n = len(load)
+    q = np.linalg.qr(narrow)[0]
+    left = np.linalg.svd(wide - q @ (q.T @ wide), full_matrices=False)[0]
+    added = left[:, : wide.shape[1] - narrow.shape[1]]
+    every = np.column_stack([q, added])
+    rest = load - every @ (every.T @ load)
+    leverage = np.minimum(np.einsum("ij,ij->i", every, every), 1 - 1e-9)
+    moved = added.T @ load
+    spread = (added * (rest / (1 - leverage))[:, None] ** 2).T @ added
+    wald = float(moved @ np.linalg.pinv(spread, hermitian=True) @ moved) / len(moved)
+    return float(fdtrc(len(moved), n - every.shape[1], wald))
+
+
 def _f_test(narrow: _Sum, wide: _Sum) -> tuple[float, float]:
     """Return F and its probability that the wide model's further terms gain nothing."""
     from scipy.special import fdtrc
@@ -251,10 +307,6 @@ def _information(sums: Sequence[_Sum]) -> float:
     )
 
 
-def _sum_of(fit: TermFit) -> _Sum:
-    return _Sum(squares=float(fit.scaled @ fit.scaled), rows=len(fit.residuals), dof=fit.dof)
-
-
 def _two_sided(t: float, fit: TermFit) -> float:
     from scipy.special import ndtr, stdtr
 
@@ -270,11 +322,14 @@ def _refit(
     """Return what other terms leave over of each load; the coefficients themselves are not wanted."""
     table, design = fit.session.table, build_basis(terms, columns).design
     load = np.array([table.column(load.setting.name) for load in loads]).T
-    if all(load.fit.weights is None for load in loads):
+    roots = [_root(fit, load) for load in loads]
+    if all(root is None for root in roots):
         return _left_over(design, load)
     return [
-        _left_over(design * root[:, None], (y * root)[:, None])[0]
-        for y, root in zip(load.T, (_root(load, len(design)) for load in loads), strict=True)
+        _left_over(design, y[:, None])[0]
+        if root is None
+        else _left_over(design * root[:, None], (y * root)[:, None])[0]
+        for y, root in zip(load.T, roots, strict=True)
     ]
 
 
@@ -286,8 +341,16 @@ def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[
     return [_Sum(squares=float(residual @ residual), rows=n, dof=n - p) for residual in below.T]
 
 
-def _root(load: LoadResult, rows: int) -> NDArray[np.float64]:
-    return np.ones(rows) if load.fit.weights is None else np.sqrt(load.fit.weights)
+def _root(fit: SessionFit, load: LoadResult) -> NDArray[np.float64] | None:
+    """Return by what rows weigh in comparisons (rows,): as stated, or by the scatter that they show.
+
+    Where the scatter grows with the indications, the rows that scatter most would pass for a curve.
+    """
+    if load.fit.weights is not None:
+        return np.sqrt(load.fit.weights)
+    session = fit.session
+    sd = shown_profile(session.table.columns(session.indications), load.fit.residuals - load.of_runs)
+    return None if sd is None else float(np.sqrt(np.mean(sd**2))) / sd
 
 
 def _determined(

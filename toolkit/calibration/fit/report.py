@@ -6,7 +6,7 @@ Formulas: Cook and Weisberg, Residuals and Influence in Regression (1982), for i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -120,12 +120,24 @@ class FitReport:
     noise_free: bool
 
 
-def report_session(fit: SessionFit) -> tuple[FitReport, ...]:
-    """Return the report of every load of a fitted session."""
+def report_session(
+    fit: SessionFit, covariances: Mapping[str, NDArray[np.float64]] | None = None
+) -> tuple[FitReport, ...]:
+    """Return the report of every load of a fitted session.
+
+    ``covariances`` of the coefficients by load hold, beside the fit's own, what the session states
+    (`uncertainty.common_errors`); None: the fit's own.
+    """
+    loads = [
+        load if covariances is None else replace(
+            load, fit=replace(load.fit, covariance=covariances[load.setting.name])
+        )
+        for load in fit.loads
+    ]  # fmt: skip
     table = fit.session.table
     level = load_levels(table.matrix([load.name for load in fit.session.loads]))
     loading = loadings(level, table.run, table.up)
-    return tuple(_report(fit, load, level, loading) for load in fit.loads)
+    return tuple(_report(fit, load, level, loading) for load in loads)
 
 
 def prediction_half_width(

@@ -9,13 +9,13 @@ Every method makes its coefficients by a linear map A of the reference loads, so
     gls         A = (X'V^-1 X)^-1 X'V^-1 V with the error that a group of rows shares (`known_errors`)
 
 A shared error whose groups are the runs is what differences of runs show: there the larger of the two counts,
-anywhere else it is added.
+anywhere else it is added. So is what rounding leaves (`rounding`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from toolkit.calibration.fit.rounding import Rounding
     from toolkit.calibration.session.known_errors import KnownErrors
     from toolkit.calibration.session.statements import Statements
     from toolkit.calibration.session.table import Table
@@ -190,13 +191,15 @@ def weighed_rows(
     group: NDArray[np.int64],
     noise: RowNoise | None,
     operator: NDArray[np.float64] | None = None,
+    rounding: Rounding | None = None,
 ) -> Rows:
     """Return how scatter reaches the coefficients of a load (rows,) on a design (rows, terms).
 
     ``operator`` (terms, rows) is what makes the coefficients, where it is known.
     """
     if noise is None:
-        return rows_of(design, load, group, operator)
+        rows = rows_of(design, load, group, operator)
+        return rows if rounding is None else replace(rows, rounded=rounding.covariance(rows.operator))
     operator = noise.operator() if operator is None else operator
     relative = rows_of(design, load, group, operator).relative
     stated = [noise.size**2 if noise.stated else 0.0, 0.0, 0.0]
@@ -210,6 +213,7 @@ def weighed_rows(
     return Rows(
         operator=operator, relative=relative, group=group, noise=noise.profile,
         stated=(stated[0], stated[1], stated[2]), shared=shared,
+        rounded=None if rounding is None else rounding.covariance(operator),
     )  # fmt: skip
 
 

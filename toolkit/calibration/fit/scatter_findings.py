@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.calibration.fit.run_differences import CellGains, cell_gains, copied_runs, odd_run
 from toolkit.calibration.fit.run_scatter import FEWEST_DOF
 from toolkit.calibration.fit.session_fit import session_statements
 from toolkit.calibration.fit.session_rows import are_untold, groups_of
@@ -105,6 +106,55 @@ def method_findings(session: Session, load: LoadResult) -> list[Finding]:
             f"{factor}s are told apart: number them before another method is considered"
         )
     return [Finding(rule="method", where=load.setting.name, message=message, level="note")]
+
+
+def difference_findings(fit: SessionFit) -> list[Finding]:
+    """Return a run of another instrument, cells whose gains move by themselves, and runs that were copied."""
+    session, findings = fit.session, []
+    moved: list[tuple[str, CellGains]] = []
+    for load in fit.loads:
+        name, unit = load.setting.name, load.setting.unit
+        odd = odd_run(session, load)
+        if odd is None:
+            gains = cell_gains(session, load)
+            moved += [] if gains is None else [(name, gains)]
+            continue
+        message = (
+            f"{odd.factor} {odd.run:g} lies {odd.off:.3g} {unit} (rms) from the equation of the other "
+            f"{odd.factor}s, with a zero and a gain of its own, where these lie {odd.others:.2g} {unit} from "
+            "it: "
+        )
+        message += (
+            f"was it read of another instrument, with other cells or another wiring? Without {odd.factor} "
+            f"{odd.run:g} the others agree"
+            if odd.alone
+            else f"the two {odd.factor}s are not of one instrument; a third would tell which is wrong"
+        )
+        findings.append(Finding(rule="run-apart", where=name, message=message, level="error"))
+    if moved:
+        _, most = max(moved, key=lambda one: one[1].size)
+        factor = groups_of(session.table, session.zero)[0]
+        message = (
+            f"gains of single cells differ from {factor} to {factor} by {100 * most.size:.2g} % (F = "
+            f"{most.F:.3g} with {most.dof[0]} and {most.dof[1]} degrees of freedom, p = "
+            f"{most.probability:.1g}), beyond the one gain of each load and {factor} that the covariance "
+            "holds: coefficients and loads are less certain than stated. Look at the excitation and the "
+            "amplifier of each cell"
+        )
+        where = ", ".join(name for name, _ in moved)
+        findings.append(Finding(rule="cell-gains", where=where, message=message))
+    copied = copied_runs(session)
+    if copied is not None:
+        unit = session.table.unit(copied.indication)
+        first, second = copied.runs
+        message = (
+            f"{copied.factor}s {first:g} and {second:g} repeat each other: in {copied.pairs} pairs of rows "
+            f"{copied.indication} differs by {copied.apart:.2g} {unit} (standard deviation of a reading, "
+            f"zero and gain apart), where {copied.against} scatter by {copied.usual:.2g} {unit}: were both "
+            "read? Copies make every uncertainty too small"
+        )
+        findings.append(Finding(rule="copied-runs", where=session.path.name, message=message))
+    return findings
 
 
 def scatter_findings(load: LoadResult) -> list[Finding]:

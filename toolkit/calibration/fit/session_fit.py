@@ -23,9 +23,11 @@ from toolkit.calibration.fit.regression import (
     fit_terms,
     raw_coefficients,
 )
+from toolkit.calibration.fit.rounding import Rounding
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.fit.session_scatter import FittedRows, scatter_of_rows
+from toolkit.calibration.records.record import ROUNDING
 from toolkit.calibration.records.scatter import RunScatter
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.session.settings import wrong
@@ -109,6 +111,8 @@ LLF_FACTOR = 2.4
 class LoadResult:
     """One load. ``fit.covariance`` is that of `records.scatter` where the session's runs tell ``scatter``.
 
+    ``rounding`` names the model by which it holds the stated resolution, None where none is stated.
+
     ``of_runs`` (rows,) is what of the residuals the runs' zeros and gains make; rows are judged without it.
     ``exact``: the rows lie on the equation as far as their printed digits tell, so that nothing scatters.
 
@@ -123,6 +127,7 @@ class LoadResult:
     setting: LoadSetting
     fit: TermFit
     scatter: RunScatter | None
+    rounding: str | None
     of_runs: NDArray[np.float64]
     exact: bool
     chi2_within: float | None
@@ -229,11 +234,16 @@ def _result(
             between=session_statements(session).between(setting.name),
         )
     )  # fmt: skip
+    rounding = Rounding.of(
+        session_statements(session), table.columns(session.indications), terms=fit.terms,
+        coefficients=fit.coefficients,
+    )  # fmt: skip
     of_runs = np.zeros_like(load)
-    if scatter is not None:
-        rows = weighed_rows(design, load, groups_of(table, session.zero)[1], noise)
-        of_runs = rows.of_runs(scatter, fit.residuals)
-        fit = dataclasses.replace(fit, covariance=rows.covariance(scatter))
+    if scatter is not None or rounding is not None:
+        rows = weighed_rows(design, load, groups_of(table, session.zero)[1], noise, rounding=rounding)
+        of_runs = of_runs if scatter is None else rows.of_runs(scatter, fit.residuals)
+        alone = fit.covariance if rows.rounded is None else fit.covariance + rows.rounded
+        fit = dataclasses.replace(fit, covariance=alone if scatter is None else rows.covariance(scatter))
     exact = rounding_alone(fit, table.columns(session.indications), load, setting.tolerance)
     residuals, percent = None, None
     if session.check is not None:
@@ -245,6 +255,7 @@ def _result(
         setting=setting,
         fit=fit,
         scatter=scatter,
+        rounding=None if rounding is None else ROUNDING,
         of_runs=of_runs,
         exact=exact,
         chi2_within=None if noise is None or not noise.stated else noise.chi2(fit.residuals - of_runs),

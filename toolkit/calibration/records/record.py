@@ -20,6 +20,7 @@ Zero = Literal["included", "tared", "run"]
 ZEROS: tuple[Zero, ...] = ("included", "tared", "run")
 Kind = Literal["fit", "legacy"]
 SCHEMA = 1
+ROUNDING = "equal-readings-1"  # readings of equal size share their rounding (`fit.rounding`)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +59,9 @@ class LoadFit:
     ``scatter`` is what the covariance was made of where the session's runs tell it (`records.scatter`); None:
     the covariance takes every row for independent, as that of one run alone and of records made before.
     ``reference_u`` is the largest standard uncertainty that the session states row by row of the reference
-    load where the fit does not weigh by it; None where it states none.
+    load where the fit does not weigh by it; None where it states none. ``rounding`` names the model by which
+    the covariance holds the stated resolution of the indications; None: it does not, as none is stated or in
+    records made before.
     """
 
     load: str
@@ -77,6 +80,7 @@ class LoadFit:
     tolerance: float | None = None
     scatter: RunScatter | None = None
     reference_u: float | None = None
+    rounding: str | None = None
 
     @property
     def largest(self) -> float:
@@ -238,6 +242,8 @@ def _load_content(load: LoadFit) -> dict[str, Any]:
         content["scatter"] = asdict(load.scatter)
     if load.reference_u is not None:
         content["reference_u"] = load.reference_u
+    if load.rounding is not None:
+        content["rounding"] = load.rounding
     return content
 
 
@@ -251,6 +257,12 @@ def _scatter(entry: Any) -> RunScatter | None:
     for count in (scatter.groups, scatter.dof):
         _optional(count, int)
     return scatter
+
+
+def _rounding(model: Any) -> str | None:
+    if model not in (None, ROUNDING):
+        raise ValueError(f"the model of rounding is not known: {model}")
+    return model if model is None else str(model)
 
 
 def content_hash(content: dict[str, Any]) -> str:
@@ -376,6 +388,7 @@ def _from_content(
                 "residual_sd": _optional(entry["residual_sd"], float),
                 "scatter": _scatter(entry.get("scatter")),
                 "reference_u": _optional(entry.get("reference_u"), float),
+                "rounding": _rounding(entry.get("rounding")),
             }
         )
         if not len(load.terms) == len(load.coefficients) == len(load.issued) == len(load.polarity):

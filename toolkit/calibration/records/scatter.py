@@ -74,7 +74,8 @@ class Rows:
     ``operator`` (terms, rows) is A; ``relative`` (rows,) the loads l; ``group`` (rows,) the run of each row,
     whole numbers from 0; ``noise`` (rows,) is s, None where it is 1. ``stated`` (3,) are variances
     within runs, of zeros and of gains that the session states, and ``shared`` (terms, terms) the covariance
-    by stated errors that no difference of runs can show.
+    by stated errors that no difference of runs can show; ``rounded`` (terms, terms) that by the stated
+    resolution of indications, None where none is stated.
     """
 
     operator: NDArray[np.float64]
@@ -83,6 +84,7 @@ class Rows:
     noise: NDArray[np.float64] | None = None
     stated: tuple[float, float, float] = (0.0, 0.0, 0.0)
     shared: NDArray[np.float64] | None = None
+    rounded: NDArray[np.float64] | None = None
 
     def parts(self, correlation: float) -> NDArray[np.float64]:
         """Return A V_k A^T of a unit of within^2, zero^2 and gain^2 (3, terms, terms)."""
@@ -128,7 +130,7 @@ class Rows:
     ) -> NDArray[np.float64]:
         shown = scatter.variances * np.array(widening)
         total = np.einsum("k,kij->ij", np.where(self.shows_more(scatter), shown, self.stated), parts)
-        total = total if self.shared is None else total + self.shared
+        total = total + sum((part for part in (self.shared, self.rounded) if part is not None), start=0.0)
         return np.asarray((total + total.T) / 2)
 
     def of_runs(self, scatter: RunScatter, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -158,7 +160,7 @@ class Rows:
 
         The gradient is by within^2, zero^2, gain^2 and the correlation.
         """
-        alone = replace(self, operator=(J @ self.operator)[None, :], shared=None)
+        alone = replace(self, operator=(J @ self.operator)[None, :], shared=None, rounded=None)
         share = alone.parts(scatter.correlation)[:, 0, 0]
         phi = scatter.correlation
         near = [max(phi - _STEP, 0.0), phi + _STEP]
@@ -166,7 +168,7 @@ class Rows:
         more = self.shows_more(scatter)
         variances = np.where(more, scatter.variances, self.stated)
         turned = variances[0] * (moved[1] - moved[0]) / (near[1] - near[0])
-        shared = 0.0 if self.shared is None else float(J @ self.shared @ J)
+        shared = sum(float(J @ part @ J) for part in (self.shared, self.rounded) if part is not None)
         # What is stated is known: it moves with no estimate.
         estimated = np.where(more, share, 0.0)
         return float(variances @ share) + shared, np.append(estimated, turned)

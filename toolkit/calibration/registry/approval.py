@@ -110,9 +110,7 @@ def approve(
         failed = judged.failed
         check, loads = stored_check(registry.folder, record), stored_loads(registry.folder, record)
         terms = gates.unverifiable(record, check, loads)
-        findings = tuple(
-            Finding(rule=result.rule, where=result.where, message=result.message) for result in failed
-        )
+        findings = tuple(result.finding() for result in failed)
         evidence = (
             *judged.evidence,
             *(f"{result.rule}: {result.where}: {result.message}" for result in judged.told),

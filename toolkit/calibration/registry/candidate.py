@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.fit.adequacy import check_levels
-from toolkit.calibration.fit.findings import readings_findings, session_findings
+from toolkit.calibration.fit.findings import session_findings
 from toolkit.calibration.fit.readings import SessionReadings, readings_of
+from toolkit.calibration.fit.readings_findings import readings_findings
 from toolkit.calibration.fit.session_fit import (
     LoadResult,
     SessionFit,
@@ -49,6 +50,7 @@ from toolkit.calibration.registry.history import history_of
 from toolkit.calibration.registry.judgement import judge, machine_of
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.legacy import check_possible, read_legacy
+from toolkit.calibration.registry.plausible import coarse
 from toolkit.calibration.registry.refit import check_reproduces, polarity, reference_u
 from toolkit.calibration.registry.registry import ID, Registry, load_checked
 from toolkit.calibration.registry.status import discarded_before, is_discarded
@@ -117,6 +119,7 @@ def calibrate(
     if existing is not None:
         readings = readings_of(existing, session.table)
         findings += readings_findings(readings, session.path.name)
+        findings += _uncertain(existing, session)
         path = folder / f"{existing.id}.json"
         return Candidate(
             record=existing, path=path, existing=True, fit=fit, readings=readings, findings=findings
@@ -127,6 +130,7 @@ def calibrate(
     # Before anything is written: what cannot be evaluated must not leave a record behind.
     readings = readings_of(unnumbered, session.table)
     findings += readings_findings(readings, session.path.name)
+    findings += _uncertain(unnumbered, session)
 
     def build(ledger: Ledger) -> Change | None:
         # Under the lock: another writer may have recorded this very session meanwhile.
@@ -162,6 +166,10 @@ def calibrate(
         readings=readings,
         findings=findings,
     )
+
+
+def _uncertain(record: CalibrationRecord, session: Session) -> tuple[Finding, ...]:
+    return tuple(result.finding() for result in coarse(record, session.table, session.check))
 
 
 def entering(record: CalibrationRecord, contents: Mapping[str, bytes], *, by: str) -> Change:
@@ -298,6 +306,7 @@ def _load_fit(session: Session, load: LoadResult) -> LoadFit:
         maximum=float(values.max()),
         tolerance=load.setting.tolerance,
         scatter=load.scatter,
+        rounding=load.rounding,
         reference_u=reference_u(session.table, load.setting.name, load.setting.unit, session.method),
     )
 

@@ -9,7 +9,7 @@ noise decides.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -26,7 +26,7 @@ from toolkit.calibration.registry.response import (
     tolerance,
 )
 from toolkit.calibration.terms import INTERCEPT, term_matrix
-from toolkit.findings import Finding
+from toolkit.findings import Finding, Level
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
@@ -37,6 +37,7 @@ VERIFIED = 5.0
 _RANK = 1e-8
 
 Effect = Literal["blocks", "asks", "tells"]
+_LEVELS: dict[Effect, Level] = {"blocks": "error", "asks": "note", "tells": "warning"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,9 +54,17 @@ class GateResult:
     effect: Effect = "blocks"
 
     def finding(self) -> Finding:
-        """Return the finding of a session: what is only asked for on approval is a note."""
-        level: Literal["warning", "note"] = "note" if self.effect == "asks" else "warning"
-        return Finding(rule=self.rule, where=self.where, message=self.message, level=level)
+        """Return the finding of a session: an error refuses the approval; what it only asks for is a note."""
+        return Finding(rule=self.rule, where=self.where, message=self.message, level=_LEVELS[self.effect])
+
+
+def refusals(findings: Iterable[Finding]) -> tuple[GateResult, ...]:
+    """Return what of a session's findings refuses an approval: those that are errors."""
+    return tuple(
+        GateResult(rule=finding.rule, where=finding.where, message=finding.message)
+        for finding in findings
+        if finding.level == "error"
+    )
 
 
 def sign_and_span(

@@ -10,15 +10,17 @@ import datetime as dt
 import json
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.apply import apply_record
-from toolkit.calibration.registry.gates import GateResult, check_loads
+from toolkit.calibration.fit.readings_findings import all_findings
+from toolkit.calibration.fit.session_fit import fit_session
+from toolkit.calibration.registry.gates import GateResult, check_loads, refusals
 from toolkit.calibration.registry.history import NO_HISTORY, History, Records, agreeing, compared, history_of
-from toolkit.calibration.registry.plausible import plausible, tare_claim
+from toolkit.calibration.registry.plausible import coarse, plausible, tare_claim
 from toolkit.calibration.registry.response import (
     largest_load,
     main_indications,
@@ -27,7 +29,7 @@ from toolkit.calibration.registry.response import (
     tolerance,
 )
 from toolkit.calibration.registry.status import status_of
-from toolkit.calibration.registry.stored import stored_check, stored_loads
+from toolkit.calibration.registry.stored import stored_check, stored_loads, stored_session
 from toolkit.calibration.session.readings import PolarityReading, polarity_readings
 from toolkit.calibration.session.statements import scope_of, statements_of
 from toolkit.errors import ConfigError
@@ -352,7 +354,7 @@ def judge_stored(
         a record that it is compared with fails a gate
     """
     status = status_of(record.id, ledger.of(record.id), dt.date.max)
-    return judge(
+    judged = judge(
         record,
         history=history_of(registry, record, ledger, but=record.id),
         machine=machine,
@@ -361,6 +363,28 @@ def judge_stored(
         check=stored_check(registry.folder, record),
         reason=reason,
         confirmed_before=status.in_force_from is not None,
+    )
+    present = {(result.rule, result.where) for result in judged.results}
+    of_session = [
+        result
+        for result in _refused_by_session(registry, record)
+        if (result.rule, result.where) not in present
+    ]
+    return replace(judged, results=(*judged.results, *of_session))
+
+
+def _refused_by_session(registry: Records, record: CalibrationRecord) -> tuple[GateResult, ...]:
+    """Return what a record's own session refuses: findings that are errors, and an uncertainty too large.
+
+    A legacy record has no session. What an approval was decided by is not asked again on every load: it costs
+    the whole evaluation of a session.
+    """
+    if record.kind != "fit":
+        return ()
+    session = stored_session(registry.folder, record)
+    return (
+        *refusals(all_findings(fit_session(session), record)),
+        *coarse(record, session.table, session.check),
     )
 
 

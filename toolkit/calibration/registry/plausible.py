@@ -16,6 +16,7 @@ import numpy as np
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.response import largest_load, response, same_dimension, tolerance
 from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.calibration.uncertainty.budget import calibration_budget
 from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.units import unit
 
@@ -122,6 +123,40 @@ def _largest(cell: Indication) -> float:
     if cell.minimum is None or cell.maximum is None:
         return math.nan
     return max(abs(cell.minimum), abs(cell.maximum)) * unit(cell.unit).factor
+
+
+# What is stated of a session may be larger than what it calibrated.
+
+
+COARSE_U = 0.1  # of the largest load: twice the standard uncertainty from which a reference is too coarse
+_EXPLAINING = 3
+
+
+def coarse(record: CalibrationRecord, loads: Table, check: Table | None) -> tuple[GateResult, ...]:
+    """Return the loads whose expanded uncertainty at the largest load is no small share of it.
+
+    Whatever makes it so, a resolution in a wrong unit, a creep reading that fell, a zero that moved, cells of
+    an uncertainty beyond reason, or rows that scatter: with such a record nothing is measured.
+    """
+    results: list[GateResult] = []
+    for load in record.loads if record.kind == "fit" else ():
+        if not load.covariance or not load.largest > 0:
+            continue
+        budget = calibration_budget(record, loads, check, load.load)
+        share = budget.U / load.largest
+        if share <= COARSE_U:
+            continue
+        parts = sorted(budget.components, key=lambda part: -part.u)[:_EXPLAINING]
+        shares = ", ".join(
+            f"{part.name} {100 * budget.share(part):.0f} %" for part in parts if budget.share(part) > 0.01
+        )
+        message = (
+            f"the expanded uncertainty at the largest load is {budget.U:.3g} {load.unit}, "
+            f"{100 * share:.3g} % of it, where an approval needs {100 * COARSE_U:g} % or less. Its variance: "
+            f"{shares}; is what the session states of them right, with its unit?"
+        )
+        results.append(GateResult(rule="coarse-uncertainty", where=load.load, message=message))
+    return tuple(results)
 
 
 # `zero = "tared"` is a claim: without load, a tared indication reads nothing.

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.rounding import rounding_of
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.fit.session_scatter import FittedRows, is_of_rows
@@ -247,6 +248,8 @@ def _check_load(record: CalibrationRecord, at: int, load: LoadFit, solver: _Solv
     n = len(loads)
     _demand_equal(record, where, "number of rows and dof", (load.n, load.dof), (n, n - len(coefficients)))
     _demand_equal(record, where, "range", (load.minimum, load.maximum), (low, high))
+    if load.rounding is not None and rounding_of(record, load, table) is None:
+        _demand_equal(record, where, "rounding", load.rounding, None)
     if load.reference_u is not None:  # records made before have none
         stated = reference_u(table, where, load.unit, load.method)
         _demand_equal(record, where, "reference_u", load.reference_u, stated)
@@ -288,12 +291,20 @@ def _covariance(
     record: CalibrationRecord, load: LoadFit, solver: _Solver, table: Table
 ) -> NDArray[np.float64]:
     """Return the covariance by the model that the record names (terms, terms)."""
-    if load.scatter is None and solver.known:
-        return solver.inverse
     if load.scatter is None:
         # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
         # rounding, and the covariance is that rounding squared.
-        return (load.residual_sd or 0.0) ** 2 * solver.inverse
+        alone = solver.inverse if solver.known else (load.residual_sd or 0.0) ** 2 * solver.inverse
+        rounding = rounding_of(record, load, table)
+        if rounding is None:
+            return alone
+        design, noise = (
+            term_matrix(load.terms, table.columns(record.indications)),
+            row_noise(record, load, table),
+        )
+        group = np.zeros(table.rows, dtype=np.int64)
+        rows = weighed_rows(design, table.column(load.load), group, noise, solver.operator, rounding)
+        return alone if rows.rounded is None else alone + rows.rounded
     covariance = scatter_covariance(record, load, solver.operator, table)
     if covariance is None:
         raise _refused(
@@ -319,7 +330,8 @@ def scatter_covariance(
     if fit.scatter is None or not is_of_rows(fit.scatter, rows):
         return None
     group = groups_of(table, record.zero, every=fit.scatter.groups > 1)[1]
-    return weighed_rows(design, load, group, noise, operator).covariance(fit.scatter)
+    rounding = rounding_of(record, fit, table)
+    return weighed_rows(design, load, group, noise, operator, rounding).covariance(fit.scatter)
 
 
 def row_noise(record: CalibrationRecord, fit: LoadFit, table: Table) -> RowNoise | None:

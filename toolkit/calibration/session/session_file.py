@@ -206,6 +206,10 @@ class CellEntries:
               together="shunt_expected"),
     ] = None  # fmt: skip
     u: Annotated[_Stated | None, Above(0), Entry("standard uncertainty", expected=_POSITIVE)] = None
+    bridge: Annotated[
+        Literal["foil", "semiconductor"] | None,
+        Entry("the gauges; a foil bridge gives at most 10 mV/V", example="semiconductor"),
+    ] = None
     temperature_coefficient: Annotated[
         TemperatureCoefficient | _Stated | None, Entry("of the span, or of span and zero, per kelvin")
     ] = None

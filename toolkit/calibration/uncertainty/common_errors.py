@@ -170,6 +170,15 @@ def record_covariance(record: CalibrationRecord) -> dict[str, NDArray[np.float64
     return {load.load: _covariance(record, load, statements) for load in record.loads if load.covariance}
 
 
+def standard_errors(record: CalibrationRecord, load: str) -> tuple[float, ...]:
+    """Return the standard errors of a load's coefficients, as they are printed; empty for a legacy import.
+
+    They are those of `record_covariance`: what a test inherits from a record is what its pages state.
+    """
+    covariance = record_covariance(record).get(load)
+    return () if covariance is None else tuple(np.sqrt(np.diag(covariance)).tolist())
+
+
 def scale_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -> float:
     """Return the relative standard uncertainty of a load's scale: reference standard and creep."""
     # A generalised fit of one shared reference has its error in the covariance already.

@@ -56,13 +56,14 @@ def components_of(
     share = abs(value) / load.largest
     curve = _curve(record, load, scatter, point)
     new = _new_run(scatter, share)
-    total = (0.0 if _from_stated(load, curve) else curve.variance) + scatter.runs.within**2
+    reading = float(scatter.reading(dict(zip(record.indications, point[:, None], strict=True)))[0])
+    total = (0.0 if _from_stated(load, curve) else curve.variance) + scatter.runs.within**2 * reading
     total += new.variance if _estimated(scatter) else 0.0
-    dof = scatter.dof(curve.gradient + _READING + new.gradient, total)
+    dof = scatter.dof(curve.gradient + reading * _READING + new.gradient, total)
     return (
         _reference(statements, load, value, loads),
         _fit(record, load, point, curve),
-        _repeatability(scatter),
+        _repeatability(scatter, reading),
         _reproducibility(scatter, new),
         _interpolation(record, scatter, check, load),
         _reversibility(scatter),
@@ -90,7 +91,9 @@ def _curve(record: CalibrationRecord, load: LoadFit, s: Scatter, point: NDArray[
     if load.scatter is None and s.runs.groups < 2 and load.method != "ols":
         return _Variance(variance=stored, gradient=np.zeros(4), dof=math.inf)
     if load.scatter is None and s.runs.groups < 2:
-        share = stored / (load.residual_sd or 1.0) ** 2
+        # Of what is rounded away nothing is estimated.
+        rounded = 0.0 if s.rows.rounded is None else float(J @ s.rows.rounded @ J)
+        share = max(stored - rounded, 0.0) / (load.residual_sd or 1.0) ** 2
         dof = math.inf if load.dof is None else float(load.dof)
         return _Variance(variance=stored, gradient=np.array([share, 0.0, 0.0, 0.0]), dof=dof)
     variance, gradient = s.rows.variance(s.runs, J)
@@ -158,15 +161,18 @@ def _fit(record: CalibrationRecord, load: LoadFit, point: NDArray[np.float64], c
     )  # fmt: skip
 
 
-def _repeatability(s: Scatter) -> Component:
+def _repeatability(s: Scatter, reading: float) -> Component:
     runs = s.runs
     text = f"scatter of a reading within a {runs.factor}"
     if runs.correlation > 0:
         text += f", correlated by {runs.correlation:.2f} from row to row"
+    if s.profile is not None:
+        text += ", as the rows' stated uncertainties have it at this point"
     if not s.misfit_dof:
         text += "; it holds the misfit of the curve, which so few rows cannot tell apart"
     dof = s.dof(_READING, runs.within**2)
-    return _part("repeatability", text, "A", "student", runs.within, dof, "data", joint=True)
+    u = runs.within * math.sqrt(reading)
+    return _part("repeatability", text, "A", "student", u, dof, "data", joint=True)
 
 
 def _reproducibility(s: Scatter, new: _Variance) -> Component:
@@ -202,7 +208,10 @@ def _interpolation(record: CalibrationRecord, s: Scatter, check: Table | None, l
         )
     design = term_matrix(load.terms, check.columns(record.indications))
     off = design @ np.asarray(load.coefficients) - check.column(load.load)
-    expected = s.runs.within**2 + np.einsum("ij,jk,ik->i", design, np.asarray(load.covariance), design)
+    reading = s.reading(check.columns(record.indications))
+    expected = s.runs.within**2 * reading + np.einsum(
+        "ij,jk,ik->i", design, np.asarray(load.covariance), design
+    )
     u = math.sqrt(max(float(np.mean(off**2 - expected)), 0.0))
     text = f"distance of {check.rows} check loads from the curve (rms), free of scatter and fit"
     return _part("interpolation", text, "A", "normal", u, check.rows, "check loads")

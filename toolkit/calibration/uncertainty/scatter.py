@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.profile import Profile
+from toolkit.calibration.fit.rounding import rounding_of
 from toolkit.calibration.fit.row_noise import noise_of, weighed_rows
 from toolkit.calibration.fit.run_scatter import estimate, spread
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
@@ -22,8 +24,11 @@ from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
+    from toolkit.calibration.fit.row_noise import RowNoise
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.table import Table
 
@@ -33,7 +38,9 @@ class Scatter:
     """Standard deviations in the load's unit, each with its degrees of freedom (0: not determined).
 
     ``runs`` are the components within and between runs, with one group where one run tells nothing of the
-    next; ``spread`` (4, 4) the covariance of their estimates; ``rows`` how they reach the coefficients.
+    next; ``profile`` is the variance of a reading by that of ``runs.within`` at any point, where rows weigh
+    unlike, else None; ``spread`` (4, 4) the covariance of their estimates; ``rows`` how they reach the
+    coefficients.
     ``reversal`` is half the root mean square difference of the directions, ``misfit`` the root mean square
     distance from the curve of what a smooth one through the rows would be.
     """
@@ -41,10 +48,17 @@ class Scatter:
     runs: RunScatter
     spread: NDArray[np.float64]
     rows: Rows
+    profile: Profile | None
     reversal: float
     reversal_dof: int
     misfit: float
     misfit_dof: int
+
+    def reading(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the variance of a reading at indications (points,), in units of ``runs.within``^2."""
+        if self.profile is None:
+            return np.ones(len(next(iter(columns.values()))))
+        return self.profile.at(columns)
 
     def dof(self, gradient: NDArray[np.float64], variance: float) -> float:
         """Return Satterthwaite's degrees of freedom of a variance, 2 u^4 / Var(u^2), one at least.
@@ -79,12 +93,24 @@ def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scat
     return Scatter(
         runs=runs,
         spread=covariance,
-        rows=weighed_rows(design, load, groups_of(loads, record.zero, every=every)[1], noise),
+        rows=weighed_rows(
+            design,
+            load,
+            groups_of(loads, record.zero, every=every)[1],
+            noise,
+            rounding=rounding_of(record, fitted, loads),
+        ),
+        profile=None if noise is None else _profile(record, loads, noise),
         misfit=misfit[0],
         misfit_dof=misfit[1],
         reversal=reversal[0],
         reversal_dof=reversal[1],
     )
+
+
+def _profile(record: CalibrationRecord, loads: Table, noise: RowNoise) -> Profile:
+    squares = noise.profile**2
+    return Profile.of(loads.columns(record.indications), squares, float(squares.min()))
 
 
 def _one_run(rows: SessionRows) -> RunScatter:

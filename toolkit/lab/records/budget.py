@@ -252,7 +252,7 @@ def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | Non
 
 
 def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> list[str]:
-    from toolkit.estimate import round_to_uncertainty, round_uncertainty
+    from toolkit.estimate import dof_text, round_to_uncertainty, round_uncertainty
 
     unit = budget.unit
     stated = [component for component in budget.components if component.stated]
@@ -264,15 +264,15 @@ def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None)
             ["component", "type", "distribution", f"u [{unit}]", "dof", "share", "", "from"],
             [
                 [component.name, component.type, component.distribution, f"{component.u:.3g}",
-                 _dof(component.dof), f"{100 * budget.share(component):.1f} %", _bar(component.u, largest),
-                 component.description]
+                 dof_text(component.dof), f"{100 * budget.share(component):.1f} %",
+                 _bar(component.u, largest), component.description]
                 for component in stated
             ],
             align="<<<>>><<",
         ),
         "",
         f"combined standard uncertainty  u = {round_uncertainty(budget.u)} {unit}, "
-        f"effective dof {_dof(budget.dof)}",
+        f"effective dof {dof_text(budget.dof)}",
         f"expanded uncertainty           U = {round_uncertainty(budget.U)} {unit}, k = {budget.k:.2f}, "
         f"coverage probability {100 * budget.probability:.0f} %",
     ]  # fmt: skip
@@ -301,10 +301,6 @@ def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None)
 
 def _bar(u: float, largest: float) -> str:
     return "" if not largest else "#" * max(round(12 * u / largest), 1 if u else 0)
-
-
-def _dof(dof: float) -> str:
-    return "inf" if math.isinf(dof) else f"{dof:.3g}" if dof < 1000 else f"{dof:.0f}"
 
 
 def _value(text: str, fit: LoadFit) -> float:

@@ -95,6 +95,7 @@ class FullRecord(TypedDict):
 
 
 _HISTORY, _MACHINE, _CHECK = "an earlier approved record", "a machine definition", "check loads"
+_SESSION = "a session"
 GATES: dict[str, str | None] = {
     "sign": _HISTORY,
     "span": _HISTORY,
@@ -110,8 +111,12 @@ GATES: dict[str, str | None] = {
     "tared": None,
     "check-tolerance": None,
     "check-load": _CHECK,
+    "coarse-uncertainty": _SESSION,
 }
-"""The rules that `judgement.judge` may name, and what each needs to say anything; None: nothing besides."""
+"""The rules that `judgement.judge` may name, and what each needs to say anything; None: nothing besides.
+
+Findings of the record's own session are gates too where their rule declares that it refuses an approval.
+"""
 
 _STATES = {"blocks": "fail", "asks": "asks", "tells": "note"}
 
@@ -129,6 +134,7 @@ def gates_answer(registry: Registry, record_id: str) -> Judged:
     from toolkit.calibration.registry.history import history_of
     from toolkit.calibration.registry.judgement import judge_stored, machine_of
     from toolkit.calibration.registry.stored import stored_check
+    from toolkit.lab.rules import rules_catalogue
 
     record = registry.load(record_id)
     ledger = registry.ledger(record.instrument)
@@ -139,6 +145,7 @@ def gates_answer(registry: Registry, record_id: str) -> Judged:
         _HISTORY: before is not None,
         _MACHINE: machine is not None,
         _CHECK: stored_check(registry.folder, record) is not None,
+        _SESSION: record.kind == "fit",
     }
     gates: list[Gate] = [
         {
@@ -150,7 +157,8 @@ def gates_answer(registry: Registry, record_id: str) -> Judged:
         for result in judged.results
     ]
     judged_rules = {result.rule for result in judged.results}
-    for rule, need in GATES.items():
+    of_session = {rule: _SESSION for rule, entry in rules_catalogue().items() if "refuses" in entry}
+    for rule, need in {**of_session, **GATES}.items():
         if rule not in judged_rules:
             judgeable = need is None or present[need]
             gates.append(

@@ -150,6 +150,8 @@ class Record(Face):
         """Return one coefficient a row: load, term, coefficient, issued digits, standard error, unit."""
         import pandas as pd
 
+        from toolkit.calibration.uncertainty.common_errors import standard_errors
+
         return pd.DataFrame(
             [
                 {"load": fit.load, "term": term, "coefficient": value, "issued": issued,
@@ -157,7 +159,7 @@ class Record(Face):
                 for fit in self.result.loads
                 for term, value, issued, error in zip(
                     fit.terms, fit.coefficients, fit.issued,
-                    fit.standard_errors or (float("nan"),) * len(fit.terms), strict=True,
+                    standard_errors(self.result, fit.load) or (float("nan"),) * len(fit.terms), strict=True,
                 )
             ]
         )  # fmt: skip
@@ -178,12 +180,14 @@ class Record(Face):
         from toolkit.calibration.fit.report import report_session
         from toolkit.calibration.fit.session_fit import fit_session
         from toolkit.calibration.registry.stored import stored_session
+        from toolkit.calibration.uncertainty.common_errors import record_covariance
         from toolkit.report.calibration.figures import open_figures
 
         if not self.result.verified:  # a legacy import has no rows to draw
             return {}
         figures: dict[str, Plot | Callable[[], Figure]] = {}
-        for report in report_session(fit_session(stored_session(self.registry.folder, self.result))):
+        fit = fit_session(stored_session(self.registry.folder, self.result))
+        for report in report_session(fit, record_covariance(self.result)):
             figures |= open_figures(report, title=self.id)
         return figures
 

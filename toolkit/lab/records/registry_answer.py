@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import UNSIGNED
 from toolkit.calibration.registry.standing import approved_after
+from toolkit.calibration.uncertainty.common_errors import standard_errors
 from toolkit.declared.answers import entry_of
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import table
@@ -362,7 +363,7 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent
     misses = _check_misses(record, registry)
     loads: dict[str, RecordLoad] = {}
     for load in record.loads:
-        errors = load.standard_errors or (None,) * len(load.terms)
+        errors = standard_errors(record, load.load) or (None,) * len(load.terms)
         loads[load.load] = entry_of(
             RecordLoad, load,
             coefficients=dict(zip(load.terms, load.coefficients, strict=True)),
@@ -401,7 +402,7 @@ def _figures(fit: LoadFit, miss: float | None) -> list[str]:
         f"{fit.method}, {fit.n} rows, {fit.dof} degrees of freedom, "
         f"range {_range(fit.minimum, fit.maximum, fit.unit)}, residual sd {fit.residual_sd:.4g} {fit.unit}"
     ]
-    lines.append(f"standard errors by: {fit.covariance_model}")
+    lines.append(f"standard errors by: {fit.covariance_model}, and what the session states")
     if fit.scatter_words is not None:
         lines.append(fit.scatter_words)
     if fit.tolerance is not None:

@@ -15,6 +15,7 @@ from toolkit.lab.answers import finding_lines, refuse_unwritable, table
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from toolkit.calibration.fit.report import FitReport as LoadReport
     from toolkit.calibration.fit.session_fit import SessionFit
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.candidate import Candidate
@@ -104,8 +105,8 @@ class FitReport:
     text: str
 
 
-def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None) -> FitReport:
-    """Return a fit's report, and write its figures where a folder is named.
+def fit_report(fit: SessionFit, record: CalibrationRecord, *, full: bool, figures: Path | None) -> FitReport:
+    """Return a fit's report, and write its figures where a folder is named; ``record`` is that of the fit.
 
     Raises
     ------
@@ -114,9 +115,10 @@ def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None)
     """
     from toolkit.calibration.fit.balance_report import report_balance
     from toolkit.calibration.fit.report import report_session
+    from toolkit.calibration.uncertainty.common_errors import record_covariance
     from toolkit.report.calibration.text import balance_dict, balance_text, report_dict, report_text
 
-    reports = report_session(fit)
+    reports = report_session(fit, record_covariance(record))
     blocks = [report_text(report) for report in reports] if full else []
     payload: dict[str, Any] = {}
     if fit.session.model == "balance":
@@ -130,7 +132,7 @@ def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None)
             payload["balance"] = balance_dict(balance)
             blocks += [balance_text(balance)] if full else []
     if figures is not None:
-        payload["figures"] = _write(fit, title, figures)
+        payload["figures"] = _write(reports, record.id, figures)
         blocks.append(f"{len(payload['figures'])} figures in {figures}")
     return FitReport(
         loads={report.load: report_dict(report, rows=full) for report in reports},
@@ -139,13 +141,12 @@ def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None)
     )
 
 
-def _write(fit: SessionFit, title: str, folder: Path) -> list[str]:
-    from toolkit.calibration.fit.report import report_session
+def _write(reports: Sequence[LoadReport], title: str, folder: Path) -> list[str]:
     from toolkit.publication import publication
     from toolkit.report.calibration.figures import report_figures
 
     pictures: dict[str, bytes] = {}
-    for report in report_session(fit):
+    for report in reports:
         pictures |= report_figures(report, title=title)
     with publication(folder) as stage:
         for name, data in pictures.items():
@@ -171,7 +172,7 @@ def record_report(
     fit = fit_session(stored_session(registry.folder, record))
     refuse_unwritable(figures)
     findings = session_findings(fit)
-    report = fit_report(fit, title=record.id, full=True, figures=figures)
+    report = fit_report(fit, record, full=True, figures=figures)
     text = f"{record.id}  {record.instrument}, session of {record.date}\nsha256 {record.sha256}{report.text}"
     if findings:
         text += "\n\nfindings:\n" + "\n".join(finding_lines(findings))
@@ -187,6 +188,7 @@ def candidate_payload(candidate: Candidate, status: str, signature: str) -> Fitt
     """Return a session's record and fit as the JSON answer; ``signature`` says who signed its decisions."""
     from toolkit.calibration.fit.readings import readings_json
     from toolkit.calibration.fit.session_fit import residual_correlation
+    from toolkit.calibration.uncertainty.common_errors import standard_errors
 
     record = candidate.record
     names = [load.setting.name for load in candidate.fit.loads]
@@ -203,7 +205,7 @@ def candidate_payload(candidate: Candidate, status: str, signature: str) -> Fitt
             "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
             "coefficients": dict(zip(fit.terms, fit.coefficients, strict=True)),
             "issued": dict(zip(fit.terms, stored.issued, strict=True)),
-            "standard_errors": dict(zip(fit.terms, stored.standard_errors, strict=True)),
+            "standard_errors": dict(zip(fit.terms, standard_errors(record, stored.load), strict=True)),
             "covariance_model": stored.covariance_model,
             "scatter": None if stored.scatter is None else asdict(stored.scatter),
             "residual_sd": fit.residual_sd,
@@ -237,6 +239,8 @@ def candidate_payload(candidate: Candidate, status: str, signature: str) -> Fitt
 
 def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
     """Return a session's record and fit for people."""
+    from toolkit.calibration.uncertainty.common_errors import standard_errors
+
     record = candidate.record
     lines = [
         f"{record.id}  {status}"
@@ -251,7 +255,11 @@ def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
         rows = [
             [term, f"{c:.10g}", f"{i:.8g}", round_uncertainty(u), _per(term, load.setting.unit, units)]
             for term, c, i, u in zip(
-                load.fit.terms, load.fit.coefficients, stored.issued, stored.standard_errors, strict=True
+                load.fit.terms,
+                load.fit.coefficients,
+                stored.issued,
+                standard_errors(record, stored.load),
+                strict=True,
             )
         ]
         check = "no check loads" if load.check_max_percent_fs is None else (

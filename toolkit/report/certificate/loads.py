@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
 from toolkit.calibration.uncertainty.budget import calibration_budget, predict
+from toolkit.calibration.uncertainty.common_errors import standard_errors
 from toolkit.report.certificate.model import Adjustment, CheckLine, Expanded, LoadResult, Part, TermLine
 from toolkit.report.certificate.statements import decide
 
@@ -72,7 +73,7 @@ def _load(
     tolerance = load.tolerance or 1e-3 * load.largest
     checks = () if check is None else _checks(record, load, loads, check, rule, tolerance)
     full = calibration_budget(record, loads, check, load.load)
-    errors = load.standard_errors
+    errors = standard_errors(record, load.load)
     return LoadResult(
         load=load.load,
         unit=load.unit,

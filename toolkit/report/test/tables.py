@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from toolkit.calibration.uncertainty.common_errors import standard_errors
 from toolkit.report.document import Rows
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -148,6 +149,7 @@ def calibration(report: ReportedTest, _style: Style) -> Rows:
     record = report.record
     units = dict(zip(record.indications, record.indication_units, strict=True)) if record else {}
     for load in record.loads if record else ():
+        errors = standard_errors(record, load.load) if record else ()
         for i, term in enumerate(load.terms):
             unit = units.get(term)
             yield (
@@ -155,7 +157,7 @@ def calibration(report: ReportedTest, _style: Style) -> Rows:
                 term,
                 load.coefficients[i],
                 load.issued[i] if i < len(load.issued) else None,
-                math.sqrt(load.covariance[i][i]) if i < len(load.covariance) else None,
+                errors[i] if i < len(errors) else None,
                 (f"{load.unit} per {unit}" if unit else load.unit).replace("*", "·"),
             )
 
