@@ -62,7 +62,9 @@ def test_a_file_with_its_cells_turned_is_named(
     assert {(one.rule, one.level, one.where) for one in found} == {("stray-file", "error", names[0])}
 
 
-@pytest.mark.parametrize(("one", "other"), [(3, 4), (0, 7), (10, 22)])
+@pytest.mark.parametrize(
+    ("one", "other"), [(3, 4), (0, 7), (10, 22)]
+)  # neighbours, two others, one angle's two directions
 def test_the_cells_of_two_files_exchanged(
     virtual_test: Path, virtual_record: CalibrationRecord, one: int, other: int
 ) -> None:

@@ -47,6 +47,7 @@ _SHARED_ROWS = 8
 _NO_SIGNAL = 1e-9
 _ONE_ANGLE = float(np.radians(0.5))
 _ALIKE = 0.3
+_CURVED = 0.3  # of the largest: so far the surface may miss a sharp bend
 
 
 def stray_findings(conditions: Sequence[Condition]) -> list[Finding]:
@@ -109,10 +110,10 @@ def _strays(used: Sequence[Condition], channel: str) -> list[_Stray]:
         return surface.misses(y, [*core, group], k)[-1]
 
     # What the core foretells comes back to it, the nearest first; the strays are left.
+    largest = float(np.max(np.abs(y[np.concatenate(core)])))
     while apart:
         misses = [of(group) for group in apart]
         nearest = min(range(len(apart)), key=lambda i: misses[i].freed)
-        largest = float(np.max(np.abs(y[np.concatenate(core)])))
         if misses[nearest].freed > _FAR * usual and misses[nearest].size > _LARGE[channel] * largest:
             break
         core.append(apart.pop(nearest))
@@ -122,7 +123,8 @@ def _strays(used: Sequence[Condition], channel: str) -> list[_Stray]:
     angles = [float(np.mean(surface.SA[group])) for group in apart]
     strays = []
     for i, (group, miss) in enumerate(zip(apart, misses, strict=True)):
-        if any(_same(angles[i] - angles[j], miss, misses[j]) for j in range(len(apart)) if j != i):
+        twice = (_same(angles[i] - angles[j], miss, misses[j]) for j in range(len(apart)) if j != i)
+        if miss.size < _CURVED * largest and any(twice):
             continue
         place = int(np.argmax(np.abs(miss.off)))
         worst = int(group[place])
@@ -132,7 +134,11 @@ def _strays(used: Sequence[Condition], channel: str) -> list[_Stray]:
 
 
 def _same(apart_rad: float, first: _Miss, second: _Miss) -> bool:
-    """Tell whether two files of one slip angle lie off alike: what a tire does twice is the tire's."""
+    """Tell whether two files of one slip angle lie off alike: what a tire does twice is the tire's.
+
+    So lies the knee of a tire on ice, which one slip angle shows in either direction. No curve bends as far
+    as a force that has turned round.
+    """
     one, other = float(np.mean(first.off)), float(np.mean(second.off))
     return abs(apart_rad) < _ONE_ANGLE and abs(one - other) < _ALIKE * max(abs(one), abs(other))
 
