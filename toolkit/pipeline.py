@@ -122,7 +122,12 @@ def declared_tare(folder: TestFolder, machine: Machine) -> Tare | None:
         return None
     unit = machine.indications[0].unit
     return Tare(
-        source="test.toml", values=tuple((name, value) for name, value, _ in folder.tare_values), unit=unit
+        source="test.toml",
+        values=tuple((name, value) for name, value, _ in folder.tare_values),
+        unit=unit,
+        u=tuple((column.symbol, dict(folder.tare_u)[column.symbol]) for column in machine.indications)
+        if folder.tare_u
+        else (),
     )
 
 

@@ -121,7 +121,7 @@ def choose_tares(
 
 def few_rows_finding(tare: Tare) -> list[Finding]:
     """Tell that the rows of the recordings say how sure a tare of few rows is."""
-    if tare.source == "none" or tare.rows >= ENOUGH_ROWS:
+    if not tare.borrowed:
         return []
     rows = {0: "a tare that is declared by its value", 1: "a tare of one row"}.get(
         tare.rows, f"a tare of {tare.rows} rows"
@@ -133,13 +133,18 @@ def few_rows_finding(tare: Tare) -> list[Finding]:
     return [Finding(rule="tare-rows", where=tare.source, message=message, level="note")]
 
 
+def _tells(tare: Tare) -> bool:
+    """Tell whether a tare says how sure it is: by enough rows, or by a u that is stated with its values."""
+    return tare.rows >= ENOUGH_ROWS or (tare.rows == 0 and bool(tare.u))
+
+
 def _of_few_rows(tare: Tare, files: Sequence[tuple[Recording, Sequence[Block], Sequence[Block]]]) -> Tare:
     """Return a tare whose uncertainty is at least that of as many rows of the load blocks.
 
     The rolling machine scatters more than the resting one, so that this is no less than the tare's own. A
     value without rows counts as one row.
     """
-    if tare.rows >= ENOUGH_ROWS:
+    if _tells(tare):
         return tare
     names = [name for name, _ in tare.values]
     own = dict(tare.u)
@@ -160,6 +165,7 @@ def _of_few_rows(tare: Tare, files: Sequence[tuple[Recording, Sequence[Block], S
     u = np.minimum(long_run / np.sqrt(max(tare.rows, 1)), row)
     return dataclasses.replace(
         tare,
+        borrowed=True,
         u=tuple((name, max(own.get(name, 0.0), float(part))) for name, part in zip(names, u, strict=True)),
     )
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _FEW_ROWS = 8  # fewer prove nothing
 _STUCK = 6  # rows in a row at one value, of a channel whose neighbouring rows otherwise differ
+_SMOOTH = 3  # times the rows for which a channel stands still elsewhere
 _BY_CHANCE = 1e-4  # how often a sound file of coarse digits may show such rows
 _JUMP = 10.0  # in median steps of the clock
 _STRAY = 15.0  # standard deviations of the other rows
@@ -204,10 +205,13 @@ def _stuck(series: Series, *, only_ends: bool = False) -> tuple[str, str] | None
     value = float(values[start])
     if only_ends and value not in ends:
         return None
-    # A channel printed so coarsely that it often repeats stands still by chance, not at an end of its range.
+    # A channel printed so coarsely that it often repeats stands still by chance, not at an end of its range;
+    # one that a filter smoothed does so for several rows on end, here and elsewhere.
     others = len(repeated) - (length - 1)
     chance = (int(repeated.sum()) - (length - 1)) / others if others else 1.0
-    if length < _STUCK or len(values) * chance ** (length - 1) > _BY_CHANCE:
+    elsewhere = repeated & (values[1:] != value)
+    usual = _longest(elsewhere)[1] + 1 if elsewhere.any() else 1
+    if length < max(_STUCK, _SMOOTH * usual) or len(values) * chance ** (length - 1) > _BY_CHANCE:
         return None
     rows = f"rows {start + 1} to {start + length}"
     if value in ends:

@@ -82,7 +82,7 @@ class Tare:
 
     ``u`` holds the standard uncertainty of each cell's zero, in the same unit: what the machine states of an
     untared bridge, or the scatter of a recorded tare, or of as many rows of the recordings where the tare has
-    few. ``rows`` are those of the tare, 0 where it is declared by its value alone.
+    few (``borrowed``). ``rows`` are those of the tare, 0 where it is declared by its value.
     """
 
     source: str
@@ -90,6 +90,7 @@ class Tare:
     unit: str
     u: tuple[tuple[str, float], ...] = ()
     rows: int = 0
+    borrowed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
