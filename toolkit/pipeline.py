@@ -15,6 +15,7 @@ from toolkit.machine import load_machine, own_text
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.read import read_recording
 from toolkit.reduction.corrections import tare_of_file
+from toolkit.reduction.health import health_findings
 from toolkit.reduction.model import ReducedTest, Tare
 from toolkit.reduction.reduce import reduce_test
 from toolkit.reduction.sweep import sweeps_of
@@ -95,7 +96,7 @@ def process(
             expected="recordings of settled slip angles beside them, which give the loads and the curves",
             next_step="add them to the folder, or leave their names out of [sweeps]", rule="no-recordings",
         )  # fmt: skip
-    tare = declared_tare(folder, machine)
+    tare, tare_findings = declared_tare(folder, machine), tare_health(folder, machine, record)
     reduced = reduce_test(
         info=folder.info, machine=machine, record=record, recordings=settled, tare=tare, use=use
     )
@@ -105,7 +106,9 @@ def process(
     )  # fmt: skip
     hidden = [finding for name, one, _ in named for finding in hidden_findings(one.hidden, name)]
     reduced = dataclasses.replace(
-        reduced, findings=(*reduced.findings, *findings, *hidden), definition=own_text(folder.info.machine)
+        reduced,
+        findings=(*reduced.findings, *tare_findings, *findings, *hidden),
+        definition=own_text(folder.info.machine),
     )
     characteristics = characterise(reduced, machine=machine, record=record, sweeps=sweeps)
     return TestResult(reduced=reduced, characteristics=characteristics)
@@ -114,10 +117,26 @@ def process(
 def declared_tare(folder: TestFolder, machine: Machine) -> Tare | None:
     """Return the tare that ``test.toml`` declares, as values or as a file, in the machine's units."""
     if folder.tare_file is not None:
-        return tare_of_file(read_recording(folder.tare_file, machine))
+        return tare_of_file(read_recording(folder.tare_file, machine), machine)
     if not folder.tare_values:
         return None
     unit = machine.indications[0].unit
     return Tare(
-        source="test.toml", values=tuple((name, value) for name, value, _ in folder.tare_values), unit=unit
+        source="test.toml",
+        values=tuple((name, value) for name, value, _ in folder.tare_values),
+        unit=unit,
+        u=tuple((column.symbol, dict(folder.tare_u)[column.symbol]) for column in machine.indications)
+        if folder.tare_u
+        else (),
     )
+
+
+def tare_health(folder: TestFolder, machine: Machine, record: CalibrationRecord) -> list[Finding]:
+    """Return what the channels of the recorded tare show; nothing where there is none."""
+    if folder.tare_file is None:
+        return []
+    recording = read_recording(folder.tare_file, machine)
+    return health_findings(
+        recording, recording.name_in(folder.folder), stretches=[slice(0, recording.rows)],
+        read=record.indications,
+    )  # fmt: skip

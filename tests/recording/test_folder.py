@@ -208,7 +208,7 @@ def test_bad_lines(folder, old, new, expected):
         assert refused(folder).expected == expected
     else:
         (folder / "test.toml").write_text(f'machine = "m15"\n{new}')
-        assert refused(folder).expected == "a table [tare] with file, values"
+        assert refused(folder).expected == "a table [tare] with file, values, u"
 
 
 def test_units(folder):
@@ -246,3 +246,20 @@ def test_a_tare_that_lacks_a_cell_is_refused(folder):
         read_test_folder(folder)
     assert caught.value.rule == "tare-incomplete"
     assert caught.value.got == "D51, E5"
+
+
+@pytest.mark.parametrize("u", ["u = { D51 = 0.1 }", "u = { D51 = 0.1, D52 = -0.1, E5 = 0.1 }"])
+def test_the_u_of_a_tare_names_every_cell_and_is_not_negative(tmp_path, u):
+    (tmp_path / "run.xlsx").write_bytes(b"x")
+    values = "values = { D51 = 1, D52 = 0.5, E5 = -2 }"
+    (tmp_path / "test.toml").write_text(f'schema = 1\nmachine = "m15"\n[tare]\n{values}\n{u}\n')
+    with pytest.raises(ToolkitError):
+        read_test_folder(tmp_path)
+
+
+def test_the_u_of_a_tare_is_read_in_the_cells_unit(tmp_path):
+    (tmp_path / "run.xlsx").write_bytes(b"x")
+    lines = ["values = { D51 = 1, D52 = 0.5, E5 = -2 }",
+             'u = { D51 = { value = 4.4482216152605, unit = "N" }, D52 = 0.1, E5 = 0.2 }']  # fmt: skip
+    (tmp_path / "test.toml").write_text("\n".join(['schema = 1\nmachine = "m15"\n[tare]', *lines]))
+    assert dict(read_test_folder(tmp_path).tare_u) == pytest.approx({"D51": 1.0, "D52": 0.1, "E5": 0.2})

@@ -145,3 +145,23 @@ def test_a_turn_that_is_not_whole_explains_nothing() -> None:
     assert turning(100, None).shape == turning(100, 0.6).shape == turning(100, 1.1).shape == (0, 100)
     assert turning(100, 2.0).shape == (4, 100)
     np.testing.assert_allclose(turning(100, 2.0).mean(axis=1), 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("counter", ["back", "still"])
+def test_a_clock_that_does_not_run_counts_no_revolutions(counter: str) -> None:
+    time = np.arange(400) * 0.01
+    time = np.full(400, 5.0) if counter == "still" else np.where(np.arange(400) > 0, time - 3.0, time)
+    found = window(recording(t=("s", time)), BLOCK, machine=M15, rolling_radius_m=RADIUS)
+    assert (found.rows, found.revolutions, found.short) == (slice(0, 400), None, False)
+
+
+def test_where_a_shaft_stands_still_the_clock_counts() -> None:
+    rows = recording(TIRE_ANGLE=("deg", np.full(400, 12.0)), t=("s", np.arange(400) * 0.01))
+    found = window(rows, BLOCK, machine=M15, rolling_radius_m=RADIUS)
+    assert found.rows.start == pytest.approx(2.5 * 0.9035 * 100, abs=1)
+
+
+def test_the_jitter_of_an_encoder_is_no_turn_backwards() -> None:
+    angle = np.arange(400) * 3.6 + np.where(np.arange(400) % 2, 4.0, 0.0)
+    found = window(recording(TIRE_ANGLE=("deg", angle)), BLOCK, machine=M15, rolling_radius_m=None)
+    assert found.rows.start == pytest.approx(250, abs=2)

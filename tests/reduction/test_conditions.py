@@ -4,7 +4,7 @@ import pytest
 
 from toolkit.channels import CHANNELS
 from toolkit.declared import Quantity
-from toolkit.reduction.conditions import CONDITIONS, condition_finding
+from toolkit.reduction.conditions import CONDITIONS, condition_finding, condition_of
 from toolkit.units import to_si, unit
 
 # What laboratories test: none of it may be told.
@@ -32,7 +32,7 @@ TAKEN = [
 
 @pytest.mark.parametrize(("name", "value", "text"), USUAL)
 def test_what_laboratories_test_is_not_told(name, value, text):
-    assert condition_finding(name, float(to_si(value, text)), where="here", unit=text) is None
+    assert condition_finding(name, float(to_si(value, text)), where="here", stated_in=text) is None
 
 
 @pytest.mark.parametrize(("name", "value", "text", "stated", "meant"), TAKEN)
@@ -44,19 +44,18 @@ def test_a_unit_taken_for_another_is_told_with_the_one_that_was_meant(
     finding = (
         condition_finding(name, Quantity(si, value=value, unit=text), where="here")
         if remembered
-        else condition_finding(name, si, where="here", unit=text)
+        else condition_finding(name, si, where="here", stated_in=text)
     )
     assert finding.rule == "unusual-condition"
     assert finding.level == "warning"
     low, high, usual = CONDITIONS[name].low, CONDITIONS[name].high, CONDITIONS[name].units[0]
-    assert finding.message.startswith(
-        f"{CONDITIONS[name].name} {stated} is outside {low:g} to {high:g} {usual}, the range of tires"
-    )
+    bounds = f"{low:g} to {high:g} {usual}, the range of tires of road vehicles"
+    assert finding.message.startswith(f"{CONDITIONS[name].name} {stated} is outside {bounds}")
     assert finding.message.endswith(f"; {meant}")
 
 
 def test_a_value_that_fits_in_no_unit_is_told_without_one():
-    finding = condition_finding("P", 4e9, where="here", unit="kPa")
+    finding = condition_finding("P", 4e9, where="here", stated_in="kPa")
     assert "would be" not in finding.message
 
 
@@ -74,3 +73,11 @@ def test_the_edges_of_a_range_belong_to_it_in_every_unit(name):
             si = float(to_si(edge, condition.units[0]))
             written = (si - unit(text).offset) / unit(text).factor
             assert condition.holds(float(to_si(written, text)))
+
+
+@pytest.mark.parametrize(
+    ("symbol", "text", "condition"),
+    [("T_TREAD", "degC", "T"), ("T_AMBIENT", "K", "T"), ("SA", "deg", "SA"), ("P_OIL", "bar", None)],
+)
+def test_a_temperature_is_known_by_its_unit_whatever_its_name(symbol, text, condition):
+    assert condition_of(symbol, text) == condition

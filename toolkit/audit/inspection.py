@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, columns_of
-from toolkit.audit.quality import impossible
+from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.screen import Screen, Signature, layout, screen_of
 from toolkit.calibration.registry.clock import in_future
 from toolkit.errors import RecordError, RegistryError
@@ -25,6 +25,7 @@ from toolkit.findings import Finding
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.read import read_recording
 from toolkit.reduction.blocks import Block, block_means, find_blocks, is_tare
+from toolkit.reduction.health import health_findings, tare_finding, tare_under_load
 from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.units import si_scale
@@ -204,28 +205,46 @@ def inspect_file(
         unverified=corrector is not None and not corrector.verified,
         choice=choice,
         findings=(
-            *_impossible(path, blocks, corrector),
+            *_impossible(path, recording, blocks, corrector),
             *_findings(path, identification, choice),
             *_of_context(path, context, why),
+            *_of_channels(loaded_recording, path, context, corrector),
             *hidden_findings(recording.hidden, path.name),
         ),
     )
 
 
+def _of_channels(
+    recording: Recording, path: Path, context: Context, corrector: CalibrationRecord | None
+) -> list[Finding]:
+    """Return what the channels show in the load blocks, or in a tare."""
+    read = None if corrector is None else corrector.indications
+    if context.is_tare:
+        error = tare_under_load(recording, context.machine)
+        loaded = [] if error is None else [tare_finding(error, path.name, level="error")]
+        return [
+            *loaded,
+            *health_findings(recording, path.name, stretches=[slice(0, recording.rows)], read=read),
+        ]
+    blocks, _ = split_blocks(recording, context.machine)
+    return health_findings(recording, path.name, stretches=[block.rows for block in blocks], read=read)
+
+
 def _impossible(
-    path: Path, blocks: Sequence[LoadBlock], corrector: CalibrationRecord | None
+    path: Path, recording: Recording, blocks: Sequence[LoadBlock], corrector: CalibrationRecord | None
 ) -> tuple[Finding, ...]:
     """Return what no tire can do, of the file's own values and of the corrected ones."""
     loads = [block for block in blocks if not block.tare]
+    IA = inclinations(recording, [(b.first_row - 1, b.last_row) for b in loads])
     rows = [f"rows {block.first_row}-{block.last_row}" for block in loads]
     stored_blocks = [(b.FZ_N, b.SA_rad, b.FY_file_N, b.MZ_file_Nm) for b in loads]
-    findings = impossible(path.name, rows, stored_blocks, values="the stored Fy and Mz are impossible")
+    findings = impossible(path.name, rows, stored_blocks, values="the stored Fy and Mz are impossible", IA=IA)
     if corrector is None:
         return findings
     new = [(b.FZ_N, b.SA_rad, b.FY_N, b.MZ_Nm) for b in loads]
     return (
         *findings,
-        *impossible(path.name, rows, new, values=f"Fy and Mz by {corrector.id} are impossible too"),
+        *impossible(path.name, rows, new, values=f"Fy and Mz by {corrector.id} are impossible too", IA=IA),
     )
 
 

@@ -19,7 +19,7 @@ from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.inspection import Choices
 from toolkit.audit.model import Grade, Identification, columns_of
-from toolkit.audit.quality import impossible, quality
+from toolkit.audit.quality import impossible, inclinations
 from toolkit.calibration.registry.clock import in_future
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
@@ -33,6 +33,7 @@ from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
+from toolkit.reduction.health import quality, tare_finding, tare_under_load
 from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.reduction.protocol import nearest_load, nearest_step
@@ -242,8 +243,9 @@ class Auditor:
             if identification.grade == "unknown"
             else None,
             notes=(
-                *_impossible(name, changed, in_force.id if in_force is not None else None),
+                *_impossible(name, recording, changed, in_force.id if in_force is not None else None),
                 *quality(recording, name),
+                *_tare(loaded, context, name),
                 *hidden_findings(recording.hidden, name),
             ),
         )
@@ -281,18 +283,29 @@ class Auditor:
         return cast("Rotation", rotation_entry) if rotation_entry in ROTATIONS else "forward"
 
 
-def _impossible(name: str, blocks: tuple[Change, ...], in_force: str | None) -> tuple[Finding, ...]:
+def _tare(recording: Recording, context: Context, name: str) -> tuple[Finding, ...]:
+    error = tare_under_load(recording, context.machine) if context.is_tare else None
+    return () if error is None else (tare_finding(error, name, level="note"),)
+
+
+def _impossible(
+    name: str, recording: Recording, blocks: tuple[Change, ...], in_force: str | None
+) -> tuple[Finding, ...]:
     rows = [f"rows {b.first_row}-{b.last_row}" for b in blocks]
+    IA = inclinations(recording, [(b.first_row - 1, b.last_row) for b in blocks])
     angles = [None if b.SA_deg is None else math.radians(b.SA_deg) for b in blocks]
     stored = [(b.FZ_N, SA, b.FY_N, b.MZ_Nm) for b, SA in zip(blocks, angles, strict=True)]
-    findings = impossible(name, rows, stored, values="the stored Fy and Mz are impossible")
+    findings = impossible(name, rows, stored, values="the stored Fy and Mz are impossible", IA=IA)
     if in_force is None:
         return findings
     new = [
         (b.FZ_N, SA, _sum(b.FY_N, b.FY_change_N), _sum(b.MZ_Nm, b.MZ_change_Nm))
         for b, SA in zip(blocks, angles, strict=True)
     ]
-    return (*findings, *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too"))
+    return (
+        *findings,
+        *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too", IA=IA),
+    )
 
 
 def _sum(stored: float | None, change: float | None) -> float | None:

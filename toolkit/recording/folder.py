@@ -15,6 +15,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from toolkit.channels import Reversal, Rotation
 from toolkit.declared import (
     Above,
+    AtLeast,
     Day,
     Entry,
     Fault,
@@ -127,11 +128,18 @@ class Tare:
         tuple[tuple[str, float], ...] | None, Keyed(), Unit(plain=True),
         Entry("of every cell, a number or { value, unit }", example={"D51": 0}),
     ] = None  # fmt: skip
+    u: Annotated[
+        tuple[tuple[str, float], ...] | None, Keyed(), Unit(plain=True), AtLeast(0),
+        Entry("standard uncertainty of every value; without it, that of a row of the recordings",
+              example={"D51": 0.0001}),
+    ] = None  # fmt: skip
 
     def faults(self) -> Iterator[Fault]:
         """Yield a tare that is stated twice."""
         if self.file is not None and self.values is not None:
             yield Fault(got="file and values", what="stands twice", expected="one of the two")
+        if self.u is not None and dict(self.u).keys() != dict(self.values or ()).keys():
+            yield Fault(got="u", what="does not name the cells of values", expected="a u of every value")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,8 +194,8 @@ class TestFolder:
 
     ``files``: the recordings, sorted by their path, without the tare's. ``rotations``: direction by file;
     ``sweeps``: surface speed [m/s] by file of those in which the slip angle is steered in time;
-    ``tare_values``: (indication, value, unit), in the machine's unit; ``protocol`` that of the test's own
-    file, None where the machine's applies.
+    ``tare_values``: (indication, value, unit), in the machine's unit, ``tare_u`` what it states of
+    them; ``protocol`` that of the test's own file, None where the machine's applies.
     """
 
     __test__ = False  # not a pytest class
@@ -199,6 +207,7 @@ class TestFolder:
     rotations: tuple[tuple[Path, Rotation], ...]
     tare_file: Path | None
     tare_values: tuple[tuple[str, float, str], ...]
+    tare_u: tuple[tuple[str, float], ...]
     protocol: Protocol | None = None
     sweeps: tuple[tuple[Path, float], ...] = ()
 
@@ -287,6 +296,10 @@ def read_test_folder(folder: Path) -> TestFolder:
         ),
         tare_file=tare_file,
         tare_values=tare_values,
+        tare_u=tuple(
+            _tare_value(name, u, machine, source, key="u")[:2]
+            for name, u in (entries.tare.u or () if entries.tare is not None else ())
+        ),
         protocol=None if plan is None else read_protocol(plan),
         sweeps=tuple(
             (_named_file(name, ("sweeps", name), folder, files, source), float(speed))
@@ -416,10 +429,12 @@ def _tare(
     return None, tuple(_tare_value(name, value, machine, source) for name, value in tare.values)
 
 
-def _tare_value(name: str, value: float, machine: Machine, source: Source) -> tuple[str, float, str]:
+def _tare_value(
+    name: str, value: float, machine: Machine, source: Source, *, key: str = "values"
+) -> tuple[str, float, str]:
     cell_unit = machine.column(name).unit
     number, unit_name = (value.value, value.unit) if isinstance(value, Quantity) else (value, "")
     if not unit_name or unit(unit_name).text == cell_unit:
         return name, float(number), cell_unit
-    scale = si_scale(unit_name, unit(cell_unit).dimension, where=f"{source.where}, [tare] values.{name}")
+    scale = si_scale(unit_name, unit(cell_unit).dimension, where=f"{source.where}, [tare] {key}.{name}")
     return name, float(from_si(float(number) * scale, cell_unit)), cell_unit

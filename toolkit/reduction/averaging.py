@@ -90,7 +90,8 @@ def revolutions(
     """Return revolutions of the protocol's shaft since the block's first row (rows,), None if unknown.
 
     The tire rolls on the drum: what the drum's surface travels, the tire's does too. A turn of the other
-    shaft is known by the ratio of the circumferences, for which the tire's size must be known.
+    shaft is known by the ratio of the circumferences, for which the tire's size must be known. A shaft or a
+    clock that stands still or runs backwards counts nothing: the next source counts.
     """
     protocol = machine.protocol
     tire = None if rolling_radius_m is None else 2 * np.pi * rolling_radius_m
@@ -100,8 +101,9 @@ def revolutions(
     for symbol, around, shaft in sorted(shafts, key=lambda shaft: shaft[2] != protocol.revolutions_of):
         if not recording.has(symbol):
             continue
-        angle = np.unwrap(recording[symbol].si_of(block.rows))
-        turns = np.asarray(np.abs(angle - angle[0]) / (2 * np.pi))
+        turns = shaft_turns(recording[symbol].si_of(block.rows))
+        if turns is None:
+            continue
         if shaft == protocol.revolutions_of:
             return turns
         if around is not None and source is not None:
@@ -109,12 +111,39 @@ def revolutions(
     if source is None:
         return None
     per_second = (protocol.speed_m_s or machine.drum.speed_m_s) / source
-    if recording.has("t"):
-        time = recording["t"].si_of(block.rows)
-        return np.asarray((time - time[0]) * per_second)
+    elapsed = clock_of(recording["t"].si_of(block.rows)) if recording.has("t") else None
+    if elapsed is not None:
+        return np.asarray(elapsed * per_second)
     if machine.sample_rate_Hz and protocol.acquisition == "continuous":
         return np.arange(block.n) / machine.sample_rate_Hz * per_second
     return None
+
+
+def clock_of(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return what a clock counts since its first row (rows,), None where it stands still or runs backwards.
+
+    >>> clock_of(np.array([5.0, 5.0, 5.1])).round(9).tolist()
+    [0.0, 0.0, 0.1]
+    >>> clock_of(np.array([5.0, 5.1, 5.0])) is None
+    True
+    """
+    elapsed = time - time[0]
+    if len(elapsed) > 1 and (elapsed[-1] <= 0 or np.any(np.diff(elapsed) < 0)):
+        return None
+    return np.asarray(elapsed)
+
+
+def shaft_turns(angle: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return the turns of a shaft since its first row (rows,), None where it does not turn in one direction.
+
+    An encoder's jitter is no turn backwards.
+    """
+    travelled = np.unwrap(angle) - angle[0]
+    turns = np.abs(travelled) / (2 * np.pi)
+    rising = np.maximum.accumulate(turns)
+    if len(turns) > 1 and (rising[-1] < _WHOLE or np.any(rising - turns > _WHOLE)):
+        return None
+    return np.asarray(rising)
 
 
 def means(values: NDArray[np.float64], *, explained: NDArray[np.float64] | None = None) -> tuple[Mean, ...]:

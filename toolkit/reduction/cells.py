@@ -75,14 +75,17 @@ def physics_findings(
     machine: Machine,
     info: TestInfo,
     tares: Mapping[str, Tare],
+    inclinations: Mapping[tuple[str, int], float],
 ) -> list[Finding]:
     """Return what no tire and no wheel can do in a test's corrected values, as findings of level error.
 
-    ``tares`` are those of the files by their names.
+    ``tares`` are those of the files by their names, ``inclinations`` [rad] the means of a recorded
+    inclination angle by file and first row of the average.
     """
     if not conditions:
         return []
-    readings = _readings(conditions, info)
+    IA = np.array([inclinations.get((c.file, c.first_row), 0.0) for c in conditions])
+    readings = _readings(conditions, info, IA)
     cells = _cells(conditions, record, machine, info, tares)
     broken = _all(readings, cells)
     if not broken:
@@ -95,13 +98,15 @@ def physics_findings(
 def checked(reduced: ReducedTest) -> ReducedTest:
     """Return a reduced test with what no tire can do told, where it was reduced before there was a gate.
 
-    Without the machine and the record, as a file of its own: the cells' pattern is left to the reduction.
+    Without the machine and the record, as a file of its own: the cells' pattern is left to the reduction. It
+    does not hold the angle at which a tire leaned: of such a test friction alone bounds the side force.
     """
     if reduced.impossible or not reduced.conditions:
         return reduced
-    findings = tuple(
-        departure.finding() for departure in departures(_readings(reduced.conditions, reduced.info))
-    )
+    leans = any(f.rule in ("one-condition", "other-conditions") for f in reduced.findings)
+    IA = np.full(len(reduced.conditions), np.nan if leans else 0.0)
+    broken = departures(_readings(reduced.conditions, reduced.info, IA))
+    findings = tuple(departure.finding() for departure in broken)
     return dataclasses.replace(reduced, findings=(*findings, *reduced.findings)) if findings else reduced
 
 
@@ -152,7 +157,7 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
     return tuple(findings)
 
 
-def _readings(conditions: Sequence[Condition], info: TestInfo) -> Readings:
+def _readings(conditions: Sequence[Condition], info: TestInfo, IA: NDArray[np.float64]) -> Readings:
     def column(name: str) -> NDArray[np.float64]:
         return np.array([getattr(c, name) for c in conditions], dtype=np.float64)
 
@@ -162,7 +167,7 @@ def _readings(conditions: Sequence[Condition], info: TestInfo) -> Readings:
         FZ=column("FZ"), SA=column("SA"), FY=column("FY"), MZ=column("MZ"),
         reverse=np.array([c.rotation == "reverse" for c in conditions]),
         block=tuple((c.step_SA, c.step_FZ) for c in conditions),
-        u_FY=column("u_FY_zero"), u_MZ=column("u_MZ_zero"), FX=none, IA=none,
+        u_FY=column("u_FY_zero"), u_MZ=column("u_MZ_zero"), FX=none, IA=IA,
         trail_m=longest_trail(free_radius_m(info.tire_size)),
     )  # fmt: skip
 

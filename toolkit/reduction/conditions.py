@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from toolkit.declared import Quantity
 from toolkit.findings import Finding
-from toolkit.units import from_si, to_si
+from toolkit.units import from_si, to_si, unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,26 +67,47 @@ CONDITIONS = {
 """By the channel's symbol; ``rated_load`` is an entry of test.toml."""
 
 
-def condition_finding(name: str, si: float, *, where: str, unit: str | None = None) -> Finding | None:
+def condition_of(symbol: str, unit_name: str) -> str | None:
+    """Return the entry of `CONDITIONS` that judges a channel, None where none does.
+
+    Whatever its name, a channel in a unit of temperature is one of the air, the tread or a bearing, and one
+    range holds them all. Other units do not say what is measured: a pressure may be that of the hydraulics,
+    an angle that of a shaft, a force that of a cell.
+
+    >>> condition_of("T_TREAD", "degC"), condition_of("P_OIL", "bar"), condition_of("P", "bar")
+    ('T', None, 'P')
+    """
+    if symbol in CONDITIONS:
+        return symbol
+    return "T" if unit(unit_name).dimension == "temperature" else None
+
+
+def condition_finding(
+    name: str, si: float, *, where: str, stated_in: str | None = None, called: str | None = None
+) -> Finding | None:
     """Return what is to be said of a condition [SI] outside its range, None inside and for what has none.
 
     Parameters
     ----------
-    unit : in which it was stated, where the value does not say it itself (`Quantity`)
+    stated_in : its unit, where the value does not say it itself (`Quantity`)
+    called : the channel's name, where that is not the condition's
 
-    >>> condition_finding("P", 3.4e6, where="test.toml", unit="bar").message.split("; ")[1]
+    >>> condition_finding("P", 3.4e6, where="test.toml", stated_in="bar").message.split("; ")[1]
     '34 psi would be 234 kPa'
     """
     condition = CONDITIONS.get(name)
     if condition is None or condition.holds(si):
         return None
     usual = condition.units[0]
-    stated = si.unit if isinstance(si, Quantity) else unit or usual
+    stated = si.unit if isinstance(si, Quantity) else stated_in or usual
     number = float(si.value) if isinstance(si, Quantity) else float(from_si(si, stated))
     written = _written(number, stated)
     shown = written if stated == usual else f"{written} ({_written(float(from_si(si, usual)), usual)})"
     low, high = condition.low, condition.high
-    message = f"{condition.name} {shown} is outside {low:g} to {high:g} {usual}, the range of tires"
+    quantity = condition.name if called is None else f"{condition.name} {called}"
+    message = (
+        f"{quantity} {shown} is outside {low:g} to {high:g} {usual}, the range of tires of road vehicles"
+    )
     for other in condition.units:
         meant = float(to_si(number, other))
         if other != stated and condition.holds(meant):

@@ -6,6 +6,7 @@ the machine's axes: the loads first, then the slip angle, which the corrected mo
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from toolkit.effects import forward
 from toolkit.findings import Finding
 from toolkit.reduction.averaging import means
 from toolkit.reduction.blocks import Block
+from toolkit.reduction.health import tare_under_load
 from toolkit.reduction.model import Tare
 
 if TYPE_CHECKING:
@@ -27,6 +29,11 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import Recording
+
+
+ENOUGH_ROWS = 20
+"""Rows of a tare that tell its scatter: of fewer, twice the standard deviation is too short."""
+_FEWEST_ROWS = 8  # of a load block that tells a scatter
 
 
 def corrected(
@@ -64,14 +71,22 @@ def correction_findings(machine: Machine) -> list[Finding]:
     ]
 
 
-def tare_of_file(recording: Recording) -> Tare:
-    """Return the tare from a recording that holds nothing else: the mean of every row."""
+def tare_of_file(recording: Recording, machine: Machine) -> Tare:
+    """Return the tare from a recording that holds nothing else: the mean of every row.
+
+    Raises
+    ------
+    RecordingError
+        ``tare-under-load``: a part of it is under load
+    """
+    if (error := tare_under_load(recording, machine)) is not None:
+        raise error
     block = Block(start=0, stop=recording.rows, mean_FZ=0.0)
     return _tare([(recording, [block])], source=f"file {recording.name}")
 
 
 def choose_tares(
-    files: Sequence[tuple[Recording, Sequence[Block]]],
+    files: Sequence[tuple[Recording, Sequence[Block], Sequence[Block]]],
     *,
     declared: Tare | None,
     machine: Machine,
@@ -81,25 +96,78 @@ def choose_tares(
 
     Parameters
     ----------
-    files : each recording with its tare blocks
+    files : each recording with its load blocks and its tare blocks
     declared : the tare of ``test.toml``, which goes before every block
 
     Notes
     -----
     A block serves its own file only where every file has one. Otherwise the mean of the blocks serves all,
     so that one curve never holds tared and untared points.
+
+    A tare of few rows, and one that is declared by its value, cannot tell how sure it is: the rows of the
+    load blocks do (`_of_few_rows`).
     """
     if declared is not None:
-        return (declared,) * len(files)
-    having = [(recording, blocks) for recording, blocks in files if blocks]
+        return (_of_few_rows(declared, files),) * len(files)
+    having = [(recording, blocks) for recording, _, blocks in files if blocks]
     if not having:
-        return (_open_zero([recording for recording, _ in files], machine=machine, record=record),) * len(
-            files
-        )
+        recordings = [recording for recording, _, _ in files]
+        return (_open_zero(recordings, machine=machine, record=record),) * len(files)
     if len(having) == len(files):
-        return tuple(_tare([block], source="block") for block in having)
+        return tuple(_of_few_rows(_tare([block], source="block"), files) for block in having)
     shared = _tare(having, source=f"mean of the tare blocks in {len(having)} of {len(files)} files")
-    return (shared,) * len(files)
+    return (_of_few_rows(shared, files),) * len(files)
+
+
+def few_rows_finding(tare: Tare) -> list[Finding]:
+    """Tell that the rows of the recordings say how sure a tare of few rows is."""
+    if not tare.borrowed:
+        return []
+    rows = {0: "a tare that is declared by its value", 1: "a tare of one row"}.get(
+        tare.rows, f"a tare of {tare.rows} rows"
+    )
+    message = (
+        f"{rows} does not tell its own scatter: its uncertainty is that of as many rows of the load blocks; "
+        f"{ENOUGH_ROWS} rows tell it"
+    )
+    return [Finding(rule="tare-rows", where=tare.source, message=message, level="note")]
+
+
+def _tells(tare: Tare) -> bool:
+    """Tell whether a tare says how sure it is: by enough rows, or by a u that is stated with its values."""
+    return tare.rows >= ENOUGH_ROWS or (tare.rows == 0 and bool(tare.u))
+
+
+def _of_few_rows(tare: Tare, files: Sequence[tuple[Recording, Sequence[Block], Sequence[Block]]]) -> Tare:
+    """Return a tare whose uncertainty is at least that of as many rows of the load blocks.
+
+    The rolling machine scatters more than the resting one, so that this is no less than the tare's own. A
+    value without rows counts as one row.
+    """
+    if _tells(tare):
+        return tare
+    names = [name for name, _ in tare.values]
+    own = dict(tare.u)
+    noises = []
+    for recording, blocks, _ in files:
+        for block in blocks:
+            if block.n < _FEWEST_ROWS:
+                continue
+            values = np.stack([recording[name].values[block.rows] for name in names])
+            explained = recording["FZ"].values[None, block.rows] if recording.has("FZ") else None
+            noises.append(
+                [(mean.u * np.sqrt(block.n), mean.sd) for mean in means(values, explained=explained)]
+            )
+    if not noises:
+        return tare
+    # A mean of n rows of a coloured noise: its long-run scatter over root n, never above that of one row.
+    long_run, row = np.median(np.array(noises), axis=0).T
+    u = np.minimum(long_run / np.sqrt(max(tare.rows, 1)), row)
+    return dataclasses.replace(
+        tare,
+        borrowed=True,
+        u=tuple((name, max(own.get(name, 0.0), float(part))) for name, part in zip(names, u, strict=True)),
+    )
 
 
 def zero_shifts(
@@ -150,6 +218,7 @@ def _tare(files: Sequence[tuple[Recording, Sequence[Block]]], *, source: str) ->
         values=tuple(zip(names, values.tolist(), strict=True)),
         unit=unit,
         u=tuple(zip(names, u.tolist(), strict=True)) if every_row.shape[1] > 1 else (),
+        rows=every_row.shape[1],
     )
 
 

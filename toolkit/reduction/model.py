@@ -81,13 +81,16 @@ class Tare:
     """The tare that was subtracted, each indication in its own unit; source ``none`` where there is none.
 
     ``u`` holds the standard uncertainty of each cell's zero, in the same unit: what the machine states of an
-    untared bridge, or the scatter of a recorded tare; empty where a tare is declared by its value alone.
+    untared bridge, or the scatter of a recorded tare, or of as many rows of the recordings where the tare has
+    few (``borrowed``). ``rows`` are those of the tare, 0 where it is declared by its value.
     """
 
     source: str
     values: tuple[tuple[str, float], ...]
     unit: str
     u: tuple[tuple[str, float], ...] = ()
+    rows: int = 0
+    borrowed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

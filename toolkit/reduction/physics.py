@@ -55,8 +55,9 @@ class Readings:
 
     ``place`` names each value for a reader, ``block`` its slip-angle and load step (equal: comparable),
     ``reverse`` its direction. ``u_FY`` and ``u_MZ`` are standard uncertainties of the zero. ``FX`` and the
-    inclination angle ``IA`` are zeros where they are not measured. ``trail_m`` is the longest trail that the
-    tire can have. ``signed`` False: directions of travel and axes are not known, so only sizes are judged.
+    inclination angle ``IA`` are zeros where they are not measured, NaN where a tire leaned by an angle that
+    is not known. ``trail_m`` is the longest trail that the tire can have. ``signed``
+    False: directions of travel and axes are not known, so only sizes are judged.
     """
 
     place: tuple[str, ...]
@@ -129,10 +130,11 @@ def _force(r: Readings, share: float) -> list[Departure]:
     if len(over) <= share * len(excess):
         return []
     worst = int(np.argmax(excess))
+    lean = f", {limits.CAMBER.high:g} per rad of inclination" if r.IA[worst] else ""
     usual = (
         "the friction of any tire on any laboratory surface"
         if bound[worst] >= limits.FRICTION.high
-        else f"{limits.STIFFNESS.high:g} times the load per rad, a steering zero "
+        else f"{limits.STIFFNESS.high:g} times the load per rad{lean}, a steering zero "
         f"{math.degrees(limits.STEER_ZERO.high):g} deg off and a pull of {limits.PULL.high:g} of the load"
     )
     return [

@@ -16,18 +16,21 @@ from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means, turning
 from toolkit.reduction.cells import physics_findings
 from toolkit.reduction.common_load import at_one_angle, carry, slopes
-from toolkit.reduction.corrections import choose_tares, correction_findings, zero_shifts
+from toolkit.reduction.corrections import choose_tares, correction_findings, few_rows_finding, zero_shifts
+from toolkit.reduction.health import first_of_many, health_findings
 from toolkit.reduction.hub import HubBlock, hub_findings, hub_means, load_findings, with_load
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
 from toolkit.reduction.remarks import drift_findings
 from toolkit.reduction.selection import CONDITIONS, Selection, of_one_condition, parted
+from toolkit.reduction.strays import copied_findings, stray_findings
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.findings import Finding
     from toolkit.machine import Machine, Protocol, TypeB
     from toolkit.recording.model import Recording, TestInfo
 
@@ -68,7 +71,7 @@ def reduce_test(
     loaded = _loaded(recordings, [tare] * len(recordings), machine=machine, record=record)
     blocks = [split_rests(recording, machine, info) for _, recording, _ in loaded]
     tares = choose_tares(
-        [(recording, empty) for (_, recording, _), (_, empty) in zip(loaded, blocks, strict=True)],
+        [(recording, *parts) for (_, recording, _), parts in zip(loaded, blocks, strict=True)],
         declared=tare,
         machine=machine,
         record=record,
@@ -95,7 +98,16 @@ def reduce_test(
             machine=machine,
             info=info,
             tares={file.name: file.tare for file in files},
+            inclinations={
+                (file.name, window.rows.start + 1): float(np.mean(file.recording["IA"].si_of(window.rows)))
+                for file in files
+                if file.recording.has("IA")
+                for window in file.windows
+            },
         ),
+        *channel_findings(files, machine=machine, record=record),
+        *stray_findings(conditions),
+        *first_of_many(copied_findings([(file.name, file.recording) for file in files])),
         *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
         *drift_findings(conditions, protocol),
         *correction_findings(machine),
@@ -107,6 +119,7 @@ def reduce_test(
         *remarks.condition_findings(files),
         *remarks.selection_findings(files, selection),
         *remarks.tare_findings(files, record),
+        *few_rows_finding(files[0].tare),
         *remarks.angle_findings(files),
         *remarks.window_findings(files),
         *remarks.acquired_findings(files, record),
@@ -125,6 +138,23 @@ def reduce_test(
         machine_title=machine.title,
         stated=_stated(machine, info, files[0].tare),
     )
+
+
+def channel_findings(
+    files: Sequence[OpenedFile], *, machine: Machine, record: CalibrationRecord
+) -> list[Finding]:
+    """Return what the channels of the files show in the rows that are reduced."""
+    counted = machine.protocol.acquisition == "continuous"
+    return first_of_many(
+        [
+            finding
+            for file in files
+            for finding in health_findings(
+                file.recording, file.name, stretches=[block.rows for block in file.blocks],
+                read=record.indications, counted=counted,
+            )
+        ]
+    )  # fmt: skip
 
 
 def _loaded(

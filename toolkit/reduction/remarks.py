@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.channels import CHANNELS
 from toolkit.findings import Finding
-from toolkit.reduction.conditions import CONDITIONS, condition_finding, farthest
+from toolkit.reduction.conditions import CONDITIONS, condition_finding, condition_of, farthest
 from toolkit.units import from_si, in_both, unit
 
 if TYPE_CHECKING:
@@ -42,21 +42,27 @@ def condition_findings(files: Sequence[OpenedFile]) -> list[Finding]:
     """Return the measured conditions that no tire is tested at, by the means of the load blocks."""
     outside: dict[str, dict[str, float]] = {}
     units: dict[str, str] = {}
+    judged: dict[str, str] = {}
     for file in files:
-        for name in CONDITIONS:
-            if not file.recording.has(name):
+        for series in file.recording.series:
+            name = condition_of(series.symbol, series.unit)
+            if name is None:
                 continue
-            series = file.recording[name]
             means = [float(np.mean(series.si_of(window.rows))) for window in file.windows]
             means = [abs(mean) for mean in means] if name in _SIZES else means
             if (worst := farthest(name, means)) is not None:
-                outside.setdefault(name, {})[file.name] = worst
-                units.setdefault(name, series.unit)
+                outside.setdefault(series.symbol, {})[file.name] = worst
+                units.setdefault(series.symbol, series.unit)
+                judged[series.symbol] = name
     findings = (
         condition_finding(
-            name, max(by_file.values(), key=abs), where=_first_names(list(by_file)), unit=units[name]
+            judged[symbol],
+            max(by_file.values(), key=abs),
+            where=_first_names(list(by_file)),
+            stated_in=units[symbol],
+            called=None if symbol in CONDITIONS else symbol,
         )
-        for name, by_file in outside.items()
+        for symbol, by_file in outside.items()
     )
     return [*filter(None, findings)]
 

@@ -17,6 +17,7 @@ from toolkit.calibration.apply import apply_record
 from toolkit.channels import Rotation, seen_by_cells, signs
 from toolkit.findings import Finding
 from toolkit.reduction.corrections import corrected
+from toolkit.reduction.health import health_findings
 from toolkit.reduction.hub import with_load
 
 if TYPE_CHECKING:
@@ -108,6 +109,9 @@ def sweeps_of(
             what = "no time" if t is None else "times that do not rise"
             findings.append(_unused(name, f"it has {what}: name a column 't [s]', or the machine's rate"))
             continue
+        findings += health_findings(
+            recording, name, stretches=[slice(0, recording.rows)], read=record.indications, settled=False
+        )
         loaded = with_load(recording, machine=machine, record=record, tare=offsets)
         signals = _signals(loaded, machine, record, rotation, info, offsets)
         signals["V"], speed_u = _speed(recording, machine, speed)

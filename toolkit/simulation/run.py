@@ -25,6 +25,7 @@ from toolkit.effects.filters import lag
 from toolkit.effects.forward import driven, similar, with_source
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
 from toolkit.errors import ConfigError
+from toolkit.reduction import averaging
 from toolkit.simulation import acquisition, carriage, cells, timeline, tire
 from toolkit.simulation.acquisition import OwnProgram, true_program
 from toolkit.simulation.cells import CELLS
@@ -83,12 +84,14 @@ class VirtualFile:
 class VirtualTest:
     """A whole test: the files in the order of recording, and the tare in the cells' unit.
 
-    ``tare_rows`` are the tare's samples [V/V], (rows, 3), ``tare_dt`` apart [s].
+    ``tare_u`` is the standard uncertainty of each mean in ``tare``; ``tare_rows`` are the tare's samples
+    [V/V], (rows, 3), ``tare_dt`` apart [s].
     """
 
     plan: Plan
     files: tuple[VirtualFile, ...]
     tare: tuple[tuple[str, float], ...]
+    tare_u: tuple[tuple[str, float], ...]
     tare_unit: str
     program: OwnProgram
     tare_rows: dict[str, NDArray[np.float64]]
@@ -134,6 +137,7 @@ def simulate(
         plan=plan,
         files=tuple(files),
         tare=tare,
+        tare_u=_tare_u(plan, tare_rows),
         tare_unit=unit,
         program=acquisition_program,
         tare_rows=tare_rows,
@@ -290,6 +294,12 @@ def _tare_values(plan: Plan, rows: Signals) -> tuple[tuple[tuple[str, float], ..
     means = {name: np.array([rows[name].mean()]) for name in CELLS}
     printed = acquisition.printed(plan.machine, means)
     return tuple((name, float(printed[name][0])) for name in CELLS), unit
+
+
+def _tare_u(plan: Plan, rows: Signals) -> tuple[tuple[str, float], ...]:
+    printed = acquisition.printed(plan.machine, {name: rows[name] for name in CELLS})
+    sure = averaging.means(np.stack([printed[name] for name in CELLS]))
+    return tuple((name, mean.u) for name, mean in zip(CELLS, sure, strict=True))
 
 
 _HEAT_TURNS = 4  # of the fixed point between heat and the forces that it changes

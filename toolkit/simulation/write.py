@@ -218,6 +218,7 @@ def test_toml(test: VirtualTest) -> str:
         "",
         f"[tare]  # {test.tare_unit}, wheel mounted and lifted off the drum",
         f"values = {{ {values} }}",
+        f"u = {{ {', '.join(f'{name} = {u:.3g}' for name, u in test.tare_u)} }}",
     ]
     return _MARK + "\n".join(lines) + "\n"
 

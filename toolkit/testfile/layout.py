@@ -99,6 +99,8 @@ def content_hash(result: TestResult, *, before_intervals: bool = False) -> str:
     ]:  # nor has a test of a hub that measures FY and MZ alone
         if not condition["hub"]:
             del condition["hub"]
+    for name in ("rows", "borrowed"):  # a file keeps the uncertainty of a tare, not what told it
+        del content["reduced"]["tare"][name]
     for name in ("stated", "machine_title", "definition"):  # a file from before there were any keeps its hash
         if not content["reduced"][name]:
             del content["reduced"][name]

@@ -230,7 +230,10 @@ def condition_findings(table: TireTable, only: Collection[str] = CONDITIONS) -> 
             row = int(np.argmin(np.abs(sizes - worst))) + 1
             findings.append(
                 condition_finding(
-                    symbol, worst, where=f"{table.path.name}, {symbol}, row {row}", unit=units.get(symbol)
+                    symbol,
+                    worst,
+                    where=f"{table.path.name}, {symbol}, row {row}",
+                    stated_in=units.get(symbol),
                 )
             )
     return tuple(filter(None, findings))

@@ -1,0 +1,256 @@
+"""Files of a test that do not belong to it: off the curve that all others make, or copied from another.
+
+What a calibration, a wiring or a tire does wrong in every file, the laws of physics show (`physics`,
+`cells`). In one file alone it hides in their pooled slopes, and spoils a conicity that is a hundredth of the
+force. The other files know what that file should say: force over load is a smooth surface over slip angle
+and load,
+
+    y(SA, FZ) = sum a_ij x^i z^j,      x = arctan(k SA),  z = ln(FZ / mean)
+
+with an odd and an even part, and a pull and a shift of the slip angle for each direction. Every slip angle of
+every file is predicted by all others, and judged against what the others leave of their own predictions, so
+that a curve that the surface fits badly, and a test that scatters, hides no fault and raises no alarm.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.findings import Finding
+from toolkit.reduction.common_load import at_one_angle
+from toolkit.units import from_si
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.recording.model import Recording
+    from toolkit.reduction.model import Condition
+
+    Array = NDArray[np.float64]
+
+_FAR = 10.0  # times what the other files leave; healthy tests stay under 5. And
+_LARGE = {"FY": 0.06, "MZ": 0.15}  # of the largest force or moment over load
+_ORDER, _LOAD_ORDER = 5, 2
+# k [1/rad]: cornering stiffness over friction, of soft tires to stiff ones, the last on ice.
+_SLOPES = (3.0, 6.0, 10.0, 15.0, 22.0, 30.0, 45.0, 70.0, 110.0)
+_FEWEST_ANGLES = 5
+_SPARE = 4  # freedoms that the surface leaves at least
+_SUSPECTS = 3
+_MOST = 8  # files that are tried as strays
+_PART = 4  # one file in so many is tried; where over half of those are strays, nobody knows which are
+_SHARED_ROWS = 8
+_NO_SIGNAL = 1e-9
+_ONE_ANGLE = float(np.radians(0.5))
+_ALIKE = 0.3
+_CURVED = 0.3  # of the largest: so far the surface may miss a sharp bend
+
+
+def stray_findings(conditions: Sequence[Condition]) -> list[Finding]:
+    """Return the files whose force or moment lies far off what all the other files of the test say."""
+    used = [c for c in conditions if c.used and c.step_FZ is not None and c.FZ > 0]
+    findings: dict[str, Finding] = {}
+    for channel, unit in (("FY", "N"), ("MZ", "N*m")):
+        for stray in _strays(used, channel):
+            condition = used[stray.worst]
+            angle = float(from_si(condition.SA, "deg"))
+            message = (
+                f"{channel} lies off the curve that the other files make: {getattr(condition, channel):.4g} "
+                f"{unit} at {angle:+.2f} deg and {condition.FZ:.0f} N where they give {stray.expected:.4g} "
+                f"{unit}; that is {stray.times:.0f} times what they leave of each other"
+            )
+            findings.setdefault(
+                condition.file,
+                Finding(rule="stray-file", where=condition.file, message=message, level="error"),
+            )
+    return list(findings.values())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Stray:
+    # Its farthest condition, what the others give there, and how many times what they leave it is off.
+    worst: int
+    expected: float
+    times: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Miss:
+    """How far one group lies off what all others say: at each condition, rms, and that over its leverage.
+
+    At an end of the curve the others say little: what they miss there is divided by what noise of theirs
+    would be there.
+    """
+
+    off: Array
+    size: float
+    freed: float
+
+
+def _strays(used: Sequence[Condition], channel: str) -> list[_Stray]:
+    groups = [np.array(group) for group in at_one_angle(used)] if used else []
+    if not groups:
+        return []
+    FZ = np.array([c.FZ for c in used])
+    y = np.array([getattr(c, channel) for c in used]) / FZ
+    surface = _Surface.of(used)
+    tried = min(len(groups) // _PART, _MOST)
+    if not tried or not surface.tells(groups, without=tried):
+        return []
+    core = _core(surface, y, groups, tried)
+    apart = [group for group in groups if not any(group is own for own in core)]
+    k = surface.slope(y, core)
+    usual = _usual(surface.misses(y, core, k))
+
+    def of(group: NDArray[np.intp]) -> _Miss:
+        return surface.misses(y, [*core, group], k)[-1]
+
+    # What the core foretells comes back to it, the nearest first; the strays are left.
+    largest = float(np.max(np.abs(y[np.concatenate(core)])))
+    while apart:
+        misses = [of(group) for group in apart]
+        nearest = min(range(len(apart)), key=lambda i: misses[i].freed)
+        if misses[nearest].freed > _FAR * usual and misses[nearest].size > _LARGE[channel] * largest:
+            break
+        core.append(apart.pop(nearest))
+    if len(apart) > max(1, tried // 2):
+        return []
+    misses = [of(group) for group in apart]
+    angles = [float(np.mean(surface.SA[group])) for group in apart]
+    strays = []
+    for i, (group, miss) in enumerate(zip(apart, misses, strict=True)):
+        twice = (_same(angles[i] - angles[j], miss, misses[j]) for j in range(len(apart)) if j != i)
+        if miss.size < _CURVED * largest and any(twice):
+            continue
+        place = int(np.argmax(np.abs(miss.off)))
+        worst = int(group[place])
+        expected = float((y[worst] - miss.off[place]) * FZ[worst])
+        strays.append(_Stray(worst=worst, expected=expected, times=miss.freed / max(usual, 1e-12)))
+    return strays
+
+
+def _same(apart_rad: float, first: _Miss, second: _Miss) -> bool:
+    """Tell whether two files of one slip angle lie off alike: what a tire does twice is the tire's.
+
+    So lies the knee of a tire on ice, which one slip angle shows in either direction. No curve bends as far
+    as a force that has turned round.
+    """
+    one, other = float(np.mean(first.off)), float(np.mean(second.off))
+    return abs(apart_rad) < _ONE_ANGLE and abs(one - other) < _ALIKE * max(abs(one), abs(other))
+
+
+def _core(
+    surface: _Surface, y: Array, groups: Sequence[NDArray[np.intp]], tried: int
+) -> list[NDArray[np.intp]]:
+    """Return the groups that agree best: without the few that the others foretell worst.
+
+    Two strays hide each other, and accuse a third: one after another goes without which the others agree
+    best, whether it is a stray or not.
+    """
+    core = list(groups)
+    k = surface.slope(y, core)
+    for _ in range(tried):
+        misses = surface.misses(y, core, k)
+        trials = []
+        for suspect in sorted(range(len(core)), key=lambda i: -misses[i].freed)[:_SUSPECTS]:
+            left = surface.misses(y, core[:suspect] + core[suspect + 1 :], k)
+            trials.append((sum(miss.freed**2 for miss in left), suspect))
+        del core[min(trials)[1]]
+    return core
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Surface:
+    # Slip angle, z and direction (+-1, zeros where there is one) of each condition.
+    SA: Array
+    z: Array
+    turn: Array
+
+    @staticmethod
+    def of(used: Sequence[Condition]) -> _Surface:
+        z = np.log([c.FZ for c in used])
+        turn = np.array([-1.0 if c.rotation == "reverse" else 1.0 for c in used])
+        return _Surface(
+            SA=np.array([c.SA for c in used]),
+            z=z - z.mean(),
+            turn=turn if np.ptp(turn) else np.zeros(len(used)),
+        )
+
+    def _angles(self, rows: NDArray[np.intp]) -> int:
+        # How many slip angles, to a degree, the direction has that has the fewest.
+        SA, turn = np.round(np.degrees(self.SA[rows])), self.turn[rows]
+        return min(len(np.unique(SA[turn == side])) for side in np.unique(turn))
+
+    def _design(self, rows: NDArray[np.intp], k: float) -> Array:
+        z, turn, x = self.z[rows], self.turn[rows], np.arctan(k * self.SA[rows])
+        order = min(_ORDER, self._angles(rows) - 3)
+        load_order = min(_LOAD_ORDER, len(np.unique(np.round(z, 1))) - 1)
+        columns = [x**i * z**j for i, j in itertools.product(range(order + 1), range(load_order + 1))]
+        if np.ptp(turn):
+            columns += [turn * z**j for j in range(min(load_order, 1) + 1)] + [turn * np.cos(x) ** 2]
+        return np.column_stack(columns)
+
+    def tells(self, groups: Sequence[NDArray[np.intp]], *, without: int) -> bool:
+        """Tell whether enough slip angles and conditions stay to foretell some groups by the others."""
+        angles = self._angles(np.concatenate(groups)) - without
+        spare = sum(sorted(len(group) for group in groups)[: len(groups) - without]) - _SPARE
+        columns = self._design(np.concatenate(groups), _SLOPES[0]).shape[1]
+        return angles >= _FEWEST_ANGLES and spare >= columns
+
+    def slope(self, y: Array, groups: Sequence[NDArray[np.intp]]) -> float:
+        """Return the k [1/rad] by which the groups foretell one another best."""
+        return min(_SLOPES, key=lambda k: _usual(self.misses(y, groups, k)))
+
+    def misses(self, y: Array, groups: Sequence[NDArray[np.intp]], k: float) -> list[_Miss]:
+        """Return what each group misses of the surface of all others."""
+        rows = np.concatenate(groups)
+        ends = np.cumsum([len(group) for group in groups])
+        parts = [slice(int(end) - len(group), int(end)) for group, end in zip(groups, ends, strict=True)]
+        X = self._design(rows, k)
+        Q, size, _ = np.linalg.svd(X / np.linalg.norm(X, axis=0), full_matrices=False)
+        Q = Q[:, size > _NO_SIGNAL * size[0]]
+        residual = y[rows] - Q @ (Q.T @ y[rows])
+        misses = []
+        for part in parts:
+            # (I - H)^-1 r of the rows left out is what a fit without them misses there.
+            spread = np.linalg.pinv(np.eye(part.stop - part.start) - Q[part] @ Q[part].T, rcond=1e-6)
+            off = spread @ residual[part]
+            rms, leverage = (float(np.sqrt(np.mean(v))) for v in (off**2, np.diag(spread)))
+            misses.append(_Miss(off=off, size=rms, freed=rms / max(leverage, 1.0)))
+        return misses
+
+
+def _usual(misses: Sequence[_Miss]) -> float:
+    return float(np.median([miss.freed for miss in misses]))
+
+
+def copied_findings(files: Sequence[tuple[str, Recording]]) -> list[Finding]:
+    """Return the files that share rows with an earlier one: two recordings never share their noise."""
+    seen: dict[bytes, str] = {}
+    findings = []
+    for name, recording in files:
+        cells = [c.values for c in recording.series if c.role == "indication"]
+        if not cells:
+            continue
+        table = np.ascontiguousarray(np.stack(cells, axis=1))
+        own = {row.tobytes() for row in table}
+        if len(own) < max(_SHARED_ROWS, recording.rows // 2):
+            continue  # without noise every row repeats
+        from_file: dict[str, int] = {}
+        for row in own:
+            if row in seen:
+                from_file[seen[row]] = from_file.get(seen[row], 0) + 1
+        other = max(from_file, key=lambda key: from_file[key], default=None)
+        if other is not None and from_file[other] >= max(_SHARED_ROWS, len(own) // 2):
+            message = (
+                f"{from_file[other]} of {recording.rows} rows have the readings of every cell that {other} "
+                "has: two recordings never share their noise"
+            )
+            findings.append(Finding(rule="repeated-readings", where=name, message=message, level="error"))
+        for row in own:
+            seen.setdefault(row, name)
+    return findings
