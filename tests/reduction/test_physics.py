@@ -305,3 +305,12 @@ def test_every_bound_names_its_source() -> None:
     for one in found:
         assert one.low < one.high
         assert len(one.source) > 20
+
+
+def test_a_leaning_tire_thrusts_by_its_camber() -> None:
+    # A motorcycle tire at 45 deg carries itself by camber: about tan(45 deg) of the load at most.
+    values = {"FZ": np.array([2000.0]), "SA": np.zeros(1), "FY": np.array([1360.0]), "MZ": np.zeros(1)}
+    assert rules(of_sizes(["here"], **values)) == {"impossible-force"}
+    assert rules(of_sizes(["here"], **values, IA=np.radians([45.0]))) == set()
+    # By how much it leaned is not known: friction alone bounds it.
+    assert rules(of_sizes(["here"], **values, IA=np.array([np.nan]))) == set()
