@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
-import subprocess
-import sys
 
 import pytest
 
+from toolkit.cli.main import run
 from toolkit.days import parse_day
 
 
@@ -39,10 +38,12 @@ def test_no_other_form_is_a_day(text: str) -> None:
     ids=lambda words: " ".join(words[:2]),
 )
 @pytest.mark.parametrize("text", ["20260403", "2026-W14-5"])
-def test_every_option_of_a_day_refuses_other_forms(words: tuple[str, ...], text: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "toolkit", *words, text], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert text in done.stderr
-    assert "YYYY-MM-DD" in done.stderr
+def test_every_option_of_a_day_refuses_other_forms(
+    words: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run([*words, text])
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert text in told
+    assert "YYYY-MM-DD" in told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import tomllib
 from collections.abc import Iterator
@@ -96,15 +97,21 @@ def test_every_file_that_is_named_exists(page: Path) -> None:
     assert not [path for path in paths if not any(any(root.glob(path)) for root in roots)]
 
 
+@functools.cache
+def _commands() -> Any:
+    """Return the tree of commands, built for all pages."""
+    main._register()
+    return typer.main.get_command(main.app)
+
+
 @EACH
 def test_every_command_that_is_named_exists(page: Path) -> None:
-    main._register()
-    root = typer.main.get_command(main.app)
+    root = _commands()
     for span in spans(page):
         words = re.fullmatch(r"toolkit ([a-z]+)(?: ([a-z]+)\b(?![.=/]))?.*", span)
         if words is None:
             continue
-        command = root.commands.get(words[1])  # type: ignore[attr-defined]
+        command = root.commands.get(words[1])
         assert command is not None, span
         if hasattr(command, "commands") and words[2]:
             assert words[2] in command.commands, span

@@ -133,7 +133,10 @@ EACH = pytest.mark.campaign("the steps that the demonstration goes as well, each
 
 @pytest.mark.parametrize("each", [False, pytest.param(True, marks=EACH)])
 def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path, each: bool) -> None:
-    """Init, a session, its approval, a test, its report and the demonstration, by the installed command."""
+    """A home and the demonstration by the installed command: a session, its record, a test and its report.
+
+    ``each`` goes the steps of the demonstration one by one as well, in the new home.
+    """
     program = environment / "bin" / "toolkit"
 
     def run(*words: object, codes: tuple[int, ...] = (0,)) -> str:
@@ -156,11 +159,11 @@ def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path, e
     assert "Tutorials" in page.read_text()
     examples = Path(place.stdout.strip()).parent / "examples" / "virtual"
     run("init", "lab")
-    run("simulate", examples / "session_plan.toml", "--out", "session", "--home", "lab")
-    run("calibrate", "session/SESSION.toml", "--home", "lab")
-    run("calibration", "approve", "m15-virtual-r1", "--in-force-from", "2026-03-03", "--checked-by",
-        "second person", "--reason", "the first record of this home", "--home", "lab")  # fmt: skip
     if each:
+        run("simulate", examples / "session_plan.toml", "--out", "session", "--home", "lab")
+        run("calibrate", "session/SESSION.toml", "--home", "lab")
+        run("calibration", "approve", "m15-virtual-r1", "--in-force-from", "2026-03-03", "--checked-by",
+            "second person", "--reason", "the first record of this home", "--home", "lab")  # fmt: skip
         run("simulate", examples / "test_plan.toml", "--out", "test", "--home", "lab")
         run("process", "test", "--out", "test.xlsx", "--home", "lab", codes=(1,))
         run("report", "test.xlsx", "--template", "lab/report_templates/org.docx", "--out", "out",

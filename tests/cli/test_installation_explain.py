@@ -32,9 +32,11 @@ def rules_in(path: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.name)
-def test_every_rule_of_a_module_is_explained(path: Path) -> None:
-    assert rules_in(path) <= rules_catalogue().keys()
+def test_every_rule_of_a_module_is_explained() -> None:
+    explained = rules_catalogue().keys()
+    unexplained = {path.name: lacking for path in SOURCES if (lacking := rules_in(path) - explained)}
+    assert len(SOURCES) > 500
+    assert unexplained == {}
 
 
 def test_the_template_lint_and_the_grades_are_explained() -> None:

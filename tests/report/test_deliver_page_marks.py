@@ -97,8 +97,23 @@ def test_a_record_in_force_leaves_the_headers_alone(tmp_path: Path) -> None:
     assert [one.header._element.xml for one in docx.Document(io.BytesIO(made.docx)).sections] == before
 
 
+UNVERIFIED = dataclasses.replace(USE, draft_reasons=(), unverified=True)
+
+
+def test_an_unverified_record_has_its_mark_in_the_same_headers(tmp_path: Path) -> None:
+    made = fill(read_template(template(tmp_path, odd=True, first=True, own=True)), content(UNVERIFIED), {})
+    assert made.page_mark == UNVERIFIED.mark
+    assert made.page_mark not in (None, MARK)
+    for section in docx.Document(io.BytesIO(made.docx)).sections:
+        for header in (section.header, section.first_page_header, section.even_page_header):
+            assert [one.text for one in header.paragraphs].count(made.page_mark) == 1
+
+
+OTHER = pytest.mark.campaign("another mark in the same headers, which hold it in every run")
+
+
 @office_needed
-@pytest.mark.parametrize("use", [USE, dataclasses.replace(USE, draft_reasons=(), unverified=True)])
+@pytest.mark.parametrize("use", [USE, pytest.param(UNVERIFIED, marks=OTHER)])
 def test_the_pdf_of_a_template_that_nobody_adapted_has_it_on_every_page(
     tmp_path: Path, use: CalibrationUse
 ) -> None:

@@ -13,11 +13,11 @@ from tests.report.template_factory import HASH, W, make, p
 from tests.report.word.test_legible import shape
 from toolkit.errors import RenderError
 from toolkit.report.content import ReportContent
-from toolkit.report.deliver import deliver
+from toolkit.report.deliver import Delivered, Job, deliver, deliver_all
 from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
 from toolkit.report.word.legible import seen
-from toolkit.report.word.package import read_template
+from toolkit.report.word.package import Template, read_template
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")),
@@ -36,10 +36,9 @@ def content() -> ReportContent:
     return build_content(make_result(simulated=True), make_record(), style=Style())
 
 
-@pytest.mark.parametrize("name", HIDING)
-def test_what_the_toolkit_adds_is_read_whatever_the_default_text_looks_like(
-    tmp_path: Path, name: str
-) -> None:
+def hidden(folder: Path, name: str) -> Template:
+    """Return a template whose default text nobody can read."""
+
     def edit(members: dict[str, bytes]) -> None:
         spacing = '<w:spacing w:line="20" w:lineRule="exact"/><w:ind w:left="-20000"/>'
         members["word/styles.xml"] = (
@@ -54,9 +53,27 @@ def test_what_the_toolkit_adds_is_read_whatever_the_default_text_looks_like(
     )
     room = '<w:spacing w:line="240" w:lineRule="auto"/><w:ind w:left="0"/>'
     body = f"<w:p><w:pPr>{room}</w:pPr><w:r><w:rPr>{look}</w:rPr><w:t>{HASH}</w:t></w:r></w:p>"
-    delivered = deliver(
-        read_template(make(tmp_path, body, hash_=False, edit=edit)), content(), tmp_path / "out"
-    )
+    folder.mkdir()
+    return read_template(make(folder, body, hash_=False, edit=edit))
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Delivered]:
+    """A document of each template, all of them converted in one call of LibreOffice."""
+    work = tmp_path_factory.mktemp("hiding")
+    jobs = [
+        Job(template=hidden(work / str(at), name), content=content(), out=work / "out", name=f"hiding-{at}")
+        for at, name in enumerate(HIDING)
+    ]
+    answers = [answer for answer in deliver_all(jobs) if isinstance(answer, Delivered)]
+    return dict(zip(HIDING, answers, strict=True))
+
+
+@pytest.mark.parametrize("name", HIDING)
+def test_what_the_toolkit_adds_is_read_whatever_the_default_text_looks_like(
+    printed: dict[str, Delivered], name: str
+) -> None:
+    delivered = printed[name]
     (mark,) = [entry.text for entry in delivered.filled.manifest if entry.tag == "mark:simulated"]
     (closing,) = [entry.text for entry in delivered.filled.manifest if entry.tag == "closing:signature"]
     assert closing == "Signature: unsigned"

@@ -36,7 +36,7 @@ ALL = (
     "creep.FY=fraction:0.02,time_constant:5s", "hysteresis.FY=50N", "nonlinearity.FY=cubic:3e-9",
     "sensitivity_error.MZ=2%",
 )  # fmt: skip
-USUAL = ("steer_offset=0.1deg",)
+USUAL = ("crosstalk.FZ.FY=0.01",)
 
 
 @pytest.fixture(scope="module")

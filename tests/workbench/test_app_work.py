@@ -106,6 +106,9 @@ def test_make_a_report_from_an_own_template(browser: BrowserContext, bench: Serv
     page.close()
 
 
+@pytest.mark.campaign(
+    "a whole work in the browser: every run holds an audit and its repair by their requests"
+)
 def test_find_why_a_file_is_wrong_and_repair_it(browser: BrowserContext, bench: Served) -> None:
     original = put_recording(bench.home / "archive" / "2019")
     before = sha256_file(original)

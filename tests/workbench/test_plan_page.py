@@ -27,13 +27,13 @@ from toolkit.lab.desk.kept_plans import fixtures_of, plan_words, read_plan
 ANSWER = holding_id("diagnoses/late")
 FORMS: dict[str, dict[str, str]] = {
     "session": {"subject": "cell", "u": "", "minutes": "", "loads": "33", "criterion": "I"},
-    "test": {"subject": "", "u": "conicity", "load": "833 lbf, 4 kN", "minutes": ""},
+    "test": {"subject": "", "u": "slope_cornering", "load": "833 lbf, 4 kN", "minutes": ""},
     "next": {"subject": ANSWER, "budget": "20", "limit": ""},
     "interval": {"subject": "cell", "reliability": "0.9", "tests": "100"},
 }
 COMMANDS: dict[str, tuple[str, ...]] = {
     "session": ("cell", "--loads", "33", "--criterion", "I"),
-    "test": ("--u", "conicity", "--load", "833 lbf", "--load", "4 kN"),
+    "test": ("--u", "slope_cornering", "--load", "833 lbf", "--load", "4 kN"),
     "interval": ("cell", "--reliability", "0.9", "--tests", "100"),
 }
 

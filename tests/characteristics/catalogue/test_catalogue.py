@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import subprocess
 import sys
@@ -26,7 +27,7 @@ from toolkit.characteristics.catalogue import (
     summary,
     tables,
 )
-from toolkit.characteristics.characterise import characterise
+from toolkit.characteristics.characterise import Characteristics, characterise
 from toolkit.characteristics.characteristic import (
     COLUMNS,
     CORRECTION,
@@ -93,23 +94,33 @@ def test_it_is_explained(declared: Characteristic, capsys: pytest.CaptureFixture
     assert all(answer.values())
 
 
+@functools.cache
+def _whole(*, swept_too: bool) -> Characteristics:
+    """Return what a whole test gives, with or without recordings in time; once for all characteristics."""
+    sweeps = [sweep for rotation in ROTATIONS for sweep in swept(0.5, rotation=rotation)]
+    return characterise(
+        reduced_test(u=(8.0, 0.3), pressure_Pa=234e3), machine=M15, record=None,
+        sweeps=sweeps if swept_too else (),
+    )  # fmt: skip
+
+
 @EACH
 def test_its_row_has_no_source_that_its_budget_does_not_name(declared: Characteristic) -> None:
-    sweeps = [sweep for rotation in ROTATIONS for sweep in swept(0.5, rotation=rotation)]
-    found = characterise(
-        reduced_test(u=(8.0, 0.3), pressure_Pa=234e3), machine=M15, record=None,
-        sweeps=sweeps if declared.table == TRANSIENT else (),
-    )  # fmt: skip
-    for row in found.of(declared.name):
+    for row in _whole(swept_too=declared.table == TRANSIENT).of(declared.name):
         assert row.estimate is not None, row.lacking
         assert row.estimate.unit == declared.unit
         assert {source for source, _ in row.sources} <= set(declared.budget)
 
 
+@functools.cache
+def _narrow() -> Characteristics:
+    """Return what three slip angles give."""
+    return characterise(reduced_test(angles=(-2.0, 0.0, 2.0)), machine=M15, record=None)
+
+
 @EACH
 def test_a_test_that_lacks_its_needs_says_which(declared: Characteristic) -> None:
-    found = characterise(reduced_test(angles=(-2.0, 0.0, 2.0)), machine=M15, record=None)
-    for row in found.of(declared.name):
+    for row in _narrow().of(declared.name):
         assert row.estimate is None
         assert row.lacking in {need.text for need in declared.needs}
 

@@ -75,6 +75,7 @@ def test_a_hundredth_of_the_range_is_a_sensors_zero_and_a_fifth_of_it_a_force(tm
     assert (effect.name, *effect.equivalent_to) == names
 
 
+@pytest.mark.campaign("the likeliest of equals by its size is held by a carriage in every run")
 def test_a_degree_is_a_zero_of_the_steering_and_no_plies_pull_as_far(tmp_path):
     case = read_case(python_tire(tmp_path, offset=1.0))
     (effect,) = diagnose(case, None).diagnosis.effects

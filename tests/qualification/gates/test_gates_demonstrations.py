@@ -46,8 +46,25 @@ NO_GATE = {
 
 
 @pytest.fixture(scope="module")
-def checks() -> list[Check]:
-    return check_gates(FOLDER)
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The only folder that the demonstrations have: home, temporary files and what they begin in."""
+    return tmp_path_factory.mktemp("alone")
+
+
+@pytest.fixture(scope="module")
+def checks(alone: Path) -> list[Check]:
+    """Every demonstration, once, where a connection is an error."""
+
+    def connect(*_: object) -> None:
+        raise AssertionError("the qualification opened a connection")
+
+    (alone / "tmp").mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(socket.socket, "connect", connect)
+        patch.setattr(tempfile, "tempdir", str(alone / "tmp"))
+        patch.chdir(alone)
+        patch.setenv("HOME", str(alone))
+        return check_gates(FOLDER)
 
 
 def rules_of_source() -> set[str]:
@@ -234,17 +251,9 @@ def test_without_a_record_in_force_there_is_a_failed_check(monkeypatch: pytest.M
 # What they need
 
 
-def test_they_are_offline_and_leave_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def connect(*_: object) -> None:
-        raise AssertionError("the qualification opened a connection")
-
-    monkeypatch.setattr(socket.socket, "connect", connect)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("HOME", str(tmp_path))
-    (tmp_path / "tmp").mkdir()
-    assert all(one.passed for one in check_gates(FOLDER))
-    assert [path.name for path in tmp_path.rglob("*")] == ["tmp"]
+def test_they_are_offline_and_leave_nothing(checks: list[Check], alone: Path) -> None:
+    assert all(one.passed for one in checks)  # none was ended by a connection
+    assert [path.name for path in alone.rglob("*")] == ["tmp"]
 
 
 def test_the_virtual_hub_is_that_of_the_drawing() -> None:
