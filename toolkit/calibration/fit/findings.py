@@ -254,7 +254,7 @@ def _load_findings(load: LoadResult, wrong: tuple[int, ...]) -> list[Finding]:
             off, tolerance = load.check_residuals[row], load.setting.tolerance
             message = f"off by {off:+.4g} {unit}, tolerance {tolerance:.4g} {unit}"
             where = f"{name}, check row {row + 1}"
-            findings.append(Finding(rule="check-load", where=where, message=message, level="error"))
+            findings.append(Finding(rule="check-load", where=where, message=message))
     return findings
 
 

@@ -154,10 +154,10 @@ def calibrate(
         judged = judge(
             unnumbered, history=history, machine=definition, loads=session.table, check=session.check
         )
-        present = {(finding.rule, finding.where) for finding in findings}
-        findings += tuple(
-            result.finding() for result in judged.results if (result.rule, result.where) not in present
-        )
+        # What a gate says takes the place of the same in the session's own words: its level is the gate's.
+        by_gates = {(result.rule, result.where): result.finding() for result in judged.results}
+        findings = tuple(by_gates.pop((one.rule, one.where), one) for one in findings)
+        findings += tuple(by_gates.values())
     return Candidate(
         record=record,
         path=folder / f"{record.id}.json",

@@ -134,10 +134,19 @@ APPROVALS: tuple[Demonstration, ...] = (
     ),
     _approval("one serial stated for two cells", "serial", Session(
         serials={"D51": "QUALIFY-D52"}, reading=1), reason="D51 was exchanged"),
-    _approval('zero = "tared" with 0.7 mV/V left on D51', "tared", Session(offsets={"D51": 0.7})),
+    _approval('zero = "tared" with 0.7 mV/V left on D51', "coarse-uncertainty tared",
+              Session(offsets={"D51": 0.7})),
     _approval(
-        'zero = "tared" with 0.7 mV/V left on D51, no row at zero load', "tared",
+        'zero = "tared" with 0.7 mV/V left on D51, no row at zero load', "coarse-uncertainty tared",
         Session(offsets={"D51": 0.7}, zero_rows=False),
+    ),
+    _approval(
+        "0.5 mV/V stated as the standard uncertainty of E5", "coarse-uncertainty",
+        Session(text='u = { value = 0.5, unit = "mV/V" }\n'),
+    ),
+    _approval(
+        "a reference of U = 0", "reference-zero",
+        Session(text='[reference.uncertainty]\nFY = { U = 0.0, k = 2, unit = "N" }\n'),
     ),
     _approval("check loads 1 % off", "check-load", Session(check_factors={"FY": 1.01})),
     _approval(
