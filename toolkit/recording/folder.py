@@ -131,7 +131,7 @@ class Tare:
     u: Annotated[
         tuple[tuple[str, float], ...] | None, Keyed(), Unit(plain=True), AtLeast(0),
         Entry("standard uncertainty of every value; without it, that of a row of the recordings",
-              example={"D51": 0.0001}),
+              example={"D51": 0.0001}, together="values"),
     ] = None  # fmt: skip
 
     def faults(self) -> Iterator[Fault]:
