@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,8 +28,7 @@ def mostly_unknown(search: Search) -> bool:
     what was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with
     a size that no cell has.
 
-    Nothing outweighs effects that take more of an output's unseen rows than they leave there: a coloured
-    noise weighs slow errors little, however large they are.
+    Nothing outweighs effects that take more of an output's unseen rows than they leave there.
     """
     if search.steps and implausible(search) and not _takes_nearly_all(search):
         return True
@@ -42,7 +41,7 @@ def mostly_unknown(search: Search) -> bool:
         return False
     if outsized(search):
         return True
-    if any(each.removed > min(VERDICT.nearly * each.above, each.left) for each in shown):
+    if any(removed > VERDICT.nearly * above for removed, above in shown) or _takes_more_than_is_left(search):
         return False
     unexplained = max(
         (structure.gain / 2 for structure in search.structure if not structure.rest), default=0.0
@@ -52,7 +51,7 @@ def mostly_unknown(search: Search) -> bool:
         return True
     if all(step.active.effect.from_digits for step in search.steps):
         return not search.steps  # read off the digits: it does not imitate anything
-    return bool(shown) and all(each.removed < VERDICT.taken * each.above for each in shown)
+    return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
 
 
 def _is_smooth(search: Search) -> bool:
@@ -131,16 +130,8 @@ def _foretells_zeros(search: Search) -> bool:
     return free > 0 and tests * float(beta.sf(max(shares), taken / 2, free / 2)) < SCREENING.alpha
 
 
-class _Share(NamedTuple):
-    """Of an output's held-out mean square: what effects take, what is above the noise, what they leave."""
-
-    removed: float
-    above: float
-    left: float
-
-
-def _taken(search: Search) -> list[_Share]:
-    """Return what effects take of each output.
+def _taken(search: Search) -> list[tuple[float, float]]:
+    """Return what effects take of each output's held-out mean square, and what of it is above the noise.
 
     Outputs that show nothing but noise do not count: of nothing, nothing is two thirds. Where the runs have
     zeros of their own, these are no effect's to take, and every run counts about its own mean.
@@ -157,8 +148,25 @@ def _taken(search: Search) -> list[_Share]:
             )
             before, after, floor = (_within_runs(problem, name, error) for error in errors)
         if before > VERDICT.shown * floor:
-            shown.append(_Share(before - after, before - floor, after))
+            shown.append((before - after, before - floor))
     return shown
+
+
+def _takes_more_than_is_left(search: Search) -> bool:
+    """Tell whether effects take more of an output's unseen rows than they leave there.
+
+    A coloured noise weighs slow errors little, however large they are. About every run's own mean: whatever
+    is left out has one, and some zero takes it.
+    """
+    problem = search.problem
+    for name in problem.names:
+        before, after = (
+            _within_runs(problem, name, problem.observed[name] - held.simulated[name])
+            for held in (search.held_refitted, search.held_augmented)
+        )
+        if before - after > after:
+            return True
+    return False
 
 
 def _takes_nearly_all(search: Search) -> bool:
