@@ -56,7 +56,7 @@ class RejectedEffect(TypedDict):
     """An effect that explains less."""
 
     name: str
-    log_likelihood_less: float | None
+    log_likelihood_less: Annotated[float | None, "at most: one that is far behind is not fitted to its end"]
 
 
 class EffectEvidence(TypedDict):
