@@ -1,6 +1,7 @@
 """An integrating plant that is driven open loop is told as drift-limited, and judged by its rates."""
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.drift import judged_by_rates
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.forward_step import drifts_faster
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 CASE = """schema = 1
@@ -131,6 +133,18 @@ def test_where_positions_are_the_sum_of_what_came_before_their_squares_are_not_m
     problem = problem_of(case, model_of(case, None))
     told = fit(problem)
     assert [told.plain, fit(judged_by_rates(problem, told)).plain] == [True, False]
+
+
+def test_what_leaves_larger_rates_than_before_explains_the_noise_and_not_the_motion(tmp_path):
+    """A likelihood of next rows may rise beside it; of outputs that do not drift it is not asked."""
+    case = written(tmp_path, runs(2, zero=0.3))
+    problem = problem_of(case, model_of(case, None))
+    before = fit(problem)
+    larger = replace(before, residual={"position": 1.01 * before.residual["position"]})
+    drifts = judged_by_rates(problem, before)
+    assert drifts_faster(drifts, before, larger)
+    assert not drifts_faster(drifts, larger, before)
+    assert not drifts_faster(problem, before, larger)
 
 
 @pytest.mark.campaign("fits of dry friction take a minute; the suite holds how a drifting plant is fitted")

@@ -155,6 +155,8 @@ def best_step(
         # One that a later effect drives to its bound is no better than one that starts there.
         if any(at_bound(each) for each in made.active) or not matters(problem, held_base, scores, least):
             continue
+        if drifts_faster(problem, base, made):
+            continue
         if not beyond_form(problem, refitted, held_base, scores, form):
             continue
         if made.active[-1].effect.needs_signal and not _shows(problem, scores, made.active[-1]):
@@ -176,6 +178,19 @@ def best_step(
         rivals=rivals(problem, trial, joint),
     )
     return trial.fit, scores, step
+
+
+def drifts_faster(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Tell whether a fit with more in it leaves larger rates of an output that only drifts.
+
+    Its rows are weighed as those of a coloured noise, by how they follow from the rows before: what makes
+    them likelier and the motion worse explains the noise.
+    """
+    left = (
+        [np.mean(problem.judged(name, made.residual[name]) ** 2) for name in problem.rates]
+        for made in (before, after)
+    )
+    return any(more > less for less, more in zip(*left, strict=True))
 
 
 def _leaves_more_than_noise(problem: Problem, made: Fit) -> bool:

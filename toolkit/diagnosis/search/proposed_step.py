@@ -17,6 +17,7 @@ from toolkit.diagnosis.search.forward_step import (
     at_bound,
     best_step,
     cost,
+    drifts_faster,
     joint_fit,
     joint_fits,
     ranked,
@@ -103,6 +104,8 @@ def _joined(
         return None
     gained = held_out.total - held_base.total
     if gained < count * STEP.least_gain or not matters(problem, held_base, held_out, max(least, PAIRS.least)):
+        return None
+    if drifts_faster(problem, base, joint):
         return None
     steps = []
     for scored, member in zip(members, joint.active[-count:], strict=True):
