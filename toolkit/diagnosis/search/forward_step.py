@@ -145,6 +145,8 @@ def best_step(
             standing[0][0].fit.log_posterior - base.log_posterior
         ):
             continue
+        if drifts_faster(problem, base, made):
+            continue
         try:
             scores = hold_out(problem, folds, made.active, made)
         except FitError:
@@ -154,8 +156,6 @@ def best_step(
             continue
         # One that a later effect drives to its bound is no better than one that starts there.
         if any(at_bound(each) for each in made.active) or not matters(problem, held_base, scores, least):
-            continue
-        if drifts_faster(problem, base, made):
             continue
         if not beyond_form(problem, refitted, held_base, scores, form):
             continue

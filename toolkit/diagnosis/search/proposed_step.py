@@ -98,14 +98,14 @@ def _joined(
     joint = joint_fit(problem, base, [scored.active for scored in members], begin=members[0].p)
     if joint is None or any(at_bound(applied) for applied in joint.active):
         return None
+    if drifts_faster(problem, base, joint):
+        return None
     try:
         held_out = hold_out(problem, folds, joint.active, joint)
     except FitError:
         return None
     gained = held_out.total - held_base.total
     if gained < count * STEP.least_gain or not matters(problem, held_base, held_out, max(least, PAIRS.least)):
-        return None
-    if drifts_faster(problem, base, joint):
         return None
     steps = []
     for scored, member in zip(members, joint.active[-count:], strict=True):
