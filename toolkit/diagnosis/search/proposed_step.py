@@ -115,7 +115,8 @@ def _joined(
                 scores = hold_out(problem, folds, instead.active, instead)
             except FitError:
                 scores = None
-            if scores is None or scores.total < held_out.total - STEP.least_gain:
+            worse = scores is None or scores.total < held_out.total - STEP.least_gain
+            if scores is None or worse or drifts_faster(problem, joint, instead):
                 active = member
             else:
                 joint, held_out = instead, scores
