@@ -10,6 +10,7 @@ import re
 import tomllib
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -138,7 +139,17 @@ def test_a_batch_of_before_is_drawn_again_from_its_seed() -> None:
     assert order == [row["bucket"] for row in sorted(rows, key=lambda row: row["index"])]
     case = next(row for row in rows if row["bucket"] == "two" and row["family"] == "drive-force")
     again = draw_case(proof.seed, case["index"], "two").answer | {"index": case["index"]}
-    assert json.loads(json.dumps(again)) == case
+    # Another processor's fused sums differ in the last digit of a drawn size.
+    assert rounded(json.loads(json.dumps(again))) == rounded(case)
+
+
+def rounded(value: Any) -> Any:
+    """Return JSON values with numbers to twelve digits."""
+    if isinstance(value, dict):
+        return {name: rounded(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [rounded(part) for part in value]
+    return float(f"{value:.12g}") if isinstance(value, float) else value
 
 
 @pytest.mark.parametrize("family", ["tire-machine", "tire-python", "drive-force", "thermal", "beam-python"])

@@ -78,9 +78,10 @@ class Term:
     ``of`` is what it depends on. ``law`` is a term of any states, inputs and the time, which ``reads`` names.
     ``on_place`` says of a term of the position that it may also enter the
     equation of a state that is a place itself. ``drives`` says that it is told as it stands in the equation
-    of its own output, and not as a resistance. ``shares`` are those of its usual size at which the response
-    of an integrated motion is taken: a motion answers a small force in proportion; one that is as large as it
-    may ever be has another phase, or comes to rest.
+    of its own output, and not as a resistance. ``spill`` names the parameter that says which share of what a
+    limit holds back arrives in the one other state that this state feeds. ``shares`` are those of its usual
+    size at which the response of an integrated motion is taken: a motion answers a small force in proportion;
+    one that is as large as it may ever be has another phase, or comes to rest.
     """
 
     of: Literal["nothing", "velocity", "position", "state"]
@@ -93,6 +94,7 @@ class Term:
     pattern: PatternHook | None = None
     on_place: bool = False
     drives: bool = False
+    spill: str | None = None
     shares: tuple[float, ...] = (1.0, 0.1)
 
 

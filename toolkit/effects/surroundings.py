@@ -17,7 +17,8 @@ class MotionSizes:
 
     ``force``, ``speed`` and ``place`` are what terms are scaled by; ``fastest`` and ``farthest`` the largest
     magnitudes of speed and position, ``level`` the largest value that may run over. ``has_position`` tells
-    whether the equation has the position itself, or only its rate.
+    whether the equation has the position itself, or only its rate. ``feeds`` is the one other state whose
+    rate depends on this one, None where there is none or there are several.
     """
 
     force: float
@@ -27,6 +28,7 @@ class MotionSizes:
     farthest: float
     level: float
     has_position: bool
+    feeds: str | None = None
 
 
 class Surroundings(Protocol):

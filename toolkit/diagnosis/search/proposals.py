@@ -369,6 +369,10 @@ class _PredictionErrors:
                 force[rows.start : rows.stop - 1] = 0.0
         force[self._ends] = 0.0
         added = -self._followed.entry[:, :, at].T[:, None, :] * force.T[None]
+        spilt = self._spilt(candidate, start.values)
+        if spilt is not None:
+            to, share = spilt
+            added += share * self._followed.entry[:, :, to].T[:, None, :] * force.T[None]
         answers = self._followed.answers(added)[self._read]
         return np.vstack([answers, np.zeros((len(self._problem.free), answers.shape[1]))])
 
@@ -389,6 +393,14 @@ class _PredictionErrors:
         values = (start.values,) if candidate.has_pattern else start.directions
         force = TermPattern(((candidate.active.effect, tuple(values)),))(signals)
         return np.asarray(0.5 * (force[1:] + force[:-1]))
+
+    def _spilt(self, candidate: CandidateEffect, values: Values) -> tuple[int, float] | None:
+        """Return the state to which a part of what is held back comes, and which part."""
+        term = candidate.active.effect.term
+        to = CaseView(self._problem, candidate.active.channel).motion.feeds
+        if term is None or term.spill is None or to not in self._names:
+            return None
+        return self._names.index(to), values.get(term.spill, 0.0)
 
     def _held_up(self, candidate: CandidateEffect, values: Values, at: int) -> Array:
         """Return by how much a limit lowers the mean rate of a state that rises, (rows - 1,)."""

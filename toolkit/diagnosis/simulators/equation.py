@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     RatesAt = Callable[[Array, Array], Array]
 
 _TRIED = 16  # rows
+_POINTS = 4  # at which it is asked what a rate depends on
 
 
 class Inputs:
@@ -107,6 +109,24 @@ class Equation:
                 ):
                     found[j] = i
         return found
+
+    def feeds(self, p: Mapping[str, float]) -> dict[int, int]:
+        """Return state -> the other state whose rate depends on it, of states that have just one such."""
+        rng = np.random.default_rng(0)
+        run = self.case.runs[0]
+        u = {name: float(run.columns[name][0]) for name in self._drivers}
+        start = self.start(run, p)
+        depends = np.zeros((len(start), len(start)), dtype=bool)  # rate of the row's state on the column's
+        for _ in range(_POINTS):
+            x = start + 0.1 * np.maximum(np.abs(start), 1e-3) * rng.normal(size=len(start))
+            points = np.tile(x, (len(x) + 1, 1))
+            points[1:] += 0.1 * np.diag(np.maximum(np.abs(start), 1e-3))
+            rates = np.full_like(points, np.nan)
+            with contextlib.suppress(Exception, SystemExit):  # not every point is one of the plant's
+                rates[:] = [self.rhs(float(run.t[0]), at, dict(u), dict(p)) for at in points]
+            depends |= (np.isfinite(rates[1:]) & (rates[1:] != rates[0])).T
+        np.fill_diagonal(depends, False)
+        return {i: int(np.argmax(depends[:, i])) for i in range(len(start)) if depends[:, i].sum() == 1}
 
     def rates(self, run: Run, p: dict[str, float], forces: Forces, own: int) -> Callable[..., Any]:
         """Return (time, state) -> rate with forces in it; ``own`` states come before those of the forces."""

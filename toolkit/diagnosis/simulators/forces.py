@@ -37,7 +37,8 @@ class Force:
 
     ``bristle`` is its bend's place among the added states, ``way`` that of its body's way where no state of
     the equation is it; ``scale`` is the size of the velocity state (of the state itself, where it has no
-    position). ``reads`` are the signals of a law by name, with the place of those that are states.
+    position). ``reads`` are the signals of a law by name, with the place of those that are states; ``feeds``
+    is the state to which a part of what is held back may come.
     """
 
     velocity: int
@@ -47,6 +48,7 @@ class Force:
     scale: float
     active: AppliedEffect
     reads: tuple[tuple[str, int | None], ...] = ()
+    feeds: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,7 @@ class Forces:
         derivative_of: Mapping[int, int],
         scale: Mapping[str, tuple[float, float]],
         inputs: Sequence[str] = (),
+        feeds: Mapping[int, int] | None = None,
     ) -> Forces:
         """Return the forces of effects on an equation's states, which see its inputs too.
 
@@ -88,6 +91,7 @@ class Forces:
                     scale=scale[states[at]][1],
                     active=one,
                     reads=_reads(one, states, at, derivative_of.get(at, at), inputs),
+                    feeds=(feeds or {}).get(at),
                 )
             )
         return Forces(tuple(made), added)
@@ -148,7 +152,10 @@ def _add(force: Force, x: Array, rate: Array, own: int, seen: Seen) -> None:
     if term is None:
         return
     if term.limit is not None:
-        rate[i] = np.where(rate[i] > 0, rate[i] * term.limit(x[i], force.scale, values), rate[i])
+        held_back = np.maximum(rate[i], 0.0) * (1.0 - term.limit(x[i], force.scale, values))
+        rate[i] -= held_back
+        if term.spill is not None and force.feeds is not None:
+            rate[force.feeds] += values.get(term.spill, 0.0) * held_back
     elif force.bristle is not None and term.bristle is not None:
         size, reach = term.bristle(values)
         v, bend = x[i], x[own + force.bristle]

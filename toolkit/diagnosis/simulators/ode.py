@@ -92,6 +92,8 @@ class OdeModel:
                 got=", ".join(unknown), expected=", ".join(names), next_step="correct the name", rule="case",
             )  # fmt: skip
         self.derivative_of = self.equation.kinematics(p)
+        # A place moves nothing into its own rate.
+        self.feeds = {i: j for i, j in self.equation.feeds(p).items() if self.derivative_of.get(j) != i}
         self.force_units = terms or {
             name: "" for i, name in enumerate(names) if i not in self.derivative_of.values()
         }
@@ -156,10 +158,12 @@ class OdeModel:
         position = self.position_of(state)
         place = size if position is None else self.scale[position][1]
         fastest, farthest = self._reach[state]
+        at = self.feeds.get(self.states.index(state))
         return MotionSizes(
             force=rate, speed=size, place=place, fastest=fastest, farthest=farthest,
             # A state that starts at zero and only falls has no level to run over.
             level=self._largest[state] or place, has_position=position is not None,
+            feeds=None if at is None else self.states[at],
         )  # fmt: skip
 
     def _motion_units(self, channel: str | None) -> tuple[str, str, str]:
@@ -391,7 +395,7 @@ class OdeModel:
 
     def forces(self, active: Sequence[AppliedEffect]) -> Forces:
         """Return effects as forces on the equation's states."""
-        return Forces.of(active, self.states, self.derivative_of, self.scale, self.drivers)
+        return Forces.of(active, self.states, self.derivative_of, self.scale, self.drivers, self.feeds)
 
     def _made(
         self,

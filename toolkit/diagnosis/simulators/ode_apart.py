@@ -188,6 +188,7 @@ def handlers_of(case: Case, model: Model) -> Handlers:
                 list(moving.units(channel)),
                 [float(length) for length in moving.way(channel)],
                 moving.position(channel),
+                motion.feeds,
             ]
         ranges = [[state.name, state.unit, list(state.quantiles)] for state in moving.states]
         return [places, motions, ranges]
@@ -287,12 +288,16 @@ def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion], t
     return places, motions, states
 
 
-def _motion(sizes: Sequence[float], units: Sequence[str], way: Sequence[float], rate_of: object) -> _Motion:
+def _motion(
+    sizes: Sequence[float], units: Sequence[str], way: Sequence[float], rate_of: object, feeds: object
+) -> _Motion:
     *numbers, has_position = map(float, sizes)
     force, velocity, position = map(str, units)
     longest, usual = map(float, way)
     return _Motion(
-        sizes=MotionSizes(**dict(zip(_SIZES, numbers, strict=True)), has_position=bool(has_position)),
+        sizes=MotionSizes(
+            **dict(zip(_SIZES, numbers, strict=True)), has_position=bool(has_position), feeds=_text(feeds)
+        ),
         units=(force, velocity, position),
         way=(longest, usual),
         position=_text(rate_of),
