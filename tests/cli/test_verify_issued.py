@@ -92,6 +92,8 @@ def test_what_was_issued_holds(issued: Issued, kind: str, suffix: str) -> None:
     assert (verdict.ledger, verdict.still_holds) == ("continues", True)
     if (kind, suffix) == ("plain", ".pdf"):
         # Its own bytes stand in no entry: the words of the page may be anybody's.
+        assert "nothing proves that what it shows is what was issued" in verdict.line
+        assert "; still holds;" not in verdict.line
         assert (verdict.signature, verdict.code) == ("unsigned", 1)
         return
     assert (verdict.signature, verdict.code) == ("valid", 0), verdict.why
@@ -184,6 +186,8 @@ def test_an_entry_forged_behind_the_issue_does_not_pass_for_a_sound_ledger(issue
     verdict = issued.verify(issued.file("plain", ".docx"))
     assert (verdict.ledger, verdict.still_holds, verdict.code) == ("continues", False, 1)
     assert "not signed" in verdict.why
+    # Asked for the ledger alone: what does not hold by itself continues nothing.
+    assert issued.continuity(issued.file("plain", ".pdf")) == "unknown"
 
 
 def test_a_changed_file_is_none_of_the_issue(issued: Issued) -> None:

@@ -206,6 +206,8 @@ def test_without_history_machine_or_reading_nothing_is_approved(empty: Registry,
     assert rules(made, "note") == {"polarity-reading"}
     decision = approve(empty, "hub-r1", in_force_from=dt.date(2026, 2, 1), checked_by="B")
     assert failed(decision) == {"polarity-reading"}
+    # What the session only asks for refuses the approval: no script may take that for one.
+    assert {finding.level for finding in decision.findings} == {"error"}
     for name in (*LOADS, *CELLS):
         assert name in decision.failed[0].message
 

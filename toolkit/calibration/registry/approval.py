@@ -6,7 +6,7 @@ Both only add a line to the ledger.
 from __future__ import annotations
 
 import datetime as dt
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.record import from_bytes
@@ -110,7 +110,8 @@ def approve(
         failed = judged.failed
         check, loads = stored_check(registry.folder, record), stored_loads(registry.folder, record)
         terms = gates.unverifiable(record, check, loads)
-        findings = tuple(result.finding() for result in failed)
+        # What a session only asks for refuses an approval as an error does.
+        findings = tuple(replace(result, effect="blocks").finding() for result in failed)
         evidence = (
             *judged.evidence,
             *(f"{result.rule}: {result.where}: {result.message}" for result in judged.told),

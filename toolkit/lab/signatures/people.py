@@ -16,7 +16,7 @@ from toolkit.calibration.registry.witnessed import ORIGIN
 from toolkit.errors import RegistryError, ToolkitError, TrustError
 from toolkit.files import write_atomic
 from toolkit.inputs import PDF_FILE, read_regular
-from toolkit.lab.signatures.proofs import anchor_in, ledgers_of, raw_lines
+from toolkit.lab.signatures.proofs import anchor_in, damage_of, ledgers_of, raw_lines
 from toolkit.publication import check_file
 from toolkit.trust.anchor import Comparison, anchor_of, compare
 from toolkit.trust.checkpoint import SUFFIX, Checkpoint, countersign, parse_checkpoint, place, remembered
@@ -291,7 +291,9 @@ def check_against(registry: Registry, instrument: str | None, document: Path) ->
     if anchor is None and data.startswith(b"%PDF-"):
         if instrument is None:
             raise _without(document, "no proof")
-        return instrument, _printed(raw_lines(registry, instrument), document)
+        return instrument, _of_sound(
+            registry, instrument, _printed(raw_lines(registry, instrument), document)
+        )
     if anchor is not None:
         checkpoint = anchor.checkpoint
     else:
@@ -304,7 +306,18 @@ def check_against(registry: Registry, instrument: str | None, document: Path) ->
             "forked", "the document's own proof does not hold: it was changed"
         )
     # A ledger that is damaged is compared, too: where it broke is what was asked.
-    return instrument_named, compare(raw_lines(registry, instrument_named), checkpoint, anchor)
+    compared = compare(raw_lines(registry, instrument_named), checkpoint, anchor)
+    return instrument_named, _of_sound(registry, instrument_named, compared)
+
+
+def _of_sound(registry: Registry, instrument: str, compared: Comparison) -> Comparison:
+    """Return a comparison that stands: a ledger that does not hold by itself continues nothing."""
+    if compared.continuity != "continues":
+        return compared
+    damage = damage_of(registry, instrument)
+    if damage is None:
+        return compared
+    return Comparison("unknown", f"the ledger is damaged: {damage}; of its older lines: {compared.why}")
 
 
 def witness(

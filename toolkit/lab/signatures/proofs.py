@@ -170,15 +170,29 @@ def _continuity(registry: Registry, anchor: Anchor) -> LedgerState:
     if comparison.continuity != "continues":
         why = f"the ledger of {instrument}: {comparison.why}"
         return LedgerState(ledger=comparison.continuity, still_holds=False, why=why)
+    damage = damage_of(registry, instrument)
+    if damage is not None:
+        why = f"the ledger of {instrument} is damaged: {damage}"
+        return LedgerState(ledger="continues", still_holds=False, why=why)
     if instrument not in registry.instruments():
-        registry.people()  # every version of it is proved
         why = f"entry {anchor.index + 1} of the log of people"
         return LedgerState(ledger="continues", why=why, signature="valid")
     ledger = registry.ledger(instrument)
-    if ledger.damage is not None:
-        why = f"the ledger of {instrument} is damaged: {ledger.damage}"
-        return LedgerState(ledger="continues", still_holds=False, why=why)
     return _signed(registry, ledger.entries[anchor.index], ledger.void)
+
+
+def damage_of(registry: Registry, instrument: str) -> str | None:
+    """Return why a ledger does not hold by itself, whatever a document says of it; None where it does.
+
+    Raises
+    ------
+    TrustError
+        ``people-log``: the log of people is damaged
+    """
+    if instrument not in registry.instruments():
+        registry.people()  # every version of it is proved
+        return None
+    return registry.ledger(instrument).damage
 
 
 def _signed(registry: Registry, entry: Entry, void: frozenset[int]) -> LedgerState:

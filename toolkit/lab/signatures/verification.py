@@ -38,6 +38,7 @@ from toolkit.trust.seal.x509 import Trust
 from toolkit.trust.seal.xml import check_xml, content_hash
 
 _DCC = "{https://ptb.de/dcc}"
+_UNPROVED = "nothing proves that what it shows is what was issued; of what it names"
 _BESIDE = ("*.pdf", "manifest.json")
 """What proves a file without a seal, in the same folder."""
 
@@ -78,6 +79,8 @@ class Verdict:
             if part
         )
         holds = {True: "still holds", False: "no longer holds", None: ""}[self.still_holds]
+        if self.still_holds and _UNPROVED in self.why:
+            holds = "the records that it names still hold"
         parts = [f"{self.signature.upper():<9} {self.kind}", issued, holds, self.why]
         return f"{self.file}: " + "; ".join(part for part in parts if part)
 
@@ -345,9 +348,11 @@ def _verdict(
         return replace(verdict, why=proof.broken)
     state = ledger(_names(proof), proof.anchor)
     time = "time as stated by the signer" if check.at and not check.stamped else ""
+    # The records that bytes name may hold; that these are the bytes that were issued, nothing says.
+    unproved = _UNPROVED if check.signature == "unsigned" and not entered else ""
     verdict = replace(
         verdict, signature=check.signature, ledger=state.ledger, still_holds=state.still_holds,
-        why="; ".join(part for part in (check.why, time, state.why) if part),
+        why="; ".join(part for part in (check.why, unproved, time, state.why) if part),
     )  # fmt: skip
     if entered and check.signature == "unsigned":
         return replace(
