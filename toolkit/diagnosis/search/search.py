@@ -171,6 +171,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     try:
         for turn in range(STEP.most_effects + 1):
             share = STEP.later if turn else STEP.first
+            base, steps = _with_a_size(problem, base, steps)
 
             def fitting(scored: Sequence[Scored], turn: int = turn) -> None:
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in scored))
