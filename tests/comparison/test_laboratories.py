@@ -270,7 +270,8 @@ def test_one_wild_result_of_any_size_leaves_algorithm_a_where_it_was(wild: float
 def test_no_robust_spread_is_where_most_results_are_equal(wild: float) -> None:
     assert algorithm_a(np.array([5.1, 5.1, 5.1, 5.1, 5.1, wild])).sd == 0
     assert algorithm_a(np.array([5.1, 5.1, 5.1, 5.2, 5.0, wild])).sd > 0.01
-    results = [Results(laboratory=name, values=(value,)) for name, value in zip("ABCDE", [5.1] * 4 + [wild])]
+    values = [5.1] * 4 + [wild]
+    results = [Results(laboratory=name, values=(v,)) for name, v in zip("ABCDE", values, strict=True)]
     with pytest.raises(ConfigError, match="more than half of the results are equal"):
         compare_laboratories({"F": results}, unit="N", reference=None, sigma=None)
 
