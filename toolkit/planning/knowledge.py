@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.rounding import rounding_of
+from toolkit.calibration.fit.row_noise import weighed_rows
 from toolkit.calibration.fit.run_scatter import spread
 from toolkit.calibration.fit.session_rows import HIGHEST_POWER, SessionRows
 from toolkit.calibration.records.scatter import RunScatter, rows_of
@@ -253,9 +255,10 @@ class Knowledge:
         # A gain is a part of the load: rows that end lower have less of it at their largest.
         gain = sizes.gain * rows.largest / fit.largest
         runs = dataclasses.replace(sizes, gain=gain, groups=rows.groups, dof=rows.dof)
-        return dataclasses.replace(
-            noise, runs=runs, spread=spread(rows, runs), rows=rows_of(design, rows.load, rows.group)
+        planned = weighed_rows(
+            design, rows.load, rows.group, None, rounding=rounding_of(self.record, fit, table)
         )
+        return dataclasses.replace(noise, runs=runs, spread=spread(rows, runs), rows=planned)
 
     def _budgets(self, scatters: list[Scatter], table: Table) -> tuple[Budget, ...]:
         # The record that the planned rows will make ends where they end: no budget of it lies beyond.
