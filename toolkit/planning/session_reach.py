@@ -16,8 +16,9 @@ import numpy as np
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.planning.fixtures import FeasibleLoads
 
 AS_READ = 0.02
 """Of the largest load: what loads of one weight differ by as they are read, and not as they are meant."""
@@ -61,10 +62,10 @@ def calibrated_interval(fit: LoadFit) -> tuple[float, float]:
     return min(fit.minimum or 0.0, 0.0), max(fit.maximum or 0.0, 0.0)
 
 
-def reach_of(record: CalibrationRecord, feasible: FeasibleLoads) -> tuple[Reach, ...]:
-    """Return how far each load may go, in the record's order."""
+def reach_of(record: CalibrationRecord, feasible: NDArray[np.float64]) -> tuple[Reach, ...]:
+    """Return how far each load may go, by feasible loads (candidates, loads) in the record's order."""
     reached = []
-    for fit, loads in zip(record.loads, feasible.loads.T, strict=True):
+    for fit, loads in zip(record.loads, feasible.T, strict=True):
         low, high = calibrated_interval(fit)
         reached.append(
             Reach(
@@ -76,11 +77,11 @@ def reach_of(record: CalibrationRecord, feasible: FeasibleLoads) -> tuple[Reach,
 
 
 def stated_loads(
-    reach: Sequence[Reach], feasible: FeasibleLoads, at: Mapping[str, float]
+    reach: Sequence[Reach], feasible: NDArray[np.float64], at: Mapping[str, float]
 ) -> tuple[float, ...]:
     """Return the load at which U of each is stated: as asked for, no farther than it reaches."""
     stated = []
-    for one, loads in zip(reach, feasible.loads.T, strict=True):
+    for one, loads in zip(reach, feasible.T, strict=True):
         value = min(max(at.get(one.load, one.end), one.low), one.high)
         # What hangs there, where it is the same: a row has to reach it, and units were converted.
         nearest = float(loads[np.argmin(np.abs(loads - value))])

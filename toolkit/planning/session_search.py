@@ -83,8 +83,8 @@ class SessionSearch:
 
     def __init__(self, knowledge: Knowledge, feasible: FeasibleLoads, demand: Demand) -> None:
         self.feasible, self.demand = feasible, demand
-        self.reach = reach_of(knowledge.record, feasible)
-        self.stated = stated_loads(self.reach, feasible, dict(demand.at))
+        self.reach = reach_of(knowledge.record, feasible.loads)
+        self.stated = stated_loads(self.reach, feasible.loads, dict(demand.at))
         self.knowledge = knowledge = knowledge.stated_at(self.stated)
         down = feasible.unloadable()
         self.place = np.concatenate([np.arange(len(feasible.loads)), down])
