@@ -292,3 +292,23 @@ def test_a_plan_from_a_candidate_is_a_draft_that_is_asked_for(tmp_path: Path) ->
     due = toolkit("plan", "interval", "cell", "--home", home, code=2)
     assert "approve" in due.stderr
     assert "--draft" not in due.stderr
+
+
+@pytest.mark.parametrize(
+    ("demand", "said"),
+    [
+        ("FY=9", "NUMBER UNIT"),
+        ("FY=9 %", "unit"),
+        ("FY=1 N at 0 N", "other than 0"),
+        ("FY=1 N at 4", "NUMBER"),
+    ],
+)
+def test_a_demand_states_its_units(home: Path, demand: str, said: str) -> None:
+    refused = toolkit("plan", "session", "m15-virtual", "--u", demand, "--home", home, code=2)
+    assert said in refused.stderr
+
+
+def test_temperature_and_polarity_stand_in_the_planned_session(planned: tuple[Path, dict[str, Any]]) -> None:
+    text = (planned[0] / "SESSION.toml").read_text()
+    assert "temperature = { value = 21.0" in text
+    assert "state what this session finds" in text

@@ -257,3 +257,38 @@ def test_unit_and_origin_do_not_matter() -> None:
 def test_results_that_are_nearly_all_the_same_have_no_spread() -> None:
     assert algorithm_a(np.array([5.0] * 9 + [6.0])).sd == 0
     assert algorithm_a(np.array([5.0] * 5)).sd == 0
+
+
+@pytest.mark.parametrize("wild", [1e2, 1e4, 1e5, 1e6, 1e9, 1e15])
+def test_one_wild_result_of_any_size_leaves_algorithm_a_where_it_was(wild: float) -> None:
+    """Expected from an iteration that was written apart: 0.17647."""
+    robust = algorithm_a(np.array([5.05, 4.95, 5.025, 5.15, 4.9, wild]))
+    assert robust.sd == pytest.approx(0.17647, abs=5e-6)
+
+
+@pytest.mark.parametrize("wild", [6.0, 1e6, 1e12])
+def test_no_robust_spread_is_where_most_results_are_equal(wild: float) -> None:
+    assert algorithm_a(np.array([5.1, 5.1, 5.1, 5.1, 5.1, wild])).sd == 0
+    assert algorithm_a(np.array([5.1, 5.1, 5.1, 5.2, 5.0, wild])).sd > 0.01
+    values = [5.1] * 4 + [wild]
+    results = [Results(laboratory=name, values=(v,)) for name, v in zip("ABCDE", values, strict=True)]
+    with pytest.raises(ConfigError, match="more than half of the results are equal"):
+        compare_laboratories({"F": results}, unit="N", reference=None, sigma=None)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-9, 1e9])
+def test_equal_repeats_have_no_scatter(size: float) -> None:
+    """The mean of three times 5.4 is not 5.4 in binary: what is left is no scatter."""
+    levels = (5.0, 5.1, 5.2, 5.3, 5.4, 5.5)
+    results = [
+        Results(laboratory=name, values=(level * size,) * 3)
+        for name, level in zip("ABCDEF", levels, strict=True)
+    ]
+    compared = compare_laboratories({"F": results}, unit="N", reference=None, sigma=None)
+    assert "laboratory-outlier" not in {finding.rule for finding in compared.findings}
+    precision = compared.measurands[0].precision
+    assert precision is not None
+    assert precision.s_r is not None
+    assert precision.s_r.value == 0
+    assert precision.cochran_p is None
+    assert {score.k for score in compared.measurands[0].scores} == {None}

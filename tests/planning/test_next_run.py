@@ -137,3 +137,38 @@ def test_the_budget_ends_the_search(tmp_path: Path) -> None:
     spent = RunSearch(problem=posed, members=members, limits={}, until=lambda: False)
     assert spent.best() == Change(run="r0.csv")
     assert len(T) == posed.runs[0].rows
+
+
+def steady_slide(folder: Path) -> Path:
+    """Write a case whose speed never turns, with its acceleration: Coulomb friction is a constant."""
+    v = 1.0 + 0.5 * np.sin(2 * np.pi * 0.5 * T)
+    a = np.gradient(v, T)
+    recorded = pd.DataFrame({"t": T, "u": v, "a": a, "F": 3.0 * v})
+    case = write_case(folder)
+    for name, gain in (("r0.csv", 3.0), ("r1.csv", 3.1)):
+        (recorded * [1, 1, 1, gain / 3]).to_csv(folder / name, index=False)
+    text = case.read_text().replace(
+        'u = { unit = "mm", role = "input" }',
+        'u = { unit = "mm/s", role = "input" }\na = { unit = "mm/s^2", role = "input" }',
+    )
+    case.write_text(text)
+    return case
+
+
+def test_an_input_with_its_rate_is_driven_through_zero(tmp_path: Path) -> None:
+    posed = problem(steady_slide(tmp_path))
+    limits = {"u": (-2.0, 2.0), "a": (-2.0, 2.0)}
+    # Of a sine the rate's rate is the sine again, its sign turned: only one of the two is the other's rate.
+    assert dict(movable(posed, limits)) == {"u": None, "a": "u"}
+    run = changed(posed, Change(run="r0.csv", mirrored=("u",)), limits)
+    assert run is not None
+    np.testing.assert_allclose(run.columns["u"], -posed.runs[0].columns["u"], atol=1e-9)
+    np.testing.assert_allclose(run.columns["a"], -posed.runs[0].columns["a"], atol=1e-9)
+    lower = changed(posed, Change(run="r0.csv", levels=(("u", "low"),)), limits)
+    assert lower is not None
+    assert lower.columns["u"].min() == pytest.approx(-2.0)
+    np.testing.assert_allclose(lower.columns["a"], posed.runs[0].columns["a"], atol=1e-9)
+    search = RunSearch(problem=posed, members=(), limits=limits)
+    offered = [change for factor in search.factors(Change(run="r0.csv")) for change in factor]
+    assert Change(run="r0.csv", mirrored=("u",)) in offered
+    assert Change(run="r0.csv", mirrored=("u",)).words()[1] == "u with its sign turned"

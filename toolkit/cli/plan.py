@@ -63,7 +63,9 @@ def session(
     demands: Annotated[
         list[str] | None,
         typer.Option(
-            "--u", metavar="LOAD=U", help='U asked for at the largest load, "FY=20 N"; once a load.'
+            "--u",
+            metavar="LOAD=U",
+            help='U asked for at the largest load, "FY=20 N", or at another, "FY=20 N at 4 kN"; once a load.',
         ),
     ] = None,
     minutes: Annotated[

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from toolkit.characteristics.catalogue import compared
 from toolkit.characteristics.model import Row
@@ -60,6 +60,22 @@ def two_sided_p(value: float, u: float, dof: float) -> float | None:
     return float(2 * (ndtr(t) if math.isinf(dof) else stdtr(dof, t)))
 
 
+ROUNDED = 16 * float(np.finfo(np.float64).eps)
+
+
+def deviations(values: ArrayLike) -> NDArray[np.float64]:
+    """Return how far values (n,) lie from their mean; zeros where they differ by no more than rounding.
+
+    >>> deviations([5.4, 5.4, 5.4 + 1e-15]).tolist(), deviations([1.0, 3.0]).tolist()
+    ([0.0, 0.0, 0.0], [-1.0, 1.0])
+    """
+    array = np.asarray(values, dtype=np.float64)
+    apart = array - array[0]  # of equal values nothing is left, whatever their size
+    if np.ptp(apart) <= ROUNDED * np.abs(array).max():
+        return np.zeros_like(array)
+    return np.asarray(apart - apart.mean())
+
+
 def grubbs_p(values: NDArray[np.float64]) -> float | None:
     """Return the two-sided p of the value farthest from the mean (Grubbs, Technometrics 11, 1969, 1-21).
 
@@ -70,10 +86,14 @@ def grubbs_p(values: NDArray[np.float64]) -> float | None:
     """
     from scipy.special import stdtr
 
-    n, s = len(values), float(values.std(ddof=1)) if len(values) > 1 else 0.0
-    if n < 3 or s <= 0:
+    n = len(values)
+    if n < 3:
         return None
-    G = float(np.max(np.abs(values - values.mean()))) / s
+    off = deviations(values)
+    s = math.sqrt(float(off @ off) / (n - 1))
+    if s <= 0:
+        return None
+    G = float(np.max(np.abs(off))) / s
     remainder = (n - 1) ** 2 - n * G * G
     if remainder <= 0:
         return 0.0

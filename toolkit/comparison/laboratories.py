@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from toolkit.comparison.differences import grubbs_p
+from toolkit.comparison.differences import ROUNDED, deviations, grubbs_p
 from toolkit.comparison.model import Spread
 from toolkit.comparison.precision import Consistency, Departure, consistencies, factor_spread, spread
 from toolkit.errors import ConfigError
@@ -36,6 +36,7 @@ FACTOR = 1.134  # as the standard prints it; 1.1334 of a normal distribution cut
 _CUT = 1.5
 _MAD = 1.483
 _SAME = 1e-10
+_VANISHED = 1e-6
 _MOST_STEPS = 10_000
 
 
@@ -56,26 +57,33 @@ class Robust:
 def algorithm_a(values: NDArray[np.float64], *, factor: float = FACTOR) -> Robust:
     """Return the robust mean and standard deviation of results (n,), by iteration until they stay.
 
-    Where more than half of the results are the same the iteration begins with their ordinary standard
-    deviation; it may then end in 0.
+    It begins with the median and the scaled median absolute deviation, and settles by its own s*: how far the
+    wildest result lies decides nothing. Where more than half of the results are the same that deviation is 0,
+    and the ordinary one is taken to begin with; it may then end in 0.
 
     >>> clean = algorithm_a(np.array([9.9, 10.0, 10.1, 10.0, 9.8, 10.2]))
     >>> spoilt = algorithm_a(np.array([9.9, 10.0, 10.1, 10.0, 9.8, 99.0]))
     >>> abs(clean.mean - spoilt.mean) < 0.1
     True
     """
-    mean = float(np.median(values))
-    sd = _MAD * float(np.median(np.abs(values - mean))) or float(values.std(ddof=1))
-    scale = max(float(np.abs(values - mean).max()), 1e-300)
+    median = float(np.median(values))
+    off = values - median  # from here on: results that lie near each other keep their digits
+    off[np.abs(off) <= ROUNDED * abs(median)] = 0.0
+    sizes = np.abs(off[off != 0])
+    if not sizes.size:
+        return Robust(mean=median, sd=0.0, n=len(values))
+    mean, sd = 0.0, _MAD * float(np.median(np.abs(off))) or float(off.std(ddof=1))
+    nothing = _VANISHED * float(sizes.min())  # of what the nearest of the others lies apart
     for _ in range(_MOST_STEPS):
-        near = np.clip(values, mean - _CUT * sd, mean + _CUT * sd)
+        near = np.clip(off, mean - _CUT * sd, mean + _CUT * sd)
         after, spread = float(near.mean()), factor * float(near.std(ddof=1))
-        settled = abs(after - mean) <= _SAME * scale and abs(spread - sd) <= _SAME * scale
+        settled = abs(after - mean) <= _SAME * sd and abs(spread - sd) <= _SAME * sd
         mean, sd = after, spread
-        if settled:
+        if sd <= nothing:
+            mean = sd = 0.0
+        if settled or not sd:
             break
-    sd = 0.0 if sd <= 1e-6 * scale else sd
-    return Robust(mean=mean, sd=sd, n=len(values))
+    return Robust(mean=median + mean, sd=sd, n=len(values))
 
 
 Signal = Literal["action", "warning"]
@@ -99,7 +107,8 @@ class Results:
     @property
     def mean(self) -> float:
         """Mean of its results."""
-        return math.fsum(self.values) / len(self.values)
+        first = self.values[0]  # the mean of equal results is that result
+        return first + math.fsum(value - first for value in self.values) / len(self.values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,10 +236,15 @@ def _measurand(
     if sigma is None and robust is not None and robust.n >= FEWEST and robust.sd > 0:
         sigma_pt, sigma_by = robust.sd, "robust standard deviation (algorithm A)"
     else:
-        sigma_pt, sigma_by = sigma, "stated" if sigma is not None else "not stated, too few to tell"
+        few = robust is None or robust.n < FEWEST
+        lacking = "too few to tell" if few else "most results are equal (s* = 0)"
+        sigma_pt, sigma_by = sigma, "stated" if sigma is not None else f"not stated, {lacking}"
     if sigma_pt is None and reference is None:
         raise _refused(
-            name, "the laboratories' results have no spread to score by", "s* = 0", "--sigma VALUE"
+            name,
+            "the laboratories' results have no spread to score by",
+            "s* = 0: more than half of the results are equal",
+            "--sigma VALUE",
         )
     alike = consistencies([entry.values for entry in taking_part])
     return Measurand(
@@ -273,7 +287,7 @@ def method_precision(results: Sequence[Results]) -> MethodPrecision:
     between = factor_spread(values, owners, factor="laboratory")
     dof = len(values) - len(results)
     within = math.sqrt(
-        sum(float(np.sum((np.array(entry.values) - entry.mean) ** 2)) for entry in results) / dof
+        sum(float(np.sum(deviations(entry.values) ** 2)) for entry in results) / dof
     ) if dof else None  # fmt: skip
     means = np.array([entry.mean for entry in results])
     cochran = cochran_p(results)
@@ -285,7 +299,7 @@ def method_precision(results: Sequence[Results]) -> MethodPrecision:
         cochran_p=None if cochran is None else cochran[1],
         cochran_laboratory=None if cochran is None else cochran[0],
         grubbs_p=grubbs_p(means),
-        grubbs_laboratory=results[int(np.argmax(np.abs(means - means.mean())))].laboratory,
+        grubbs_laboratory=results[int(np.argmax(np.abs(deviations(means))))].laboratory,
     )  # fmt: skip
 
 
@@ -302,7 +316,9 @@ def cochran_p(results: Sequence[Results]) -> tuple[str, float] | None:
     repeated = [entry for entry in results if len(entry.values) > 1]
     if len(repeated) < 2:
         return None
-    variances = np.array([np.var(entry.values, ddof=1) for entry in repeated])
+    variances = np.array(
+        [float(np.sum(deviations(entry.values) ** 2)) / (len(entry.values) - 1) for entry in repeated]
+    )
     if not variances.any():
         return None
     n, p = max(set(sizes), key=lambda size: (sizes.count(size), size)), len(repeated)

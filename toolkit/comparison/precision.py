@@ -35,7 +35,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.comparison.differences import Series, at_load, grubbs_p, holm, series_of
+from toolkit.comparison.differences import Series, at_load, deviations, grubbs_p, holm, series_of
 from toolkit.comparison.model import Entry, Factor, FactorSpread, Precision, Repeats, Spread
 
 FACTORS = ("day", "operator", "mounting", "calibration", "machine", "laboratory")
@@ -139,7 +139,7 @@ def _within(values: NDArray[np.float64], levels: Sequence[Hashable]) -> tuple[fl
     squares, dof = 0.0, 0
     for level in dict.fromkeys(levels):
         members = values[[entry == level for entry in levels]]
-        squares += float(np.sum((members - members.mean()) ** 2))
+        squares += float(np.sum(deviations(members) ** 2))
         dof += len(members) - 1
     return (squares / dof if dof else 0.0), dof
 
@@ -155,11 +155,12 @@ def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, fa
     p = len(sizes)
     if p == N:
         # Every test has a level of its own: the spread of all is the intermediate precision itself.
-        s = float(values.std(ddof=1))
+        s = math.sqrt(float(np.sum(deviations(values) ** 2)) / (N - 1))
         return FactorSpread(factor=factor, levels=p, s=s, s_between=None, F=None, p=None)
     within, dof = _within(values, levels)
-    means = np.array([values[[entry == level for entry in levels]].mean() for level in dict.fromkeys(levels)])
-    between = float(np.sum(sizes * (means - values.mean()) ** 2)) / (p - 1)
+    off = deviations(values)
+    means = np.array([off[[entry == level for entry in levels]].mean() for level in dict.fromkeys(levels)])
+    between = float(np.sum(sizes * means**2)) / (p - 1)
     n0 = (N - float(np.sum(sizes**2)) / N) / (p - 1)
     s_between = math.sqrt(max(0.0, (between - within) / n0))
     F = between / within if within > 0 else None
@@ -228,15 +229,16 @@ def consistencies(results: Sequence[Sequence[float]]) -> tuple[Consistency, ...]
     >>> [round(laboratory.h, 3) for laboratory in consistencies([[1.0], [2.0], [6.0]])]
     [-0.756, -0.378, 1.134]
     """
-    means = np.array([math.fsum(values) / len(values) for values in results])
-    p, scatter = len(means), float(means.std(ddof=1)) if len(means) > 1 else 0.0
+    p = len(results)
+    off = deviations([values[0] + float(np.mean(np.subtract(values, values[0]))) for values in results])
+    scatter = math.sqrt(float(off @ off) / (p - 1)) if p > 1 else 0.0
     dofs = [len(values) - 1 for values in results]
-    squares = [float(np.sum((np.array(values) - np.mean(values)) ** 2)) for values in results]
+    squares = [float(np.sum(deviations(values) ** 2)) for values in results]
     repeated = sum(dof > 0 for dof in dofs) > 1 and sum(squares) > 0
     s_r = math.sqrt(sum(squares) / sum(dofs)) if repeated else math.nan
     laboratories = []
-    for mean, dof, square in zip(means, dofs, squares, strict=True):
-        h = float((mean - means.mean()) / scatter) if p >= FEWEST and scatter > 0 else None
+    for apart, dof, square in zip(off.tolist(), dofs, squares, strict=True):
+        h = apart / scatter if p >= FEWEST and scatter > 0 else None
         k = math.sqrt(square / dof) / s_r if repeated and dof else None
         h_limits = [h_limit(p, level) for level in (STRAGGLER, OUTLIER)] if h is not None else []
         k_limits = [k_limit(dof, sum(dofs), level) for level in (STRAGGLER, OUTLIER)] if k is not None else []

@@ -27,12 +27,20 @@ _INDEPENDENT = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verification:
-    """Whether check loads show a term: ``movement`` is how many tolerances a load moves by it."""
+    """Whether check loads show a term: ``movement`` is how many tolerances a load moves by it.
+
+    The intercept moves all of them alike: it is told from the slopes by the rank of the check loads alone.
+    """
 
     load: Annotated[str, Entry("symbol of the load")]
     term: Annotated[str, Entry("of its equation")]
-    movement: Annotated[float, Entry("tolerances by which a check load moves the load by the term")]
-    verified: Annotated[bool, Entry("whether that is five or more")]
+    movement: Annotated[
+        float | None,
+        Entry("tolerances by which check loads move the load by the term; null of the intercept"),
+    ]
+    verified: Annotated[
+        bool, Entry("whether that is five or more; of the intercept, whether the rank is full")
+    ]
 
 
 def choose_check_loads(
@@ -69,7 +77,7 @@ def verification(knowledge: Knowledge, check: NDArray[np.float64]) -> tuple[Veri
         )
         results += [
             Verification(
-                load=fit.load, term=term, movement=float(size),
+                load=fit.load, term=term, movement=None if term == INTERCEPT else float(size),
                 verified=full and (term == INTERCEPT or float(size) > VERIFIED),
             )
             for term, size in zip(fit.terms, moved, strict=True)

@@ -11,6 +11,7 @@ import numpy as np
 
 from toolkit.declared import Quantity
 from toolkit.errors import ConfigError
+from toolkit.planning.session_reach import AS_READ, calibrated_interval
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 _NONE: Mapping[str, float] = MappingProxyType({})
 _BEYOND = 1.1  # of the largest load that was put on: further the record says nothing of the cells
-_SAME_DIRECTION = 0.02  # of a load that was put on before, in parts of the largest: as read, not as meant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,7 +65,8 @@ def loads_of_fixtures(
     """Return the loads of declared fixtures in the record's units.
 
     A load may be as large as its stated limit, else as the instrument's rated one [N, N*m], else a tenth
-    above the largest of the record.
+    above the largest of the record; in a sense that was calibrated less far, by as much less, and in one
+    that was not, not at all.
 
     Raises
     ------
@@ -89,6 +90,7 @@ def loads_of_fixtures(
         [bounds[fit.load] / scale[fit.load] if fit.load in bounds else _BEYOND * fit.largest
          for fit in record.loads]
     )  # fmt: skip
+    low, high = _bounds(record, limits)
     rows, mounts, labels, amounts, minutes = [np.zeros(len(names))], [""], ["no load"], [0.0], [0.0]
     setup: dict[str, float] = {}
     refused = 0
@@ -98,7 +100,7 @@ def loads_of_fixtures(
             mount = fixture.name + ("" if not fixture.both else ", +" if sign > 0 else ", -")
             for weight in sorted(fixture.weights_N):
                 load = sign * arms * weight + 0.0  # no -0 in anything that is written
-                if (np.abs(load) > limits * (1 + 1e-9)).any():
+                if ((load < low * (1 + 1e-9)) | (load > high * (1 + 1e-9))).any():
                     refused += 1
                     continue
                 rows.append(load)
@@ -111,11 +113,15 @@ def loads_of_fixtures(
         raise ConfigError(
             "the limits leave no weight of any fixture", where=path,
             got=f"{refused} loads, each beyond a limit",
-            expected="loads of at most "
+            expected="loads within "
             + ", ".join(
-                f"{fit.load} {limit:.4g} {fit.unit}" for fit, limit in zip(record.loads, limits, strict=True)
-            ),
-            next_step="state weights that the instrument may bear; nothing was written", rule="plan-fixtures",
+                f"{fit.load} {one:.4g} to {other:.4g} {fit.unit}"
+                for fit, one, other in zip(record.loads, low.tolist(), high.tolist(), strict=True)
+            )
+            + f", as {record.id} is calibrated",
+            next_step="state weights, and the sign of per_newton, that the instrument may bear and is "
+            "calibrated for; nothing was written",
+            rule="plan-fixtures",
         )  # fmt: skip
     minutes[0] = float(np.mean(minutes[1:]))
     return FeasibleLoads(
@@ -123,6 +129,21 @@ def loads_of_fixtures(
         amount=np.array(amounts), minutes=np.array(minutes), setup_minutes=setup,
         run_minutes=stated.run_minutes, refused=refused,
     )  # fmt: skip
+
+
+def _bounds(
+    record: CalibrationRecord, limits: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and the highest load (loads,) that may be put on, by limits of their sizes (loads,).
+
+    Each sense goes as much beyond what was calibrated of it as the largest load may; what a fixture makes of
+    a load aside, as small as loads differ as they are read, is allowed.
+    """
+    ends = np.array([calibrated_interval(fit) for fit in record.loads]).T
+    largest = np.array([fit.largest for fit in record.loads])
+    sizes = np.maximum(np.abs(ends) * np.maximum(limits / largest, 1.0), AS_READ * largest)
+    low, high = np.minimum(sizes, limits)
+    return -low, high
 
 
 def _written(weight: float) -> str:
@@ -139,11 +160,11 @@ def loads_of_record(record: CalibrationRecord, tables: list[Table]) -> FeasibleL
     names = [fit.load for fit in record.loads]
     largest = np.array([fit.largest for fit in record.loads])
     parts = np.concatenate([table.matrix(names) for table in tables]) / largest
-    parts = np.round(parts / _SAME_DIRECTION) * _SAME_DIRECTION
+    parts = np.round(parts / AS_READ) * AS_READ
     _, first = np.unique(parts, axis=0, return_index=True)
     loads = np.concatenate([table.matrix(names) for table in tables])[np.sort(first)]
     size = np.abs(loads / largest).max(axis=1)
-    loaded = size > _SAME_DIRECTION
+    loaded = size > AS_READ
     loads, size = loads[loaded], size[loaded]
     mounts = [_direction(load, names) for load in loads / largest / size[:, None]]
     return FeasibleLoads(

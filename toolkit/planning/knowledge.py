@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.rounding import rounding_of
+from toolkit.calibration.fit.row_noise import weighed_rows
 from toolkit.calibration.fit.run_scatter import spread
 from toolkit.calibration.fit.session_rows import HIGHEST_POWER, SessionRows
 from toolkit.calibration.records.scatter import RunScatter, rows_of
@@ -25,6 +27,8 @@ from toolkit.estimate import coverage_factor
 from toolkit.planning.row_exchange import Response
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
@@ -45,7 +49,8 @@ class Knowledge:
 
     ``runs`` is the scatter that a plan takes (`cautious`).
 
-    ``plane`` (loads + 1, indications) makes indications of loads, ``today`` is the budget at the largest.
+    ``plane`` (loads + 1, indications) makes indications of loads, ``at`` are the loads at which U is stated,
+    None the largest of the record's range, and ``today`` the budgets there.
     """
 
     record: CalibrationRecord
@@ -55,6 +60,7 @@ class Knowledge:
     scatter: tuple[Scatter, ...]
     runs: tuple[RunScatter, ...]
     today: tuple[Budget, ...]
+    at: tuple[float | None, ...] = ()
 
     @classmethod
     def of(cls, record: CalibrationRecord, loads: Table, check: Table | None) -> Knowledge:
@@ -86,6 +92,14 @@ class Knowledge:
                 for fit, noise in zip(record.loads, scatter, strict=True)
             ),
         )  # fmt: skip
+
+    def stated_at(self, at: Sequence[float]) -> Knowledge:
+        """Return the same with U stated at these loads, in the record's order and units."""
+        today = (
+            calibration_budget(self.record, self.loads, self.check, fit.load, value, scatter=noise)
+            for (fit, noise), value in zip(self._pairs(), at, strict=True)
+        )
+        return dataclasses.replace(self, at=tuple(at), today=tuple(today))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -144,8 +158,14 @@ class Knowledge:
         )
 
     def expected(self, table: Table) -> tuple[Budget, ...]:
-        """Return the budgets at the largest loads that planned rows make, scattering as `runs` has it."""
-        return self._budgets([self._planned(at, table) for at in range(len(self.names))])
+        """Return the budgets that planned rows make where U is stated, scattering as `runs` has it.
+
+        Raises
+        ------
+        SessionError
+            ``budget``: the rows do not reach a load at which U is stated
+        """
+        return self._budgets([self._planned(at, table) for at in range(len(self.names))], table)
 
     def likely(self, table: Table) -> tuple[Budget, ...]:
         """Return the budgets of planned rows where runs differ as the record says, without `cautious`."""
@@ -182,10 +202,10 @@ class Knowledge:
             scatter_of(self.record, drawn, dataclasses.replace(fit, scatter=None))
             for fit in self.record.loads
         ]
-        return self._budgets(scatters)
+        return self._budgets(scatters, table)
 
     def visible_misfit(self, table: Table) -> tuple[float | None, ...]:
-        """Return of each load the misfit, at the largest load, that planned rows show in 80 % of sessions.
+        """Return of each load the misfit, at the rows' largest, that planned rows show in 80 % of sessions.
 
         The misfit is the lowest power of the load, from the square on, that neither the equation's terms nor
         the zeros of the runs make; None where the rows have too few levels for any.
@@ -197,14 +217,15 @@ class Knowledge:
             zeros = (run[:, None] == np.unique(run)).astype(np.float64)
             basis = np.linalg.svd(_unit_columns(np.column_stack([design, zeros])), full_matrices=False)
             q = basis[0][:, basis[1] > _DEPENDENT * basis[1][0]]
-            relative = table.column(fit.load) / fit.largest
+            applied = table.column(fit.load)
+            relative = applied / (float(np.abs(applied).max()) or 1.0)
             rests = [relative**power - q @ (q.T @ relative**power) for power in _POWERS]
             squares = [float(rest @ rest) for rest in rests if rest @ rest > _DEPENDENT * table.rows]
             sizes.append(noise.runs.within * math.sqrt(DETECTABLE / squares[0]) if squares else None)
         return tuple(sizes)
 
     def weights(self, table: Table) -> NDArray[np.float64]:
-        """Return what a unit error of every planned row makes of each load at its largest (loads, rows)."""
+        """Return what a unit error of every planned row makes where U is stated (loads, rows)."""
         weights = []
         for fit, budget in zip(self.record.loads, self.today, strict=True):
             design = term_matrix(fit.terms, table.columns(self.record.indications))
@@ -219,7 +240,7 @@ class Knowledge:
         return np.array([table.column(fit.load) / fit.largest for fit in self.record.loads])
 
     def floor(self, at: int) -> float:
-        """Return U of a load at its largest were its coefficients and its scatter known."""
+        """Return U of a load, where it is stated, were its coefficients and its scatter known."""
         apart = [part.u**2 for part in self.today[at].components if part.name != "fit"]
         return math.sqrt(math.fsum(apart)) * coverage_factor(math.inf)
 
@@ -230,15 +251,26 @@ class Knowledge:
         fit, noise = self.record.loads[at], self.scatter[at]
         design = term_matrix(fit.terms, table.columns(self.record.indications))
         rows = SessionRows.of(design, table.column(fit.load), table, self.record.zero)
-        runs = dataclasses.replace(self.runs[at], groups=rows.groups, dof=rows.dof)
-        return dataclasses.replace(
-            noise, runs=runs, spread=spread(rows, runs), rows=rows_of(design, rows.load, rows.group)
+        sizes = self.runs[at]
+        # A gain is a part of the load: rows that end lower have less of it at their largest.
+        gain = sizes.gain * rows.largest / fit.largest
+        runs = dataclasses.replace(sizes, gain=gain, groups=rows.groups, dof=rows.dof)
+        planned = weighed_rows(
+            design, rows.load, rows.group, None, rounding=rounding_of(self.record, fit, table)
         )
+        return dataclasses.replace(noise, runs=runs, spread=spread(rows, runs), rows=planned)
 
-    def _budgets(self, scatters: list[Scatter]) -> tuple[Budget, ...]:
+    def _budgets(self, scatters: list[Scatter], table: Table) -> tuple[Budget, ...]:
+        # The record that the planned rows will make ends where they end: no budget of it lies beyond.
+        ends = [table.column(name) for name in self.names]
+        fits = tuple(
+            dataclasses.replace(fit, minimum=float(applied.min()), maximum=float(applied.max()))
+            for fit, applied in zip(self.record.loads, ends, strict=True)
+        )
+        record = dataclasses.replace(self.record, loads=fits)
         return tuple(
-            calibration_budget(self.record, self.loads, self.check, fit.load, scatter=scatter)
-            for fit, scatter in zip(self.record.loads, scatters, strict=True)
+            calibration_budget(record, self.loads, self.check, fit.load, at, scatter=scatter)
+            for fit, scatter, at in zip(fits, scatters, self.at or (None,) * len(fits), strict=True)
         )
 
 

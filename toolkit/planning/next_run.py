@@ -1,10 +1,10 @@
 """The run that parts members of a class: a search over what can be changed of the runs that were made.
 
 A run is a recording of the case with factors changed one by one (`exchange`): how fast its inputs
-go, how far, which of them alone moves, a condition such as the way the drum turns or how the tire stands on
-its hub. Inputs stay within what was recorded, or within limits that are given. A channel that is another
-one's rate of change stays that. A covariate is measured and not set: it goes on as it was recorded, unless a
-limit is given, which says that it can be set.
+go, how far, which way, which of them alone moves, a condition such as the way the drum turns or how the tire
+stands on its hub. Inputs stay within what was recorded, or within limits that are given. A channel that is
+another one's rate of change stays that. A covariate is measured and not set: it goes on as it was recorded,
+unless a limit is given, which says that it can be set.
 """
 
 from __future__ import annotations
@@ -49,13 +49,15 @@ _TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
 class Change:
     """What is changed of a recording: nothing by default.
 
-    ``rate`` of the inputs, ``sizes`` of each about its middle, ``levels`` of those that are moved to
-    an end of their limits, ``conditions`` that differ.
+    ``rate`` of the inputs, ``sizes`` of each about its middle, ``mirrored`` those whose sign is turned, rates
+    of change with them, ``levels`` of those that are moved to an end of their limits, ``conditions`` that
+    differ.
     """
 
     run: str
     rate: float = 1.0
     sizes: tuple[tuple[str, float], ...] = ()
+    mirrored: tuple[str, ...] = ()
     levels: tuple[tuple[str, Level], ...] = ()
     conditions: tuple[tuple[str, str], ...] = ()
 
@@ -69,6 +71,7 @@ class Change:
                 statements.append(
                     f"{name} held at its middle" if size == 0 else f"{name} {size:g} times as far"
                 )
+        statements += [f"{name} with its sign turned" for name in self.mirrored]
         statements += [f"{name} as {level} as its limits allow" for name, level in self.levels]
         statements += [f"{key}: {value}" for key, value in self.conditions]
         return tuple(statements)
@@ -176,6 +179,10 @@ class RunSearch:
             factors.append(
                 tuple(dataclasses.replace(change, sizes=(*sizes, (name, size))) for size in _SIZES)
             )
+            others = tuple(entry for entry in change.mirrored if entry != name)
+            factors.append(
+                tuple(dataclasses.replace(change, mirrored=turned) for turned in (others, (*others, name)))
+            )
             flat = tuple(entry for entry in change.levels if entry[0] != name)
             moved = (dataclasses.replace(change, levels=(*flat, (name, level))) for level in _LEVELS)
             factors.append((dataclasses.replace(change, levels=flat), *moved))
@@ -257,7 +264,9 @@ def _source(run: Run, name: str, names: Sequence[str]) -> str | None:
         rate = np.gradient(run.columns[source], run.t)
         rate = rate - rate.mean()
         size = float(np.sum(rate**2) * np.sum(column**2))
-        if size > 0 and float(np.sum(rate * column)) ** 2 / size > _IS_RATE:
+        # Of a sine the rate's rate is the sine again, with its sign turned: it is not what drives it.
+        follows = float(np.sum(rate * column))
+        if size > 0 and follows > 0 and follows**2 / size > _IS_RATE:
             return source
     return None
 
@@ -282,6 +291,8 @@ def changed(problem: Problem, change: Change, limits: Limits) -> Run | None:
         turn = np.where(back, -1.0, 1.0) ** depth * change.rate**depth
         size = sizes.get(_root(name, sources), 1.0)
         column = middle + size * (moved * turn - middle)
+        if _root(name, sources) in change.mirrored:
+            column = -column
         low, high = limits.get(name, reach(problem, name))
         if name in levels:
             column = column + (low - column.min() if levels[name] == "low" else high - column.max())

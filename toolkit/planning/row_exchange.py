@@ -26,6 +26,7 @@ from toolkit.planning.exchange import Alternatives, best_of, exchanged
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+_LACKING = 1e6  # of a run in which a span is lacking: more than any criterion gains
 _RIDGE = 1e-9  # a first draw may not determine what an exchange will
 
 
@@ -100,6 +101,18 @@ class Price:
         return float(self.minutes[points].sum()) + mounted
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Span:
+    """In so many ``runs`` at least one of some candidates (``among``, one mark a candidate) has to stand."""
+
+    among: NDArray[np.bool_]
+    runs: int
+
+    def lacking(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> int:
+        """Return in how many runs too few they stand in a design."""
+        return max(self.runs - len(np.unique(run[self.among[points]])), 0)
+
+
 def loss(
     responses: Sequence[Response],
     points: NDArray[np.intp],
@@ -133,12 +146,14 @@ def exchange(
     starts: int = 4,
     price: Price | None = None,
     once: bool = False,
+    spans: Sequence[Span] = (),
 ) -> NDArray[np.intp]:
     """Return the candidates (rows,) of the best design found for rows in given runs (numbered from 0).
 
     With a ``price`` the criterion pays for what the rows take; ``once``: no run has a candidate twice.
+    ``spans`` are kept before anything else counts, as far as the rows allow.
     """
-    rows = _Rows(responses=responses, run=run, by=by, price=price, once=once)
+    rows = _Rows(responses=responses, run=run, by=by, price=price, once=once, spans=spans)
     return best_of(
         (rows.drawn(rng) for _ in range(starts)),
         lambda start: exchanged(start, rows.alternatives, lambda: rng.permutation(len(run)).tolist()),
@@ -155,6 +170,7 @@ class _Rows:
     by: Criterion
     price: Price | None
     once: bool
+    spans: Sequence[Span] = ()
 
     def drawn(self, rng: np.random.Generator) -> NDArray[np.intp]:
         """Return a design (rows,) drawn at random."""
@@ -166,6 +182,7 @@ class _Rows:
 
     def loss(self, points: NDArray[np.intp]) -> float:
         value = loss(self.responses, points, self.run, self.by, _RIDGE)
+        value += sum(_LACKING * span.lacking(points, self.run) for span in self.spans)
         return value + (0.0 if self.price is None else self.price.weight * self.price.total(points, self.run))
 
     def alternatives(self, points: NDArray[np.intp], at: int) -> Alternatives[NDArray[np.intp]]:
@@ -174,6 +191,10 @@ class _Rows:
         beside = remaining[run_of_rest == self.run[at]]
         if self.price is not None:
             losses = losses + self.price.added(beside)
+        for span in self.spans:
+            runs = np.unique(run_of_rest[span.among[remaining]])
+            adds = span.among & (self.run[at] not in runs)
+            losses = losses + _LACKING * np.maximum(span.runs - len(runs) - adds, 0)
         if self.once:
             losses[beside] = np.inf
 

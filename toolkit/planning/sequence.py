@@ -26,12 +26,19 @@ def visits(
 ) -> list[NDArray[np.intp]]:
     """Return the rows of a run by mount, each loaded from the smallest up and then down again.
 
+    No load is reached from below before a mount's loads and from above after them: by itself it has no side.
+
     ``points`` (rows of the session,) is the candidate of each row, ``up`` (rows,) its direction.
     """
     by_mount: dict[str, list[int]] = {}
     for row in rows.tolist():
         by_mount.setdefault(feasible.mount[points[row]], []).append(row)
     size = feasible.amount[points]
+    empty = by_mount.pop("", [])
+    if empty:
+        by_mount.setdefault(max(by_mount, key=lambda mount: len(by_mount[mount]), default=""), []).extend(
+            empty
+        )
     return [
         np.array(sorted(group, key=lambda row: (not up[row], size[row] if up[row] else -size[row])))
         for group in by_mount.values()

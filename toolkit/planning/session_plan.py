@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.calibration.standards.cell_rows import e74_points
+from toolkit.calibration.standards.e74 import MIN_POINTS
 from toolkit.declared import Entry
 from toolkit.findings import Finding
 from toolkit.planning.check_loads import Verification, choose_check_loads
@@ -41,6 +43,8 @@ class PlannedLoad:
 class Outlook:
     """What is expected of one load: U at ``at`` today, as asked, as planned, and in nine of ten sessions.
 
+    ``at`` lies inside of what is calibrated and of what is loaded.
+
     ``U`` takes runs to differ by a standard error more than the record says: by it the demand is kept.
     ``U_expected`` takes them as the record says, and is what sessions have on average.
     ``U_repeated`` is what the last session's own loads are expected to give another time.
@@ -51,7 +55,9 @@ class Outlook:
 
     load: Annotated[str, Entry("symbol of the load")]
     unit: Annotated[str, Entry("of every number of it")]
-    at: Annotated[float, Entry("the largest load")]
+    at: Annotated[
+        float, Entry("load at which every U of it is stated: the largest that is reached, or as asked")
+    ]
     U_today: Annotated[float, Entry("by the record")]
     U_repeated: Annotated[float, Entry("expected of the last session's own loads another time")]
     U_asked: Annotated[float | None, Entry("demanded; null where nothing is")]
@@ -238,6 +244,13 @@ class _Finished:
         )
         if blind:
             lines.append(f"no misfit of the equation of {blind} can be seen: the loads have too few levels")
+        lines += self._fewer_points(design)
+        lines += [
+            f"loads beyond {reach.low:.5g} to {reach.high:.5g} {reach.unit} of {reach.load}: "
+            "the next record's range ends there"
+            for reach in self.search.reach
+            if reach.short
+        ]
         if fewer > 0:
             lines.append(f"{fewer} readings fewer than {self.knowledge.record.id}: an outlier weighs more")
         if self.feasible.refused:
@@ -245,6 +258,18 @@ class _Finished:
         if wider:
             lines.append(f"U is wider than by the last session's loads: {', '.join(wider)}")
         return tuple(lines)
+
+    def _fewer_points(self, design: Design) -> list[str]:
+        """Return the loads of which ASTM E74 counts too few points, where it counted enough before."""
+        planned, last = self.search.table(design.points, design.run), self.knowledge.loads
+        names = self.knowledge.names
+        counts = [(name, e74_points(planned, name, names), e74_points(last, name, names)) for name in names]
+        return [
+            f"a class by ASTM E74 of {name}: {now} points as it counts them (loaded, ascending), {before} by "
+            f"the last session, {MIN_POINTS} are needed"
+            for name, now, before in counts
+            if now < MIN_POINTS <= before
+        ]
 
     def _findings(
         self, verified: tuple[Verification, ...], outlook: tuple[Outlook, ...]
@@ -254,10 +279,23 @@ class _Finished:
             Finding(
                 rule="plan-unverified", where=f"{record.id}, {entry.load}",
                 message=f"no feasible load moves {entry.load} by {entry.term} as much as five tolerances "
-                f"({entry.movement:.2g} at most): its sign stays unverified",
+                f"({entry.movement:.2g} at most): its sign stays unverified"
+                if entry.movement is not None
+                else f"the feasible check loads do not tell the intercept of {entry.load} from its slopes",
             )
             for entry in verified
             if not entry.verified
+        ]  # fmt: skip
+        findings += [
+            Finding(
+                rule="plan-range", where=f"{record.id}, {reach.load}",
+                message=f"{reach.load} is loaded from {reach.low:.5g} to {reach.high:.5g} {reach.unit}, "
+                f"where {record.id} is calibrated from "
+                f"{reach.calibrated[0]:.5g} to {reach.calibrated[1]:.5g} {reach.unit}: the next record gives "
+                "no U beyond what is loaded",
+            )
+            for reach in self.search.reach
+            if reach.short
         ]  # fmt: skip
         for load, noise in zip(outlook, self.knowledge.scatter, strict=True):
             sizes = {"drift": load.drift, "creep": load.creep}

@@ -14,7 +14,8 @@ from toolkit.errors import ConfigError
 from toolkit.planning.check_loads import choose_check_loads
 from toolkit.planning.criteria import Criterion
 from toolkit.planning.knowledge import RANK_TOLERANCE
-from toolkit.planning.row_exchange import Price, Response, exchange, loss
+from toolkit.planning.row_exchange import Price, Response, Span, exchange, loss
+from toolkit.planning.session_reach import AS_READ, reach_of, refuse_beyond, stated_loads
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,13 +40,15 @@ _MISFITS = (1.0, 3.0, 10.0, 30.0)  # times the misfit that is allowed for, until
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demand:
-    """What a plan is asked for: U at the largest load [the record's unit] by load; minutes and loads at most.
+    """What a plan is asked for: U [the record's unit] by load; minutes and loads at most.
 
+    U is asked for at the largest load of the record's range, or at the load that ``at`` has for it.
     The check loads count in the minutes, not in the loads. ``simulated`` sessions tell how sure U is.
     ``two_levels`` allows plans at which no misfit of the equations can be seen.
     """
 
     U: tuple[tuple[str, float], ...] = ()
+    at: tuple[tuple[str, float], ...] = ()
     minutes: float | None = None
     loads: int | None = None
     criterion: Criterion = "D"
@@ -79,7 +82,10 @@ class SessionSearch:
     """The search over runs and rows: one exchange for each, their U as the record's own budget has it."""
 
     def __init__(self, knowledge: Knowledge, feasible: FeasibleLoads, demand: Demand) -> None:
-        self.knowledge, self.feasible, self.demand = knowledge, feasible, demand
+        self.feasible, self.demand = feasible, demand
+        self.reach = reach_of(knowledge.record, feasible.loads)
+        self.stated = stated_loads(self.reach, feasible.loads, dict(demand.at))
+        self.knowledge = knowledge = knowledge.stated_at(self.stated)
         down = feasible.unloadable()
         self.place = np.concatenate([np.arange(len(feasible.loads)), down])
         self.loads = feasible.loads[self.place]
@@ -98,7 +104,7 @@ class SessionSearch:
         if demand.loads is not None and demand.loads < FEW_POINTS:
             raise ConfigError(
                 "too few loads for a session", where="--loads", got=demand.loads,
-                expected=f"{FEW_POINTS} loads at least, as ASTM E74 asks for",
+                expected=f"{FEW_POINTS} loads at least: fewer tell scatter and misfit badly",
                 next_step=f"nearest: --loads {FEW_POINTS}", rule="plan-infeasible",
             )  # fmt: skip
         if demand.minutes is not None and feasible.minutes is None:
@@ -108,6 +114,8 @@ class SessionSearch:
                 next_step="state them in a file of fixtures: --fixtures FILE", rule="plan-fixtures",
             )  # fmt: skip
         self._refuse_what_cannot_be_told()
+        refuse_beyond(self.reach, self.stated, dict(demand.U), dict(demand.at))
+        self.spans = self._spans()
         self._refuse_what_shows_no_misfit()
 
     def _refuse_what_cannot_be_told(self) -> None:
@@ -141,6 +149,16 @@ class SessionSearch:
             "(a column of its data, a name in loads), calibrate, and plan from that record",
             rule="plan-record",
         )  # fmt: skip
+
+    def _spans(self) -> list[Span]:
+        """Return what runs must reach: where U is stated in as many as tell them apart, the ends in one."""
+        spans = []
+        for at, (reach, stated) in enumerate(zip(self.reach, self.stated, strict=True)):
+            for end, runs in ((stated, FEWEST_RUNS), (reach.low, 1), (reach.high, 1)):
+                if abs(end) <= AS_READ * reach.largest:
+                    continue
+                spans.append(Span(among=np.sign(end) * self.loads[:, at] >= abs(end), runs=runs))
+        return spans
 
     def _refuse_what_shows_no_misfit(self) -> None:
         """Refuse feasible loads of too few levels, unless that is asked for."""
@@ -182,9 +200,8 @@ class SessionSearch:
         rng = np.random.default_rng([self.demand.seed, runs, per_run])
         for responses in self._bent:
             points = self._points(responses, run, rng, starts)
-            budgets = self.knowledge.expected(self.table(points, run))
             design = Design(
-                points=points, run=run, U=np.array([budget.U for budget in budgets]),
+                points=points, run=run, U=self._expected(points, run),
                 minutes=self.minutes(points, run, self.check),
             )  # fmt: skip
             if self._shows_misfit(design):
@@ -192,13 +209,28 @@ class SessionSearch:
         self._designs[key] = design
         return design
 
+    def _expected(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return U of each load; infinite of rows that do not span the loads at which it is stated."""
+        if any(span.lacking(points, run) for span in self.spans):
+            return np.full(len(self.asked), np.inf)
+        return np.array([budget.U for budget in self.knowledge.expected(self.table(points, run))])
+
     def _points(
         self, responses: Sequence[Response], run: NDArray[np.intp], rng: np.random.Generator, starts: int
     ) -> NDArray[np.intp]:
         """Return the rows of an exchange; where time is stated, with as few mounts as the runs allow."""
 
         def exchanged(price: Price | None) -> NDArray[np.intp]:
-            return exchange(responses, run, self.demand.criterion, rng, starts=starts, price=price, once=True)
+            return exchange(
+                responses,
+                run,
+                self.demand.criterion,
+                rng,
+                starts=starts,
+                price=price,
+                once=True,
+                spans=self.spans,
+            )
 
         points = exchanged(None)
         if self.feasible.setup_minutes is None:

@@ -70,9 +70,8 @@ def test_coefficients_lie_within_their_standard_errors_as_often_as_they_say(tmp_
             record = calibrate(path, Registry(tmp_path / f"r{seed}{stated}")).record
             off = np.abs(np.array(record.load("F").coefficients[:2]) - truth[0])
             inside[stated] += int((off <= 1.96 * np.array(standard_errors(record, "F")[:2])).sum())
-    # Of 60 intervals of 95 %, 53 or more in all but one case of a hundred; unstated, rounding averages away.
-    assert inside[True] >= 53
-    assert inside[False] < 50
+    # Of 60 intervals of 95 %, 53 or more in all but one case of a hundred, the step stated or seen.
+    assert min(inside.values()) >= 53
 
 
 def test_a_record_with_a_stated_resolution_holds_it_and_loads_again(tmp_path: Path) -> None:

@@ -183,7 +183,7 @@ def _data_findings(fit: SessionFit) -> list[Finding]:
     session = fit.session
     table, where = session.table, session.path.name
     if table.rows < FEW_POINTS:
-        message = f"{table.rows} points; ASTM E74 asks for at least {FEW_POINTS}"
+        message = f"{table.rows} rows, fewer than {FEW_POINTS}: they tell scatter and misfit badly"
         findings.append(Finding(rule="few-points", where=where, message=message))
     names = [*session.indications, *(load.name for load in session.loads)]
     rows = table.matrix(names)

@@ -1,4 +1,6 @@
-"""What a stated resolution of indications leaves in the coefficients, however many readings there are.
+"""What rounded indications leave in the coefficients, however many readings there are.
+
+The step is the resolution that is stated, else the one that the readings show (`fit.reading_steps`).
 
 A reading is off by up to half a step r, rectangular: u = r / sqrt(12) (JCGM 100, F.2.2.1). Rounding has no
 noise of its own. Where the noise is below the step, readings of equal size are off by the same amount, of
@@ -52,7 +54,7 @@ class Rounding:
         terms: Sequence[str],
         coefficients: Sequence[float],
     ) -> Rounding | None:
-        """Return the rounding that a session states; None where it states none."""
+        """Return the rounding that a session states or shows; None where it does neither."""
         resolutions = {cell.name: cell.resolution for cell in statements.cells if cell.resolution}
         if not resolutions:
             return None

@@ -15,6 +15,7 @@ from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.printed_digits import rounding_alone
+from toolkit.calibration.fit.reading_steps import with_steps
 from toolkit.calibration.fit.regression import (
     Factor,
     TermFit,
@@ -162,11 +163,13 @@ def fit_session(session: Session) -> SessionFit:
     columns = table.columns(session.indications)
     cells = table.matrix(session.indications)
     groups = replicate_groups(cells)
+    fits = _solved(session, columns)
+    session = with_steps(session, fits)
     return SessionFit(
         session=session,
         loads=tuple(
             _result(session, setting, fit, cells, groups)
-            for setting, fit in zip(session.loads, _solved(session, columns), strict=True)
+            for setting, fit in zip(session.loads, fits, strict=True)
         ),
         condition_number=adequacy.condition_number,
         condition_number_terms=adequacy.condition_number_terms,
@@ -330,17 +333,18 @@ def session_statements(session: Session) -> Statements:
         date=session.date,
         where=session.path,
         columns={cell.name: cell.column_unit or cell.unit for cell in session.cells},
+        steps={cell.name: cell.step for cell in session.cells if cell.step is not None},
     )
 
 
 def _resolution(session: Session, fit: TermFit) -> float:
-    """Return the load that one digit of the coarsest stated cell is worth; 0 where none is stated."""
+    """Return the load that one step of the coarsest cell is worth; 0 where none is known."""
     coefficients = dict(zip(fit.terms, fit.coefficients, strict=True))
     return max(
         (
-            abs(coefficients.get(cell.name, 0.0)) * cell.resolution
+            abs(coefficients.get(cell.name, 0.0)) * step
             for cell in session.cells
-            if cell.resolution
+            if (step := cell.resolution or cell.step)
         ),
         default=0.0,
     )

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.fit.session_fit import SessionFit
+    from toolkit.calibration.session.read import CellSetting
     from toolkit.calibration.session.table import Table
 
 FIRST_YEAR = 1938  # of bonded strain gauges (Simmons, Ruge)
@@ -89,12 +90,14 @@ def direction_conflicts(table: Table, loads: list[str]) -> list[int]:
 
 
 def _resolutions(fit: SessionFit) -> list[Finding]:
-    """Return the stated resolutions whose steps the readings do not keep."""
+    """Return the stated resolutions whose steps the readings do not keep, and steps that nobody stated."""
     session = fit.session
     equations = [(session.terms, load.fit.coefficients, load.fit.residual_sd) for load in fit.loads]
     scatters = own_scatter(session.indications, equations)
     findings = []
     for cell, scatter in zip(session.cells, scatters, strict=True):
+        if cell.step is not None:
+            findings.append(_found_step(cell))
         if cell.resolution is None:
             continue
         off = _off_steps(session.table.column(cell.name), session.table.run, cell.resolution)
@@ -120,6 +123,14 @@ def _resolutions(fit: SessionFit) -> list[Finding]:
             )
         )  # fmt: skip
     return findings
+
+
+def _found_step(cell: CellSetting) -> Finding:
+    return Finding(
+        rule="resolution-found", where=cell.name, level="note",
+        message=f"no resolution is stated, and the readings are whole steps of {cell.step:.4g} {cell.unit} "
+        "apart, with little noise beside it: the step counts as the resolution, in U as if it were stated",
+    )  # fmt: skip
 
 
 def _off_steps(

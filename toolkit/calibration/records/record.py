@@ -37,7 +37,8 @@ class Indication:
     """One load cell's output: its unit, the range of the fitted data in it, its serial number.
 
     ``column_unit`` is the unit of the stored data where they were converted to ``unit`` by the cell's
-    excitation or scale (`session.bridge`); None: the data are in ``unit``.
+    excitation or scale (`session.bridge`); None: the data are in ``unit``. ``step`` is the step of the
+    readings, in ``unit``, that counts as the resolution where none is stated (`fit.reading_steps`).
     """
 
     name: str
@@ -46,6 +47,7 @@ class Indication:
     maximum: float | None = None
     serial: str | None = None
     column_unit: str | None = None
+    step: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -232,7 +234,8 @@ def _cell_content(cell: Indication) -> dict[str, Any]:
         "serial": cell.serial,
     }  # fmt: skip
     # Only where it says something: records of data that needed no conversion keep their hash.
-    return content if cell.column_unit is None else content | {"column_unit": cell.column_unit}
+    further = {"column_unit": cell.column_unit, "step": cell.step}
+    return content | {key: value for key, value in further.items() if value is not None}
 
 
 def _load_content(load: LoadFit) -> dict[str, Any]:
@@ -404,7 +407,9 @@ def _from_content(
         date=content["date"],
         entered_by=content["entered_by"],
         zero=cast("Zero", content["zero"]),
-        cells=tuple(Indication(**cell) for cell in content["cells"]),
+        cells=tuple(
+            Indication(**{**cell, "step": _optional(cell.get("step"), float)}) for cell in content["cells"]
+        ),
         loads=tuple(loads),
         golden=Golden(
             inputs=tuple(_floats(row) for row in golden["inputs"]),

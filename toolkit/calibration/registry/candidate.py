@@ -252,6 +252,7 @@ def _record(fit: SessionFit) -> CalibrationRecord:
                 maximum=high,
                 serial=c.serial,
                 column_unit=c.column_unit,
+                step=c.step,
             )
             for c, (low, high) in zip(session.cells, ranges, strict=True)
         ),

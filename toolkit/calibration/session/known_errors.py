@@ -114,7 +114,7 @@ def known_errors(method: str, statements: Statements, table: Table, load: str, w
         raise wrong(
             where, f"reference.uncertainty.{load}", fault, f"U in the unit of {load}, or a column u_{load}"
         )
-    cells = np.array([_u_cell(c.u, c.resolution, c.name, where) for c in statements.cells])
+    cells = np.array([_u_cell(c.u, c.stated_resolution, c.name, where) for c in statements.cells])
     return KnownErrors(u=u, group=group, u_shared=0.0, proportional=False, u_cells=cells)
 
 

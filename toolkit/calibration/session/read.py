@@ -55,7 +55,8 @@ class LoadSetting:
 class CellSetting:
     """One indication: the unit of the fit, serial number, and resolution in that unit (None: not stated).
 
-    ``column_unit`` is the unit in the file where it was converted (`bridge`), None where it is ``unit``.
+    ``column_unit`` is the unit in the file where it was converted (`bridge`), None where it is ``unit``;
+    ``step`` what the fit finds in the readings where none is stated (`fit.reading_steps`).
     """
 
     name: str
@@ -63,6 +64,7 @@ class CellSetting:
     serial: str | None
     resolution: float | None
     column_unit: str | None = None
+    step: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

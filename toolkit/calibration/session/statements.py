@@ -11,6 +11,7 @@ import datetime as dt
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
+
+
+_NONE: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,6 +129,7 @@ class Reference:
 class CellStatement:
     """One indication. ``resolution`` and ``u`` (standard) in its unit, ``excitation`` in V, as stated.
 
+    ``found``: the resolution is not stated, it is the step that the readings show (`fit.reading_steps`).
     ``span_per_K`` [1/K] and ``zero_per_K`` [unit/K] are its temperature coefficients, None where not stated.
     ``column_unit`` is the unit of the stored data, and of bare numbers in ``scale`` and ``shunt_expected``.
     """
@@ -140,6 +145,12 @@ class CellStatement:
     column_unit: str
     span_per_K: float | None
     zero_per_K: float | None
+    found: bool = False
+
+    @property
+    def stated_resolution(self) -> float | None:
+        """The resolution where it is stated."""
+        return None if self.found else self.resolution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,6 +192,7 @@ def statements_of(record: CalibrationRecord) -> Statements:
         date=dt.date.fromisoformat(record.date),
         where=record.id,
         columns=columns,
+        steps={cell.name: cell.step for cell in record.cells if cell.step is not None},
     )
 
 
@@ -204,11 +216,13 @@ def parse_statements(
     where: object,
     columns: Mapping[str, str] | None = None,
     largest: Mapping[str, float],
+    steps: Mapping[str, float] = _NONE,
 ) -> Statements:
     """Return the statements of a session's settings.
 
     ``indications`` and ``loads`` are name to unit of the fit, ``columns`` name to unit of the data where an
-    indication was converted, ``largest`` name to the largest absolute load of the fit.
+    indication was converted, ``largest`` name to the largest absolute load of the fit, ``steps`` name to the
+    step of readings whose resolution is not stated.
     """
     entry = settings.get("reference", {})
     due = entry.get("due")
@@ -233,7 +247,7 @@ def parse_statements(
             digital=_digital(entry.get("dcc")),
         ),
         cells=tuple(
-            _cell(name, text, (columns or indications)[name], cells.get(name, {}), where)
+            _cell(name, text, (columns or indications)[name], cells.get(name, {}), where, steps.get(name))
             for name, text in indications.items()
         ),
         zero=tuple(zero) if isinstance(zero, list) else (),
@@ -275,7 +289,9 @@ def _reference(load: str, entry: Mapping[str, Any], text: str, largest: float) -
     return ReferenceUncertainty(load=load, U=U * (found.factor / unit(text).factor), k=k)
 
 
-def _cell(name: str, text: str, column: str, entry: Mapping[str, Any], where: object) -> CellStatement:
+def _cell(
+    name: str, text: str, column: str, entry: Mapping[str, Any], where: object, step: float | None
+) -> CellStatement:
     bridge = bridge_of(name, entry, where=where)
 
     def number(key: str) -> float | None:
@@ -283,12 +299,14 @@ def _cell(name: str, text: str, column: str, entry: Mapping[str, Any], where: ob
             return None
         return bridge.stated(entry[key], f"cells.{name}.{key}", column=column, target=text)
 
+    resolution = number("resolution")
     span, zero = temperature_effect(entry.get("temperature_coefficient"), bridge, column, text)
     return CellStatement(
         name=name,
         unit=text,
         serial=None if entry.get("serial") is None else str(entry["serial"]),
-        resolution=number("resolution"),
+        resolution=step if resolution is None else resolution,
+        found=resolution is None and step is not None,
         u=number("u"),
         excitation_V=bridge.excitation_V,
         scale=entry.get("scale"),

@@ -21,6 +21,8 @@ from toolkit.errors import SessionError
 from toolkit.units import unit
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import Zero
@@ -95,12 +97,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
             raise _refused(source.where, f"there is no {kind} {name}", name, ", ".join(names))
     table = source.table
     force, reading = table.column(load), table.column(indication)
-    alone = np.ones(table.rows, dtype=bool)
-    for load_name in source.loads:
-        if load_name != load:
-            values = np.abs(table.column(load_name))
-            alone &= values <= _OTHER_LOAD * values.max(initial=0.0)
-    acting = np.abs(force) > _NO_LOAD * np.abs(force).max()
+    acting, alone = _acting(table, load, source.loads)
     if not (acting & alone).any():
         raise _refused(
             source.where, f"there is no row in which {load} acts alone", f"{table.rows} rows", "such rows"
@@ -135,6 +132,28 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
                 )
             )
     return tuple(cells)
+
+
+def _acting(table: Table, load: str, loads: Sequence[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return in which rows (rows,) a load acts, and in which no other of the loads does."""
+    force = table.column(load)
+    alone = np.ones(table.rows, dtype=bool)
+    for load_name in loads:
+        if load_name != load:
+            values = np.abs(table.column(load_name))
+            alone &= values <= _OTHER_LOAD * values.max(initial=0.0)
+    return np.abs(force) > _NO_LOAD * np.abs(force).max(), alone
+
+
+def e74_points(table: Table, load: str, loads: Sequence[str]) -> int:
+    """Return how many points ASTM E74 counts of a load in a session: of one sense, ascending, not zero.
+
+    Of the senses the one with more points; rows without a direction count as ascending.
+    """
+    acting, alone = _acting(table, load, loads)
+    up = np.ones(table.rows, dtype=bool) if table.up is None else table.up
+    force = table.column(load)
+    return max(int(np.count_nonzero(acting & alone & up & (sign * force > 0))) for sign in (1, -1))
 
 
 def _run(

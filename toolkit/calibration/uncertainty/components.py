@@ -231,7 +231,9 @@ def _resolution(record: CalibrationRecord, statements: Statements, slope: NDArra
         return _absent("resolution", "no indication's resolution is stated", "session")
     # Half a digit, rectangular (GUM F.2.2.1), in each reading that the indication is made of.
     parts = [c * e.half_width / ROOT3 * math.sqrt(e.readings) for c, e in zip(slope, errors, strict=True)]
+    found = [cell.name for cell in statements.cells if cell.found]
     text = f"half a digit, rectangular, in {errors[0].readings} reading(s) an indication" + _without(silent)
+    text += f"; of {', '.join(found)} the step of the readings" if found else ""
     u = math.sqrt(sum(part * part for part in parts))
     return _part("resolution", text, "B", "rectangular", u, math.inf, "session")
 

@@ -53,7 +53,8 @@ FILES = (
     "plan.docx",
     "plan.pdf",
 )
-_DEMAND = re.compile(r"\s*(\w+)\s*=\s*([-+0-9.eE]+)\s*(\S.*)?")
+_QUANTITY = r"([-+0-9.eE]+)\s*(\S+)"
+_DEMAND = re.compile(rf"\s*(\w+)\s*=\s*{_QUANTITY}\s*(?:\s+at\s+{_QUANTITY}\s*)?")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +101,10 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[PlanSessi
     if order.minutes is not None and not (math.isfinite(order.minutes) and order.minutes > 0):
         raise _wrong("a time cannot be used", "--minutes", order.minutes, "minutes above 0")
     record, loads, check, text, notes = _basis(registry, order)
+    demands = [_demand(record, entry) for entry in order.demands]
     demand = Demand(
-        U=tuple(_demand(record, entry) for entry in order.demands), minutes=order.minutes,
+        U=tuple((load, U) for load, U, _ in demands),
+        at=tuple((load, at) for load, _, at in demands if at is not None), minutes=order.minutes,
         loads=order.loads, criterion=order.criterion, seed=order.seed, two_levels=order.two_levels,
     )  # fmt: skip
     if len({name for name, _ in demand.U}) < len(demand.U):
@@ -192,8 +195,8 @@ def _basis(
     return record, loads, stored_check(registry.folder, record), session.session_bytes, notes
 
 
-def _demand(record: CalibrationRecord, text: str) -> tuple[str, float]:
-    """Read ``FY=20 N`` into the load's unit; without a unit it is that of the record."""
+def _demand(record: CalibrationRecord, text: str) -> tuple[str, float, float | None]:
+    """Read ``FY=20 N`` or ``FY=20 N at 4 kN`` into the load, U and the load of it, in the record's unit."""
     from toolkit.units import si_scale, unit
 
     match = _DEMAND.fullmatch(text)
@@ -203,19 +206,25 @@ def _demand(record: CalibrationRecord, text: str) -> tuple[str, float]:
             "an uncertainty cannot be read",
             "--u",
             text,
-            f'LOAD=NUMBER UNIT, such as "{names[0]}=1 {record.loads[0].unit}", of {", ".join(names)}',
+            f'LOAD=NUMBER UNIT or LOAD=NUMBER UNIT at NUMBER UNIT, such as "{names[0]}=1 '
+            f'{record.loads[0].unit}", of {", ".join(names)}',
         )
     fit = record.load(match[1])
-    try:
-        value = float(match[2])
-    except ValueError:
-        value = math.nan
-    if match[3] is not None:
-        own = unit(fit.unit)
-        value *= si_scale(match[3].strip(), own.dimension, where="--u") / own.factor
+    own = unit(fit.unit)
+
+    def in_own(number: str, name: str) -> float:
+        try:
+            return float(number) * si_scale(name, own.dimension, where=f"--u {text}") / own.factor
+        except ValueError:
+            return math.nan
+
+    value = in_own(match[2], match[3])
     if not (math.isfinite(value) and value > 0):
         raise _wrong("an uncertainty cannot be used", "--u", text, "a number above 0")
-    return fit.load, value
+    at = None if match[4] is None else in_own(match[4], match[5])
+    if at is not None and not (math.isfinite(at) and at):
+        raise _wrong("a load cannot be used", "--u", text, "a finite load other than 0")
+    return fit.load, value, at
 
 
 def _refuse_filled(out: Path) -> None:
@@ -253,7 +262,8 @@ def plan_text(plan: SessionPlan, record: CalibrationRecord) -> str:
         ),
         "'expected': runs differ as the record says; 'planned': by a standard error more, as for 'repeated', "
         "what the last session's loads are to give another time",
-        f"U at the largest load, k for 95 %; 'in 9 of 10', 'reached in': of {plan.simulated} simulations",
+        "U at the load of column 'at', k for 95 %; 'in 9 of 10', 'reached in': of "
+        f"{plan.simulated} simulations",
         "",
         table(
             ["", "run", "mount", "load", "direction", *(f"{fit.load} [{fit.unit}]" for fit in record.loads)],
@@ -296,7 +306,7 @@ def _session_text(session: bytes, plan: SessionPlan) -> str:
     from toolkit.files import parse_toml
 
     entries = parse_toml(session, where=plan.record, entered=True)
-    for key in ("creep", "polarity", "certificate", "phase", "temperature"):
+    for key in ("creep", "certificate", "phase"):
         entries.pop(key, None)
     if isinstance(entries.get("zero"), list):
         entries.pop("zero")
@@ -305,9 +315,15 @@ def _session_text(session: bytes, plan: SessionPlan) -> str:
     check = entries.get("check")
     entries["check"] = {**check, "file": "check.csv"} if isinstance(check, dict) else "check.csv"
     entries |= {"date": "", "operator": "", "data": "loads.csv"}
+    kept = [name for name in ("temperature", "polarity") if name in entries]
     return (
         f"# Planned from {plan.record}. Fill in date and operator, the readings in loads.csv and check.csv,\n"
         "# and the loads where others were put on; then: toolkit calibrate SESSION.toml\n"
+        + (
+            f"# {' and '.join(kept)}: as {plan.record} has it; state what this session finds\n"
+            if kept
+            else ""
+        )
         + toml_text(entries)
     )
 

@@ -113,7 +113,7 @@ def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date)
         subject=plan.instrument,
         basis=f"{plan.record}, {plan.source}",
         size=f"{len(plan.rows)} loads in {plan.runs} runs, {len(plan.check)} check loads{minutes}",
-        summary=f"{len(plan.rows)} loads in place of {plan.rows_today}. U at the largest load becomes "
+        summary=f"{len(plan.rows)} loads in place of {plan.rows_today}. U becomes "
         f"{largest.U / largest.U_today:.2f} times that of today at most ({largest.load}).",
         issued=issued,
         uncertainties=tuple(

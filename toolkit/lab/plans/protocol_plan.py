@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from toolkit.report.word.package import Template
     from toolkit.simulation.plan import Plan
 
+_TIRE_FILES = (".tir", ".toml")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanTestAnswer(ProtocolPlan):
@@ -99,6 +101,7 @@ def plan_test(
     labels = [demand.label for demand in demands]
     _refuse_doubled(labels, where="--u", what="a characteristic has two demands")
     _refuse_endless(order)
+    _refuse_strange_loads(order)
     tell("the earlier test")
     tires, like, tire = _tires(order, spread)
     own = tires[0].machine
@@ -174,7 +177,7 @@ def _earlier(order: ProtocolOrder, like: Path | None) -> tuple[EarlierTest, str,
     """Return an earlier test, what it is called, and the tire file that it was simulated from."""
     from toolkit.lab.tire_tests.resolve import resolve_test
 
-    if like is None or like.suffix.lower() in (".tir", ".toml"):
+    if like is None or like.suffix.lower() in _TIRE_FILES:
         what = "the published passenger tire (SAE 870421)" if like is None else f"the tire {like.name}"
         earlier = dataclasses.replace(_virtual(order, like), tire=what if like is None else str(like))
         return earlier, f"{_SIMULATED} simulated tests of {what} on the virtual machine", like
@@ -207,14 +210,11 @@ def _virtual(order: ProtocolOrder, like: Path | None) -> EarlierTest:
     from toolkit.lab.tire_tests.resolve import resolve_test
     from toolkit.machine.default import SIMULATED_MACHINE
     from toolkit.planning.expectation import pooled
-    from toolkit.simulation.plan import read_plan
 
     registry = registry_if_any(order.calibrations, order.home)
     known = registry is not None and (registry.folder / SIMULATED_MACHINE).is_dir()
     calibrations = registry.folder if registry is not None and known else packaged_home() / "calibrations"
-    plan = read_plan(Path(__file__).parents[2] / "examples" / "virtual" / "test_plan.toml")
-    if like is not None:
-        plan = _within_its_loads(_with_tire(plan, like), like)
+    plan = _virtual_plan(like)
     tests = []
     with tempfile.TemporaryDirectory() as folder:
         for number in range(_SIMULATED):
@@ -225,6 +225,14 @@ def _virtual(order: ProtocolOrder, like: Path | None) -> EarlierTest:
             )
             tests.append(_of(resolved, str(like)))
     return pooled(tests)
+
+
+def _virtual_plan(like: Path | None) -> Plan:
+    """Return the virtual machine's test of a tire file, at the loads that it was made for."""
+    from toolkit.simulation.plan import read_plan
+
+    plan = read_plan(Path(__file__).parents[2] / "examples" / "virtual" / "test_plan.toml")
+    return plan if like is None else _within_its_loads(_with_tire(plan, like), like)
 
 
 def _with_tire(plan: Plan, tire: Path) -> Plan:
@@ -276,6 +284,17 @@ def _loads(texts: Sequence[str], known_N: Sequence[float]) -> tuple[float, ...]:
             raise _wrong_load(text, in_both(list(known_N), "lbf", ".0f"))
         loads.append(nearest)
     return tuple(sorted(set(loads)))
+
+
+def _refuse_strange_loads(order: ProtocolOrder) -> None:
+    """Refuse loads that cannot be read, or that no test simulated for the plan has: before any is made."""
+    for text in order.loads:
+        _quantity(text)
+    if not order.loads:
+        return
+    for like in order.like or (None,):
+        if like is None or like.suffix.lower() in _TIRE_FILES:
+            _loads(order.loads, _virtual_plan(like).loads_N)
 
 
 def _quantity(text: str) -> float:
@@ -340,11 +359,18 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
     ]
     limit = "" if math.isinf(minutes) else f" in {minutes:g} min"
     if not missed:
+        asked = ", ".join(dict.fromkeys(value.name for value in plan.values))
+        loads = ", ".join(f"{load:.0f} N" for load in plan.plan.loads_N)
         return ConfigError(
-            f"no test{limit} knows its curves between the slip angles", where="--minutes",
-            got=f"{len(plan.plan.slip_angles_deg)} slip angles at {len(plan.plan.loads_N)} loads",
+            f"no test{limit} knows its curves between the slip angles",
+            where="--minutes" if limit else "--like, --u, --load",
+            got=f"{asked} at {loads}, of {plan.like}; {len(plan.plan.slip_angles_deg)} slip angles are tried",
             expected="slip angles that leave no part of a curve open",
-            next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
+            next_step="allow more time, or ask for fewer loads"
+            if limit
+            else "the machine has no angles between: ask for fewer loads or characteristics, or plan by a "
+            "test of a tire whose curves its steps follow",
+            rule="plan-infeasible",
         )  # fmt: skip
     angles = ", ".join(f"{angle:g}" for angle in sorted(plan.plan.slip_angles_deg))
     swept = "" if plan.sweeps is None else f" and {len(plan.sweeps.recordings)} sweeps"

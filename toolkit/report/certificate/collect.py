@@ -140,7 +140,7 @@ def collect(
         ledger_head=ledger.decided,
         signature=registry.signature(record.id),
         cells=record.cells,
-        resolutions=tuple(statements.cell(cell.name).resolution for cell in record.cells),
+        resolutions=tuple(statements.cell(cell.name).stated_resolution for cell in record.cells),
         loads=results,
         gaps=gaps,
         findings=(
