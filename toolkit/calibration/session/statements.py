@@ -123,10 +123,10 @@ class Reference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellStatement:
-    """One indication. ``resolution`` and ``u`` (standard) in its unit, ``excitation`` in V, as stated.
+    """One indication. ``resolution`` and ``u`` (standard) in its unit, as stated.
 
     ``span_per_K`` [1/K] and ``zero_per_K`` [unit/K] are its temperature coefficients, None where not stated.
-    ``column_unit`` is the unit of the stored data, and of bare numbers in ``scale`` and ``shunt_expected``.
+    ``column_unit`` is the unit of the stored data, and of bare numbers in ``scale``.
     """
 
     name: str
@@ -134,9 +134,7 @@ class CellStatement:
     serial: str | None
     resolution: float | None
     u: float | None
-    excitation_V: float | None
     scale: Any
-    shunt_expected: Any
     column_unit: str
     span_per_K: float | None
     zero_per_K: float | None
@@ -290,9 +288,7 @@ def _cell(name: str, text: str, column: str, entry: Mapping[str, Any], where: ob
         serial=None if entry.get("serial") is None else str(entry["serial"]),
         resolution=number("resolution"),
         u=number("u"),
-        excitation_V=bridge.excitation_V,
         scale=entry.get("scale"),
-        shunt_expected=entry.get("shunt_expected"),
         column_unit=column,
         span_per_K=span,
         zero_per_K=zero,
