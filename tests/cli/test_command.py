@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pkgutil
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, TypedDict
@@ -12,7 +13,9 @@ from typer.main import get_command_from_info
 from typer.models import CommandInfo
 
 from tests.cli.one_command import run
-from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.command import ARGUMENT, Mark, _mark, answers
+from toolkit.cli.groups import leaves
+from toolkit.cli.main import command_tree
 from toolkit.cli.options import INTO_FILE, Output
 from toolkit.errors import OutputError, ToolkitError
 from toolkit.lab.answers import Timing
@@ -87,3 +90,11 @@ def test_a_word_that_cannot_be_printed_is_refused_by_the_name_of_its_option() ->
     with pytest.raises(ToolkitError) as refused:
         run(weigh, "F\x1bY")
     assert refused.value.where == "LOAD"
+
+
+def test_what_refuses_a_value_is_a_function_that_there_is() -> None:
+    commands = (command.callback.__wrapped__ for _, command in leaves(command_tree()))
+    marks = [_mark(parameter) for command in commands for parameter in command._parameters]
+    checks = {mark["check"] for mark in marks if "check" in mark}
+    assert len(checks) >= 5
+    assert all(map(callable, map(pkgutil.resolve_name, checks)))

@@ -13,14 +13,14 @@ import inspect
 import pkgutil
 import typing
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, TypedDict
 
 import typer
 
 from toolkit.printable import check_text, unprintable
 
 
-class Mark(typing.TypedDict, total=False):
+class Mark(TypedDict, total=False):
     """What is said of an option besides its type and its text; several marks add up."""
 
     argument: Annotated[bool, "it stands by its place, without a name"]
@@ -33,8 +33,6 @@ class Mark(typing.TypedDict, total=False):
 
 
 ARGUMENT = Mark(argument=True)
-
-_PARSED: tuple[Literal["metavar", "min", "max", "parser"], ...] = ("metavar", "min", "max", "parser")
 
 
 class Command:
@@ -117,7 +115,8 @@ def _parsed(parameter: inspect.Parameter) -> inspect.Parameter:
     if not (said := getattr(parameter.annotation, "__metadata__", ())):
         return parameter
     mark = _mark(parameter)
-    facts: dict[str, Any] = {name: mark[name] for name in _PARSED if name in mark}
+    of_parser = ("metavar", "min", "max", "parser")
+    facts: dict[str, Any] = {name: fact for name, fact in mark.items() if name in of_parser}
     if "check" in mark:
         facts["callback"] = _callback(mark["check"])
     names = () if "argument" in mark else _names(parameter, mark)
