@@ -340,6 +340,15 @@ def ratio_of_units(ratio: float, text: str) -> str | None:
     return None
 
 
+def printed(text: str) -> str:
+    """Return a unit as it is printed for people.
+
+    >>> printed("lbf*ft/(mV/V)")
+    'lbf·ft/(mV/V)'
+    """
+    return text.replace("*", "·")
+
+
 _BESIDE = {"N": "lbf", "lbf": "N", "N*m": "lbf*ft", "lbf*ft": "N*m"}
 
 
@@ -353,7 +362,7 @@ def in_both(values: ArrayLike, text: str, spec: str = ".4g") -> str:
     """
     texts = [
         f"{', '.join(f'{one:{spec}}' for one in np.atleast_1d(from_si(values, unit_text)).tolist())} "
-        + unit_text.replace("*", "·")
+        + printed(unit_text)
         for unit_text in (text, _BESIDE[text])
     ]
     return f"{texts[0]} ({texts[1]})"

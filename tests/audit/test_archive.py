@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.recording.fig4_4 import write_fig4_4
 from toolkit.audit.archive import audit_archive
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app
-from toolkit.examples import write_fig4_4
 
 HOME = Path(__file__).resolve().parents[2]
 DATED = 'schema = 1\nmachine = "m15"\ndate = 2019-03-01\n'

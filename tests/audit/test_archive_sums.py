@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.recording.fig4_4 import write_fig4_4
 from toolkit.audit import archive as archive_module
 from toolkit.audit.archive import SUMS, audit_archive, read_sums, sum_up, write_sums
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError
-from toolkit.examples import write_fig4_4
 
 CALIBRATIONS = Path(__file__).resolve().parents[2] / "calibrations"
 NAMES = ("one", "two")

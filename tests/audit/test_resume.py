@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.recording.fig4_4 import write_fig4_4
 from toolkit import machine as machine_module
 from toolkit.audit import archive as archive_module
 from toolkit.audit.archive import audit_archive
@@ -15,7 +16,6 @@ from toolkit.audit.resume import RESULTS, Results
 from toolkit.audit.serial import from_plain, to_plain
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError
-from toolkit.examples import write_fig4_4
 
 HOME = Path(__file__).resolve().parents[2]
 

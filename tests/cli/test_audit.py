@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.recording.fig4_4 import write_fig4_4
 from toolkit.cli.main import _register, app
-from toolkit.examples import write_fig4_4
 from toolkit.lab.archives.audit_headline import headline_of
 
 HOME = Path(__file__).resolve().parents[2]

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import typer
 
-from toolkit.cli.console import Command, answers
+from toolkit.cli.command import Command, answers
 from toolkit.cli.groups import build_group, declared_answers, declared_type, leaves
 from toolkit.cli.main import command_tree, run
 from toolkit.cli.options import Json, Output, RegistryOptions

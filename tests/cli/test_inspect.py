@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.recording.fig4_4 import ROWS, SYMBOLS
 from toolkit.cli import inspect
 from toolkit.errors import ToolkitError
-from toolkit.examples import ROWS, SYMBOLS, packaged_fig4_4
+from toolkit.examples import packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording.labview import write_labview
 

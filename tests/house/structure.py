@@ -12,7 +12,7 @@ from typing import Any
 from tests.house.source import PACKAGE, Module, contracts, layers
 
 NO_COMMAND_ASKED = frozenset(
-    f"toolkit.cli{name}" for name in ("", ".main", ".groups", ".console", ".options")
+    f"toolkit.cli{name}" for name in ("", ".main", ".groups", ".command", ".console", ".options")
 )
 """The package itself, its entry, and what all commands share: how they are built, options, printing."""
 ROOMS = ("report", "diagnosis")

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from tests.recording.fig4_4 import ROWS, SYMBOLS
 from tests.recording.printed import half_last_place
-from toolkit.examples import ROWS, SYMBOLS
 
 
 def by_text(values: list[float]) -> list[float]:

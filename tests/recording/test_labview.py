@@ -12,8 +12,9 @@ import numpy as np
 import openpyxl
 import pytest
 
+from tests.recording.fig4_4 import ROWS, SPREADSHEET_ROWS, SYMBOLS, write_fig4_4
 from toolkit.errors import OutputError
-from toolkit.examples import NAMES, ROWS, SPREADSHEET_ROWS, SYMBOLS, packaged_fig4_4, write_fig4_4
+from toolkit.examples import NAMES, packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording import machine_of, read_recording
 from toolkit.recording.labview import write_labview

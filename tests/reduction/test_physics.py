@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.campaigns.tires import sweep
-from toolkit.examples import ROWS
+from tests.recording.fig4_4 import ROWS
 from toolkit.reduction import limits
 from toolkit.reduction.physics import Readings, departures, longest_trail, of_sizes
 from toolkit.simulation.tire import aligning_moment, lateral_force

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
+from tests.trust.signatures import signed_by, witnessed_at
 from toolkit.errors import TrustError
 from toolkit.trust.checkpoint import Checkpoint, countersign, parse_checkpoint, place
 from toolkit.trust.keys import Signer
@@ -49,9 +50,9 @@ def test_a_signed_checkpoint_reads_back_and_proves_its_signer() -> None:
     checkpoint = _checkpoint(LINES).signed("anna", anna)
     again = parse_checkpoint(checkpoint.text)
     assert again == checkpoint
-    assert again.signed_by("anna", anna.public)
-    assert not again.signed_by("ben", anna.public)
-    assert not again.signed_by("anna", ben.public)
+    assert signed_by(again, "anna", anna.public)
+    assert not signed_by(again, "ben", anna.public)
+    assert not signed_by(again, "anna", ben.public)
     # The signature line is an Ed25519 signature of the three lines of the body, by the key alone.
     line = again.text.split("\n\n")[1].split()[-1]
     key = Ed25519PublicKey.from_public_bytes(anna.public.raw)
@@ -61,7 +62,7 @@ def test_a_signed_checkpoint_reads_back_and_proves_its_signer() -> None:
 def test_a_checkpoint_of_another_size_is_not_signed() -> None:
     anna = _signer()
     text = _checkpoint(LINES).signed("anna", anna).text
-    assert not parse_checkpoint(text.replace("m15\n20\n", "m15\n21\n")).signed_by("anna", anna.public)
+    assert not signed_by(parse_checkpoint(text.replace("m15\n20\n", "m15\n21\n")), "anna", anna.public)
 
 
 @pytest.mark.parametrize(
@@ -79,9 +80,9 @@ def test_a_witness_signs_growth_and_the_time(tmp_path: Path) -> None:
     assert first.before == 0
     second = countersign(tmp_path, "north", witness, _checkpoint(LINES), LINES, time=1_790_000_100)
     assert second.before == 5
-    assert second.checkpoint.witnessed_at("north", witness.public) == 1_790_000_100
-    assert second.checkpoint.witnessed_at("south", witness.public) is None
-    assert second.checkpoint.witnessed_at("north", _signer().public) is None
+    assert witnessed_at(second.checkpoint, "north", witness.public) == 1_790_000_100
+    assert witnessed_at(second.checkpoint, "south", witness.public) is None
+    assert witnessed_at(second.checkpoint, "north", _signer().public) is None
 
 
 @pytest.mark.parametrize(

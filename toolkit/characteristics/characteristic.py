@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from toolkit.channels import ROTATIONS, Rotation
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.characteristics.groups import Channel, Direction
@@ -153,7 +154,7 @@ class Characteristic:
         return {
             "title": self.title,
             "symbol": self.symbol,
-            "unit": unit.replace("*", "·"),
+            "unit": printed(unit),
             "means": self.definition,
             "formula": self.formula,
             "term": self.term,

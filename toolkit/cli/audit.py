@@ -3,70 +3,42 @@
 from __future__ import annotations
 
 import shutil
-import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import answers, progress, say, stream
-from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_file, into_folder
+from toolkit.cli.command import ARGUMENT, answers
+from toolkit.cli.console import progress, say, stream
+from toolkit.cli.options import INTO_FILE, INTO_FOLDER, Draft, KnownAt, Output, RegistryOptions, day
 
 NAME = "audit"
 
 
 @answers("toolkit.lab.archives.audit_answer:AuditAnswer")
 def command(
-    archive: Annotated[Path, typer.Argument(help="A folder of recordings, in any depth.")],
-    workers: Annotated[
-        int | None, typer.Option("--workers", help="Processes that read files; default 1.")
-    ] = None,
+    archive: Annotated[Path, "A folder of recordings, in any depth.", ARGUMENT],
+    workers: Annotated[int | None, "Processes that read files; default 1."] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(
-            "--scheduler",
-            help="A dask cluster instead: tcp://host:8786, or tls:// with the certificates that dask's own "
-            "configuration names (distributed.comm.tls).",
-        ),
+        "A dask cluster instead: tcp://host:8786, or tls:// with the certificates that dask's own "
+        "configuration names (distributed.comm.tls).",
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            callback=into_folder,
-            help="Folder for the results; an interrupted audit resumes from it.",
-        ),
+        Path | None, "Folder for the results; an interrupted audit resumes from it.", INTO_FOLDER
     ] = None,
     reports: Annotated[
-        Path | None,
-        typer.Option("--reports", help="Reports of past years: a folder, or CSV with report, test, sha256."),
+        Path | None, "Reports of past years: a folder, or CSV with report, test, sha256."
     ] = None,
     since_good: Annotated[
-        str | None,
-        typer.Option(
-            "--since-good",
-            help="Record id of the last good check: tests that a failed as-found check puts in doubt.",
-        ),
+        str | None, "Record id of the last good check: tests that a failed as-found check puts in doubt."
     ] = None,
     repair: Annotated[
-        Path | None,
-        typer.Option(
-            "--repair",
-            callback=into_folder,
-            help="Folder for corrected copies; the originals are never touched.",
-        ),
+        Path | None, "Folder for corrected copies; the originals are never touched.", INTO_FOLDER
     ] = None,
-    template: Annotated[
-        Path | None,
-        typer.Option("--template", help="Word template of a summary, audit.docx and audit.pdf in --out."),
-    ] = None,
+    template: Annotated[Path | None, "Word template of a summary, audit.docx and audit.pdf in --out."] = None,
     parquet: Annotated[
-        Path | None,
-        typer.Option(
-            "--parquet",
-            callback=into_file,
-            help="Also the results of all files as a Parquet table (.parquet).",
-        ),
+        Path | None, "Also the results of all files as a Parquet table (.parquet).", INTO_FILE
     ] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
@@ -96,10 +68,9 @@ def command(
         scheduler=scheduler, out=out, reports=reports, since_good=since_good, repair=repair,
         template=template, parquet=parquet, draft=draft, calibrations=place.calibrations, home=place.home,
     )  # fmt: skip
-    began = time.perf_counter()
     result, written = audit(order, stage=partial(progress, show=not output.silent))
     if output.json:
-        seconds = time.perf_counter() - began
+        seconds = output.timing["seconds"]
         rate = len(result.made.files) / seconds if seconds else None
         timing = {"seconds": seconds, "files_per_second": rate, "reused": result.made.reused}
         stream({**payload_of(result), "written": [str(path) for path in written], "timing": timing})

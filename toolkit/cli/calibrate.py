@@ -6,38 +6,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import EntryOptions, Machine, Output, into_folder, new_registry
+from toolkit.cli.command import ARGUMENT, answers
+from toolkit.cli.console import exit_code
+from toolkit.cli.options import INTO_FOLDER, INTO_REGISTRY, EntryOptions, Machine, Output
 from toolkit.errors import ConfigError
 
 NAME = "calibrate"
-Full = Annotated[
-    bool, typer.Option("--full", help="Print the whole report of the fit; the JSON then has its rows.")
-]
-Figures = Annotated[
-    Path | None,
-    typer.Option(
-        "--figures", callback=into_folder, help="Folder for the fit's figures, PNG and SVG of each."
-    ),
-]
+Full = Annotated[bool, "Print the whole report of the fit; the JSON then has its rows."]
+Figures = Annotated[Path | None, "Folder for the fit's figures, PNG and SVG of each.", INTO_FOLDER]
 
 
 @answers("toolkit.lab.records.session_answer:CalibrateAnswer")
 def command(
-    session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", callback=new_registry, help="Another name for --calibrations."),
-    ] = None,
+    session: Annotated[Path, "SESSION.toml, with its CSV or .xlsx files beside it.", ARGUMENT],
+    out: Annotated[Path | None, "Another name for --calibrations.", INTO_REGISTRY] = None,
     machine: Machine = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Compute and judge everything; write nothing.")
-    ] = False,
-    again: Annotated[
-        bool, typer.Option("--again", help="Enter a session anew whose record was discarded.")
-    ] = False,
+    dry_run: Annotated[bool, "Compute and judge everything; write nothing."] = False,
+    again: Annotated[bool, "Enter a session anew whose record was discarded."] = False,
     full: Full = False,
     figures: Figures = None,
     *,

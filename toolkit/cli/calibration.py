@@ -10,15 +10,9 @@ import typer
 
 from toolkit.cli import calibration_results as results
 from toolkit.cli.calibrate import Figures
-from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import (
-    DecisionOptions,
-    EntryOptions,
-    Id,
-    Machine,
-    Output,
-    RegistryOptions,
-)
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
+from toolkit.cli.options import DecisionOptions, EntryOptions, Id, Machine, Output, RegistryOptions
 
 app = typer.Typer(help="Calibration records: what is in force, and why.", no_args_is_help=True)
 
@@ -26,14 +20,14 @@ IN_FORCE = (
     "First day in force (YYYY-MM-DD). Before the session's date it needs --reason; "
     "before the decision it is noted in the ledger."
 )
-KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known on this day (YYYY-MM-DD).")]
+KnownAt = Annotated[str | None, "What was known on this day (YYYY-MM-DD)."]
 
 
 @app.command("list")
 @answers("toolkit.lab.records.registry_answer:ListAnswer")
 def list_records(
-    instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
-    everything: Annotated[bool, typer.Option("--all", help="Discarded candidates too.")] = False,
+    instrument: Annotated[str | None, "One instrument; default: all.", ARGUMENT] = None,
+    everything: Annotated[bool, "Discarded candidates too.", Mark(names=("--all",))] = False,
     known_at: KnownAt = None,
     *,
     place: RegistryOptions,
@@ -58,9 +52,7 @@ def list_records(
 def show(
     record_id: Id,
     known_at: KnownAt = None,
-    full: Annotated[
-        bool, typer.Option("--full", help="Also what an approval meets: gates, responses in SI, as found.")
-    ] = False,
+    full: Annotated[bool, "Also what an approval meets: gates, responses in SI, as found."] = False,
     *,
     place: RegistryOptions,
     output: Output,
@@ -84,7 +76,7 @@ def show(
 @app.command()
 @answers("toolkit.lab.records.decisions:VerifyRegistryAnswer")
 def verify(
-    head: Annotated[str | None, typer.Option("--head", help="A ledger hash printed earlier.")] = None,
+    head: Annotated[str | None, "A ledger hash printed earlier."] = None,
     *,
     place: RegistryOptions,
     output: Output,
@@ -103,7 +95,7 @@ def verify(
 @app.command()
 @answers("toolkit.lab.records.registry_answer:HistoryAnswer")
 def history(
-    name: Annotated[str, typer.Argument(help="An instrument, or a record id.")],
+    name: Annotated[str, "An instrument, or a record id.", ARGUMENT],
     *,
     place: RegistryOptions,
     output: Output,
@@ -125,10 +117,8 @@ def history(
 @app.command("import")
 @answers("toolkit.lab.records.decisions:ImportAnswer")
 def import_record(
-    file: Annotated[Path, typer.Argument(help="TOML with the coefficients and the source that names them.")],
-    again: Annotated[
-        bool, typer.Option("--again", help="Enter a file anew whose record was discarded.")
-    ] = False,
+    file: Annotated[Path, "TOML with the coefficients and the source that names them.", ARGUMENT],
+    again: Annotated[bool, "Enter a file anew whose record was discarded."] = False,
     *,
     entering: EntryOptions,
     output: Output,
@@ -147,28 +137,18 @@ def import_record(
 @answers("toolkit.lab.records.decisions:ApproveAnswer")
 def approve(
     record_id: Id,
-    in_force_from: Annotated[str, typer.Option("--in-force-from", help=IN_FORCE)],
-    checked_by: Annotated[str, typer.Option("--checked-by", help="Who checked; not who entered.")],
-    approved_by: Annotated[str | None, typer.Option("--approved-by", help="Who approved.")] = None,
+    in_force_from: Annotated[str, IN_FORCE],
+    checked_by: Annotated[str, "Who checked; not who entered."],
+    approved_by: Annotated[str | None, "Who approved."] = None,
     reason: Annotated[
-        str | None,
-        typer.Option(
-            "--reason",
-            help="Why; asked for where a date lies in the past, or a cell was replaced.",
-        ),
+        str | None, "Why; asked for where a date lies in the past, or a cell was replaced."
     ] = None,
-    on: Annotated[
-        str | None,
-        typer.Option("--on", help="Day of the decision; default: today. In the past it needs --reason."),
-    ] = None,
+    on: Annotated[str | None, "Day of the decision; default: today. In the past it needs --reason."] = None,
     polarity: Annotated[
-        Path | None,
-        typer.Option("--polarity", help="TOML with [[polarity]]: readings of one load of known direction."),
+        Path | None, "TOML with [[polarity]]: readings of one load of known direction."
     ] = None,
     machine: Machine = None,
-    recall: Annotated[
-        str | None, typer.Option("--recall", help='Recall interval after the session, such as "12 months".')
-    ] = None,
+    recall: Annotated[str | None, 'Recall interval after the session, such as "12 months".'] = None,
     *,
     entering: DecisionOptions,
     output: Output,
@@ -193,15 +173,11 @@ def approve(
 @answers("toolkit.lab.records.decisions:WithdrawAnswer")
 def withdraw(
     record_id: Id,
-    on: Annotated[
-        str,
-        typer.Option("--on", help="Day on which the fault became known (YYYY-MM-DD)."),
-    ],
-    reason: Annotated[str, typer.Option("--reason", help="Why; printed wherever the record is named.")],
-    by: Annotated[str, typer.Option("--by", help="Who withdraws.")],
+    on: Annotated[str, "Day on which the fault became known (YYYY-MM-DD)."],
+    reason: Annotated[str, "Why; printed wherever the record is named."],
+    by: Annotated[str, "Who withdraws."],
     void_from: Annotated[
-        str | None,
-        typer.Option("--from", help="First void day; default: the record's in-force date."),
+        str | None, "First void day; default: the record's in-force date.", Mark(names=("--from",))
     ] = None,
     *,
     entering: DecisionOptions,
@@ -244,9 +220,9 @@ def diff(
 
 @answers("toolkit.lab.records.decisions:DiscardAnswer")
 def discard(
-    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
-    reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
-    by: Annotated[str, typer.Option("--by", help="Who discards.")],
+    record_id: Annotated[str, "Record id, such as rig-r2.", ARGUMENT, Mark(metavar="ID")],
+    reason: Annotated[str, "Why; the ledger keeps it."],
+    by: Annotated[str, "Who discards."],
     *,
     entering: DecisionOptions,
     output: Output,

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
 from toolkit.cli.options import (
+    DAY,
+    INTO_FILE,
+    INTO_FOLDER,
     Draft,
     Id,
     IssueOptions,
@@ -18,11 +19,7 @@ from toolkit.cli.options import (
     Output,
     RegistryOptions,
     day,
-    into_file,
-    into_folder,
-    moment_of,
 )
-from toolkit.days import FORM
 
 CERTIFICATE = "certificate"
 
@@ -30,37 +27,21 @@ CERTIFICATE = "certificate"
 @answers("toolkit.lab.records.budget:BudgetAnswer")
 def budget(
     record_id: Id,
-    load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
-    at: Annotated[
-        str | None,
-        typer.Option("--at", help="Load value, with a unit or in the record's; default: full scale."),
-    ] = None,
-    indications: Annotated[
-        str | None, typer.Option("--indications", help="Predict from D51=..,D52=.. in the record's units.")
-    ] = None,
+    load: Annotated[str | None, "One load; default: all of them."] = None,
+    at: Annotated[str | None, "Load value, with a unit or in the record's; default: full scale."] = None,
+    indications: Annotated[str | None, "Predict from D51=..,D52=.. in the record's units."] = None,
     temperature_range: Annotated[
-        float | None,
-        typer.Option(
-            "--temperature-range", help="Largest departure from the session's temperature in use [K]."
-        ),
+        float | None, "Largest departure from the session's temperature in use [K]."
     ] = None,
     temperature_coefficient: Annotated[
-        float | None,
-        typer.Option(
-            "--temperature-coefficient", help="Relative change per kelvin; default: what the session states."
-        ),
+        float | None, "Relative change per kelvin; default: what the session states."
     ] = None,
     trials: Annotated[
-        int | None, typer.Option("--monte-carlo", help="Check by this many trials; 0: until settled.")
+        int | None, "Check by this many trials; 0: until settled.", Mark(names=("--monte-carlo",))
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the trials.")] = 0,
-    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Significant digits of u.")] = 2,
-    figure: Annotated[
-        Path | None,
-        typer.Option(
-            "--figure", callback=into_file, help="Draw shares and U over the range: .png, .svg or .pdf."
-        ),
-    ] = None,
+    seed: Annotated[int, "Seed of the trials."] = 0,
+    digits: Annotated[int, "Significant digits of u.", Mark(min=1, max=2)] = 2,
+    figure: Annotated[Path | None, "Draw shares and U over the range: .png, .svg or .pdf.", INTO_FILE] = None,
     *,
     place: RegistryOptions,
     output: Output,
@@ -84,21 +65,11 @@ def budget(
 def apply(
     record_id: Id,
     data: Annotated[
-        Path,
-        typer.Argument(metavar="DATA", help="Indications: CSV, .xlsx, TDMS, LVM, MDF 4, MAT or Parquet."),
+        Path, "Indications: CSV, .xlsx, TDMS, LVM, MDF 4, MAT or Parquet.", ARGUMENT, Mark(metavar="DATA")
     ],
-    out: Annotated[
-        Path,
-        typer.Option("--out", callback=into_file, help="A new file: .csv, .xlsx, .tdms, .mf4 or .parquet."),
-    ],
-    tare: Annotated[
-        str | None,
-        typer.Option("--tare", help="Unloaded indications, A=..,B=.., in the units of the file."),
-    ] = None,
-    on: Annotated[
-        datetime | None,
-        typer.Option("--on", parser=moment_of, metavar=FORM, help="Day of the measurement; default: today."),
-    ] = None,
+    out: Annotated[Path, "A new file: .csv, .xlsx, .tdms, .mf4 or .parquet.", INTO_FILE],
+    tare: Annotated[str | None, "Unloaded indications, A=..,B=.., in the units of the file."] = None,
+    on: Annotated[datetime | None, "Day of the measurement; default: today.", DAY] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
     *,
@@ -125,37 +96,20 @@ def apply(
 
 @answers("toolkit.lab.records.certificate:CertificateAnswer")
 def certificate(
-    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as rig-r2.")],
-    template: Annotated[
-        Path | None,
-        typer.Option("--template", help="Word template; default: report_templates/certificate.docx."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", callback=into_folder, help="Output folder; default: certificate-<ID> here."),
-    ] = None,
-    dcc: Annotated[bool, typer.Option("--dcc", help="Also write the DCC 3.3.0 file (XML).")] = False,
-    replaces: Annotated[
-        str | None, typer.Option("--replaces", help="Id of the certificate that this one replaces.")
-    ] = None,
-    amendment_reason: Annotated[
-        str | None, typer.Option("--amendment-reason", help="Why it is replaced; printed.")
-    ] = None,
-    draft: Annotated[
-        bool, typer.Option("--draft", help="Allow a record that is not approved: every page says DRAFT.")
-    ] = False,
+    record_id: Annotated[str, "Record id, such as rig-r2.", ARGUMENT, Mark(metavar="ID")],
+    template: Annotated[Path | None, "Word template; default: report_templates/certificate.docx."] = None,
+    out: Annotated[Path | None, "Output folder; default: certificate-<ID> here.", INTO_FOLDER] = None,
+    dcc: Annotated[bool, "Also write the DCC 3.3.0 file (XML)."] = False,
+    replaces: Annotated[str | None, "Id of the certificate that this one replaces."] = None,
+    amendment_reason: Annotated[str | None, "Why it is replaced; printed."] = None,
+    draft: Annotated[bool, "Allow a record that is not approved: every page says DRAFT."] = False,
     issue: Annotated[
         bool,
-        typer.Option(
-            "--issue",
-            help="Enter it in the ledger, its PDF carries the proof; always where people are enrolled, or "
-            "with --seal.",
-        ),
+        "Enter it in the ledger, its PDF carries the proof; always where people are enrolled, or with "
+        "--seal.",
     ] = False,
     known_at: KnownAt = None,
-    keep: Annotated[
-        bool, typer.Option("--keep", help="Keep what was not verified in rejected/ of the folder.")
-    ] = False,
+    keep: Annotated[bool, "Keep what was not verified in rejected/ of the folder."] = False,
     *,
     issuing: IssueOptions,
     output: Output,
@@ -172,7 +126,6 @@ def certificate(
     from toolkit.lab.records.certificate import certificate_payload, certificate_text, deliver_certificate
     from toolkit.report.word.package import read_template
 
-    started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", issuing.home))
     registry = issuing.registry()
     sealing = issuing.sealing(registry, draft=draft)
@@ -183,7 +136,7 @@ def certificate(
             replaces=replaces, amendment=amendment_reason, dcc=dcc, sealing=sealing, asked=issue,
             named=issuing.issued_by or (), keep=keep, step=step,
         )  # fmt: skip
-    payload = certificate_payload(issued, delivered, sealing, {"seconds": time.perf_counter() - started})
+    payload = certificate_payload(issued, delivered, sealing, output.timing)
     output.answer(payload, certificate_text(issued, delivered, sealing))
     return 1 if delivered.warnings else exit_code(issued.findings)
 
@@ -191,20 +144,12 @@ def certificate(
 @answers("toolkit.lab.records.control_answer:StandardAnswer")
 def standard(
     record_id: Id,
-    name: Annotated[str, typer.Option("--standard", help="e74 or iso376.")],
-    load: Annotated[str | None, typer.Option("--load", help="One load; needed where there are more.")] = None,
-    indication: Annotated[
-        str | None, typer.Option("--indication", help="One indication; needed where there are more.")
-    ] = None,
-    degree: Annotated[
-        int | None, typer.Option("--degree", help="Of the curve; E74: by its annex, ISO 376: 3.")
-    ] = None,
+    name: Annotated[str, "e74 or iso376.", Mark(names=("--standard",))],
+    load: Annotated[str | None, "One load; needed where there are more."] = None,
+    indication: Annotated[str | None, "One indication; needed where there are more."] = None,
+    degree: Annotated[int | None, "Of the curve; E74: by its annex, ISO 376: 3."] = None,
     preloads: Annotated[
-        int | None,
-        typer.Option(
-            "--preloads",
-            help="Preloads to the largest force (ISO 376); default: [standard] preloads of the session.",
-        ),
+        int | None, "Preloads to the largest force (ISO 376); default: [standard] preloads of the session."
     ] = None,
     *,
     place: RegistryOptions,
@@ -239,16 +184,11 @@ def standard(
 
 @answers("toolkit.lab.records.control_answer:ChartAnswer")
 def chart(
-    instrument: Annotated[str, typer.Argument(help="The instrument.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", callback=into_file, help="A picture: FILE.png or FILE.svg.")
-    ] = None,
-    load: Annotated[str | None, typer.Option("--load", help="One load only.")] = None,
+    instrument: Annotated[str, "The instrument.", ARGUMENT],
+    out: Annotated[Path | None, "A picture: FILE.png or FILE.svg.", INTO_FILE] = None,
+    load: Annotated[str | None, "One load only."] = None,
     baseline: Annotated[
-        int | None,
-        typer.Option(
-            "--baseline", min=4, help="First sessions that make the limits; default: all but the last."
-        ),
+        int | None, "First sessions that make the limits; default: all but the last.", Mark(min=4)
     ] = None,
     *,
     place: RegistryOptions,
@@ -269,11 +209,8 @@ def chart(
 
 @answers("toolkit.lab.records.control_answer:DueAnswer")
 def due(
-    instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
-    on: Annotated[
-        datetime | None,
-        typer.Option("--on", parser=moment_of, metavar=FORM, help="The day to judge; default: today."),
-    ] = None,
+    instrument: Annotated[str | None, "One instrument; default: all.", ARGUMENT] = None,
+    on: Annotated[datetime | None, "The day to judge; default: today.", DAY] = None,
     *,
     place: RegistryOptions,
     output: Output,

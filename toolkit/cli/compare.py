@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
 from toolkit.cli.options import (
+    INTO_FOLDER,
     Draft,
     KnownAt,
     Output,
@@ -17,7 +16,6 @@ from toolkit.cli.options import (
     Reader,
     RegistryOptions,
     day,
-    into_folder,
 )
 from toolkit.cli.options import reader as choose_reader
 from toolkit.errors import ConfigError
@@ -35,75 +33,42 @@ NAME = "compare"
 def command(
     sources: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="A B ...",
-            help="Tests (folders or reduced .xlsx) and makers' tables (.csv); A is the reference.",
-        ),
+        "Tests (folders or reduced .xlsx) and makers' tables (.csv); A is the reference.",
+        ARGUMENT,
+        Mark(metavar="A B ..."),
     ] = None,
     mode: Annotated[
-        str | None,
-        typer.Option("--mode", help="table, surfaces, tires or repeats; default: by what the tests state."),
+        str | None, "table, surfaces, tires or repeats; default: by what the tests state."
     ] = None,
-    axes: Annotated[
-        str, typer.Option("--axes", help="Axes of the tables: SAE, adapted-SAE, ISO-W, machine.")
-    ] = "SAE",
+    axes: Annotated[str, "Axes of the tables: SAE, adapted-SAE, ISO-W, machine."] = "SAE",
     laboratories: Annotated[
         Path | None,
-        typer.Option(
-            "--laboratories",
-            metavar="FILE",
-            help="Interlaboratory comparison (.csv): measurand,laboratory,value [N],U [N],k; a row a result.",
-        ),
+        "Interlaboratory comparison (.csv): measurand,laboratory,value [N],U [N],k; a row a result.",
+        Mark(metavar="FILE"),
     ] = None,
     reference: Annotated[
-        str | None,
-        typer.Option(
-            "--reference", help="Laboratory whose values are the assigned ones; default: consensus."
-        ),
+        str | None, "Laboratory whose values are the assigned ones; default: consensus."
     ] = None,
     sigma: Annotated[
-        float | None,
-        typer.Option("--sigma", help="sigma_pt of --laboratories, in the results' unit; default: robust."),
+        float | None, "sigma_pt of --laboratories, in the results' unit; default: robust."
     ] = None,
-    level: Annotated[
-        float, typer.Option("--level", help="Chance of even one false decision in a table (Holm).")
-    ] = 0.05,
+    level: Annotated[float, "Chance of even one false decision in a table (Holm)."] = 0.05,
     reproducibility: Annotated[
-        bool,
-        typer.Option(
-            "--reproducibility",
-            help="Require reproducibility: tests of one laboratory alone are then an error.",
-        ),
+        bool, "Require reproducibility: tests of one laboratory alone are then an error."
     ] = False,
     units: Annotated[
         str | None,
-        typer.Option(
-            "--units",
-            help="SI or lbf, for people: text, figures, document. Default: SI; in the document the style "
-            "file's. The JSON answer is always in SI.",
-        ),
+        "SI or lbf, for people: text, figures, document. Default: SI; in the document the style file's. The "
+        "JSON answer is always in SI.",
     ] = None,
     figures: Annotated[
-        Path | None,
-        typer.Option(
-            "--figures",
-            callback=into_folder,
-            help="Folder for the figures (PNG), as the thesis's 6.6 to 6.29.",
-        ),
+        Path | None, "Folder for the figures (PNG), as the thesis's 6.6 to 6.29.", INTO_FOLDER
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            callback=into_folder,
-            help="Folder for comparison.docx (laboratories.docx) and its verified PDF.",
-        ),
+        Path | None, "Folder for comparison.docx (laboratories.docx) and its verified PDF.", INTO_FOLDER
     ] = None,
     template: Annotated[
-        Path | None,
-        typer.Option(
-            "--template", help="Word template of --out; default: comparison.docx or laboratories.docx."
-        ),
+        Path | None, "Word template of --out; default: comparison.docx or laboratories.docx."
     ] = None,
     protocol: ProtocolFile = None,
     known_at: KnownAt = None,
@@ -157,7 +122,6 @@ def command(
         )  # fmt: skip
     engine = choose_reader(reader)
     style = unit_choice(units or "SI")
-    started = time.perf_counter()
     opened = document_template(template, out, default="comparison.docx", home=place.home)
     with output.progress("reading") as step:
         entries, findings = read_entries(
@@ -172,7 +136,7 @@ def command(
         comparison, style, attention, figures=figures, opened=opened, out=out, known_at=day(known_at),
         units=None if units is None else style,
     )  # fmt: skip
-    payload = compare_answer(comparison, attention, drawn, document, started)
+    payload = compare_answer(comparison, attention, drawn, document, output.timing)
     text = comparison_text(comparison, style, attention, drawn)
     if document is not None:
         text += f"\n\n{document.pdf}\n{document.docx}\n{document.pages} pages, verified"

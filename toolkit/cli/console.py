@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import functools
-import inspect
 import json
 import re
 import sys
-import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from toolkit.printable import check_text, escaped, unprintable
+from toolkit.printable import escaped
 
 if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
@@ -62,85 +58,6 @@ def ask_passphrase(key: Path, *, twice: bool = False) -> str:
         next_step="run it at a terminal; without one, name the public half of a key that the SSH agent holds",
         rule="signing-key",
     )  # fmt: skip
-
-
-class Command:
-    """A command that takes the options of each dataclass among its parameters one by one.
-
-    Options that commands share are declared once, as the fields of such a class (`toolkit.cli.options`).
-    ``answer`` is the declaration of its JSON answer. Its options are worked out when they are asked for.
-    """
-
-    def __init__(self, command: Callable[..., int], answer: str | type | None = None) -> None:
-        self._command, self.answer = command, answer
-        functools.update_wrapper(self, command)
-
-    def __call__(self, *arguments: Any, **options: Any) -> int:
-        """Run the command; what is not given has its default."""
-        bound = self.__signature__.bind(*arguments, **options)
-        bound.apply_defaults()
-        values = bound.arguments
-        self._check(values)
-        groups = {
-            name: group(**{option.name: values.pop(option.name) for option in dataclasses.fields(group)})
-            for name, group in self._groups.items()
-        }
-        return self._command(**values, **groups)
-
-    def _check(self, values: Mapping[str, Any]) -> None:
-        """Refuse words that no document can print; a path is whatever the disk has, and is no such word."""
-        for name, value in values.items():
-            for text in value if isinstance(value, list | tuple) else (value,):
-                if type(text) is str and unprintable(text):
-                    check_text(text, where=_option_of(self.__signature__.parameters[name]))
-
-    @functools.cached_property
-    def _hints(self) -> dict[str, Any]:
-        return typing.get_type_hints(self._command, include_extras=True)
-
-    @functools.cached_property
-    def _groups(self) -> dict[str, Any]:
-        return {name: held for name, held in self._hints.items() if dataclasses.is_dataclass(held)}
-
-    @functools.cached_property
-    def __signature__(self) -> inspect.Signature:
-        """Its options as parameters, those of a class in its place."""
-        parameters: list[inspect.Parameter] = []
-        for parameter in inspect.signature(self._command).parameters.values():
-            group = self._groups.get(parameter.name)
-            if group is None:
-                parameters.append(parameter.replace(annotation=self._hints[parameter.name]))
-                continue
-            hints = typing.get_type_hints(group, include_extras=True)
-            parameters += [
-                inspect.Parameter(
-                    option.name, parameter.KEYWORD_ONLY, default=option.default, annotation=hints[option.name]
-                )
-                for option in dataclasses.fields(group)
-            ]
-        return inspect.Signature(parameters)
-
-
-def _option_of(parameter: inspect.Parameter) -> str:
-    """Return what a parameter of a command is called among its words: ``--checked-by``, ``ID``."""
-    stated = [
-        mark
-        for mark in getattr(parameter.annotation, "__metadata__", ())
-        if hasattr(mark, "param_decls") and hasattr(mark, "metavar")
-    ]
-    # In an annotation typer holds an option's first word as its default.
-    words = [word for mark in stated for word in (mark.default, *(mark.param_decls or ()))]
-    names = [word for word in words if isinstance(word, str) and word.startswith("--")]
-    names += [mark.metavar for mark in stated if mark.metavar]
-    return str(names[0] if names else parameter.name.upper())
-
-
-def answers(declared: str | type) -> Callable[[Callable[..., int]], Command]:
-    """Declare the JSON answer of a command: a type, or ``module:name`` of what is heavy to import.
-
-    `toolkit.cli.groups` prints it as page and schema; a test looks for commands without it.
-    """
-    return functools.partial(Command, answer=declared)
 
 
 def answer(payload: Mapping[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, TypedDict
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_file
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
+from toolkit.cli.options import INTO_FILE, Draft, KnownAt, Output, RegistryOptions, day
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import Timing
 
@@ -35,14 +33,10 @@ NAME = "convert"
 
 @answers(ConvertAnswer)
 def command(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="A .tir, .tdx, .csv or reduced .xlsx.")],
-    target: Annotated[
-        Path, typer.Argument(metavar="OUT", callback=into_file, help="A .tir, .fmu, .tdx or .csv.")
-    ],
-    axes: Annotated[
-        str, typer.Option("--axes", help="Axes of the .csv: SAE, adapted-SAE, ISO-W, machine.")
-    ] = "SAE",
-    fmi: Annotated[str, typer.Option("--fmi", help="Version of FMI of an .fmu: 2 or 3.")] = "2",
+    source: Annotated[Path, "A .tir, .tdx, .csv or reduced .xlsx.", ARGUMENT, Mark(metavar="IN")],
+    target: Annotated[Path, "A .tir, .fmu, .tdx or .csv.", ARGUMENT, INTO_FILE, Mark(metavar="OUT")],
+    axes: Annotated[str, "Axes of the .csv: SAE, adapted-SAE, ISO-W, machine."] = "SAE",
+    fmi: Annotated[str, "Version of FMI of an .fmu: 2 or 3."] = "2",
     known_at: KnownAt = None,
     draft: Draft = False,
     *,
@@ -62,7 +56,6 @@ def command(
     from toolkit.lab.tire_tests.convert import convert
     from toolkit.lab.tire_tests.resolve import resolve_test
 
-    started = time.perf_counter()
     resolve = partial(
         resolve_test, calibrations=place.calibrations, home=place.home, known_at=day(known_at), draft=draft
     )
@@ -78,7 +71,7 @@ def command(
         "axes": axes if "csv" in converted.kinds else "ISO-W",
         **draft_keys(*([converted.use] if converted.use else [])),
         "findings": [finding.as_dict() for finding in converted.findings],
-        "timing": {"seconds": time.perf_counter() - started},
+        "timing": output.timing,
     }
     output.answer(payload, text)
     return exit_code(converted.findings)

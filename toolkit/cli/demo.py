@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import typer
 
-from toolkit.cli.console import answers
-from toolkit.cli.options import Output, into_folder
+from toolkit.cli.command import answers
+from toolkit.cli.options import INTO_FOLDER, Output
 from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import Timing
 
@@ -60,12 +59,9 @@ class Step:
 @answers(DemoAnswer)
 def command(
     context: typer.Context,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", callback=into_folder, help="Output folder; one that an earlier demo made is replaced."
-        ),
-    ] = Path("demo-out"),
+    out: Annotated[Path, "Output folder; one that an earlier demo made is replaced.", INTO_FOLDER] = Path(
+        "demo-out"
+    ),
     *,
     output: Output,
 ) -> int:
@@ -79,7 +75,6 @@ def command(
     from toolkit.machine import load_machine
     from toolkit.machine.default import SIMULATED_MACHINE
 
-    started = time.perf_counter()
     say = _silent if output.silent else typer.echo
     steps_run: list[Payload] = []
     with _stage(out) as stage:
@@ -108,7 +103,7 @@ def command(
     say(f"The report: {out / 'report.pdf'}  ({out / 'report.docx'})")
     say(f"The whole test in one file: {out / 'test.xlsx'}")
     say("Everything here is simulated, except Figure 4.4 in step 1.")
-    say(f"Took {time.perf_counter() - started:.0f} s.")
+    say(f"Took {output.timing['seconds']:.0f} s.")
     say(f"In a browser: toolkit open {out / 'home'}")
     names = ("report.docx", "report.pdf", "test.xlsx", "tire.tir")
     payload = {
@@ -118,7 +113,7 @@ def command(
         + [str(out / "certificate" / name) for name in certificates],
         "steps": steps_run,
         "report": report["told"],
-        "timing": {"seconds": time.perf_counter() - started},
+        "timing": output.timing,
     }
     output.answer(payload, "")
     return 0

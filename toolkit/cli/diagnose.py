@@ -6,44 +6,26 @@ import time
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from toolkit.cli.console import answers
-from toolkit.cli.options import Output, RegistryOptions, WorkerOptions, into_folder
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.options import INTO_FOLDER, Output, RegistryOptions, WorkerOptions
 
 NAME = "diagnose"
 
 
 @answers("toolkit.lab.studies.diagnosis:DiagnoseAnswer")
 def command(
-    case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Simulation and recordings.")],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", callback=into_folder, help="Folder for diagnosis.json, the page and predictions."
-        ),
-    ],
-    budget: Annotated[
-        float, typer.Option("--budget", min=1.0, help="Seconds after which a partial answer is given.")
-    ] = 600.0,
+    case: Annotated[Path, "Simulation and recordings.", ARGUMENT, Mark(metavar="CASE.toml")],
+    out: Annotated[Path, "Folder for diagnosis.json, the page and predictions.", INTO_FOLDER],
+    budget: Annotated[float, "Seconds after which a partial answer is given.", Mark(min=1.0)] = 600.0,
     model: Annotated[
-        Path | None,
-        typer.Option(
-            "--model", help="Model file (model.toml of an earlier answer) in place of the case's simulation."
-        ),
+        Path | None, "Model file (model.toml of an earlier answer) in place of the case's simulation."
     ] = None,
-    pdf: Annotated[
-        bool, typer.Option("--pdf", help="Also diagnosis.docx and its verified diagnosis.pdf.")
-    ] = False,
+    pdf: Annotated[bool, "Also diagnosis.docx and its verified diagnosis.pdf."] = False,
     template: Annotated[
-        Path | None,
-        typer.Option("--template", help="Word template of --pdf; default: report_templates/diagnosis.docx."),
+        Path | None, "Word template of --pdf; default: report_templates/diagnosis.docx."
     ] = None,
     by: Annotated[
-        str | None,
-        typer.Option(
-            "--by", help="Who releases the opinion on the cause (ISO/IEC 17025, 7.8.7); else a draft."
-        ),
+        str | None, "Who releases the opinion on the cause (ISO/IEC 17025, 7.8.7); else a draft."
     ] = None,
     *,
     worker: WorkerOptions,
@@ -73,7 +55,6 @@ def command(
     from toolkit.report.word.office import find_soffice
     from toolkit.report.word.package import read_template
 
-    started = time.perf_counter()
     # What the document needs is judged before anything is searched: it comes with the answer or not at all.
     chosen = template or (home_template("diagnosis.docx", place.home) if pdf else None)
     opened = None if chosen is None else read_template(chosen)
@@ -84,9 +65,7 @@ def command(
         limits=worker.limits(),
         tell=_teller(show=not output.silent),
     )  # fmt: skip
-    payload = write_diagnosis(
-        diagnosed, out, timing=lambda: {"seconds": time.perf_counter() - started}, opened=opened, by=by
-    )
+    payload = write_diagnosis(diagnosed, out, timing=lambda: output.timing, opened=opened, by=by)
     text = diagnosis_text(diagnosed.result.diagnosis, out)
     warned = False
     if opened is not None:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, TypedDict
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import Output, into_file
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
+from toolkit.cli.options import INTO_FILE, Output
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import Timing
 
@@ -35,20 +33,13 @@ NAME = "evaluate"
 
 @answers(EvaluateAnswer)
 def command(
-    tire: Annotated[Path, typer.Argument(metavar="TIRE.tir", help="A tire property file, MF 5.2 or 6.x.")],
+    tire: Annotated[Path, "A tire property file, MF 5.2 or 6.x.", ARGUMENT, Mark(metavar="TIRE.tir")],
     grid: Annotated[
-        Path, typer.Argument(metavar="GRID.csv", help="SA, FZ and optional IA, KAPPA, P, V with their units.")
+        Path, "SA, FZ and optional IA, KAPPA, P, V with their units.", ARGUMENT, Mark(metavar="GRID.csv")
     ],
-    axes: Annotated[
-        str, typer.Option("--axes", help="Axes of grid and answer: ISO-W, SAE, adapted-SAE, machine.")
-    ] = "ISO-W",
-    angles: Annotated[
-        str, typer.Option("--angles", help="star: tan(alpha), sin(gamma); raw: the angles, as MF-Tyre.")
-    ] = "star",
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", callback=into_file, help="Write the grid with FX, FY, MZ to a .csv."),
-    ] = None,
+    axes: Annotated[str, "Axes of grid and answer: ISO-W, SAE, adapted-SAE, machine."] = "ISO-W",
+    angles: Annotated[str, "star: tan(alpha), sin(gamma); raw: the angles, as MF-Tyre."] = "star",
+    out: Annotated[Path | None, "Write the grid with FX, FY, MZ to a .csv.", INTO_FILE] = None,
     *,
     output: Output,
 ) -> int:
@@ -62,7 +53,6 @@ def command(
     from toolkit.tires.table import read_table
     from toolkit.tires.tir import read_tir
 
-    started = time.perf_counter()
     table = read_table(grid, axes=axes, required=("SA", "FZ"), measured=False)
     if out is not None:
         refuse_output(out, (tire, grid))
@@ -84,7 +74,7 @@ def command(
         "rows": grid_rows(table, values),
         "out": None if out is None else str(out),
         "findings": [finding.as_dict() for finding in findings],
-        "timing": {"seconds": time.perf_counter() - started},
+        "timing": output.timing,
     }
     output.answer(payload, printed)
     return exit_code(findings)

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
 from toolkit.cli.options import (
+    INTO_FILE,
+    INTO_FOLDER,
     CalibrationId,
     Draft,
     KnownAt,
     Output,
     RegistryOptions,
     day,
-    into_file,
-    into_folder,
 )
 
 NAME = "fit"
@@ -28,58 +26,31 @@ NAME = "fit"
 def command(
     source: Annotated[
         Path,
-        typer.Argument(
-            metavar="TEST|TABLE",
-            help="A test (folder or reduced .xlsx), a table (.csv), a continuous belt test (.mat, .dat).",
-        ),
+        "A test (folder or reduced .xlsx), a table (.csv), a continuous belt test (.mat, .dat).",
+        ARGUMENT,
+        Mark(metavar="TEST|TABLE"),
     ],
     model: Annotated[
         list[str] | None,
-        typer.Option(
-            "--model",
-            help="Tire model; may be repeated: magic_formula (per load, the default), pacejka94, mf52, mf61, "
-            "mf62, tmeasy, treadsim, lugre, brush; 'all' is every one.",
-        ),
+        "Tire model; may be repeated: magic_formula (per load, the default), pacejka94, mf52, mf61, mf62, "
+        "tmeasy, treadsim, lugre, brush; 'all' is every one.",
     ] = None,
-    tir: Annotated[
-        Path | None,
-        typer.Option("--tir", callback=into_file, help="Write a tire file of mf52, mf61 or mf62."),
-    ] = None,
+    tir: Annotated[Path | None, "Write a tire file of mf52, mf61 or mf62.", INTO_FILE] = None,
     fmu: Annotated[
-        Path | None,
-        typer.Option(
-            "--fmu", callback=into_file, help="Write an FMU of a model over all loads; runs without Python."
-        ),
+        Path | None, "Write an FMU of a model over all loads; runs without Python.", INTO_FILE
     ] = None,
-    fmi: Annotated[str, typer.Option("--fmi", help="Version of FMI of the FMU: 2 or 3.")] = "2",
-    figures: Annotated[
-        Path | None,
-        typer.Option(
-            "--figures", callback=into_folder, help="Folder for figures: curves, residuals, comparison."
-        ),
-    ] = None,
+    fmi: Annotated[str, "Version of FMI of the FMU: 2 or 3."] = "2",
+    figures: Annotated[Path | None, "Folder for figures: curves, residuals, comparison.", INTO_FOLDER] = None,
     axes: Annotated[
         str | None,
-        typer.Option(
-            "--axes",
-            help="Axes of the table: SAE (its default), adapted-SAE, ISO-W, machine; a belt test says them "
-            "by the sign of its load.",
-        ),
+        "Axes of the table: SAE (its default), adapted-SAE, ISO-W, machine; a belt test says them by the "
+        "sign of its load.",
     ] = None,
-    loss: Annotated[str, typer.Option("--loss", help="linear (least squares) or robust.")] = "linear",
-    weights: Annotated[
-        str,
-        typer.Option("--weights", help="Of global models: equal, or noise (each load by its own residuals)."),
-    ] = "equal",
-    rated_load: Annotated[
-        float | None, typer.Option("--rated-load", help="Rated load [N] of a table's tire: FNOMIN.")
-    ] = None,
-    radius: Annotated[
-        float | None, typer.Option("--radius", help="Free radius [m] of a table's tire: UNLOADED_RADIUS.")
-    ] = None,
-    side: Annotated[
-        str, typer.Option("--side", help="TYRESIDE as tested: LEFT, RIGHT, SYMMETRIC, UNKNOWN.")
-    ] = "UNKNOWN",
+    loss: Annotated[str, "linear (least squares) or robust."] = "linear",
+    weights: Annotated[str, "Of global models: equal, or noise (each load by its own residuals)."] = "equal",
+    rated_load: Annotated[float | None, "Rated load [N] of a table's tire: FNOMIN."] = None,
+    radius: Annotated[float | None, "Free radius [m] of a table's tire: UNLOADED_RADIUS."] = None,
+    side: Annotated[str, "TYRESIDE as tested: LEFT, RIGHT, SYMMETRIC, UNKNOWN."] = "UNKNOWN",
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     draft: Draft = False,
@@ -109,7 +80,6 @@ def command(
     from toolkit.publication import publication
     from toolkit.tires.field_file import is_field_file
 
-    started = time.perf_counter()
     in_field_form = is_field_file(source)
     names = model_choice(model or ["mf61" if (tir or fmu) is not None and in_field_form else "magic_formula"])
     options = fit_options(loss, weights, rated_load, radius)
@@ -144,10 +114,7 @@ def command(
         "fmu": None if fmu is None else str(fmu),
         "figures": written,
         "findings": [finding.as_dict() for finding in findings],
-        "timing": {
-            "seconds": time.perf_counter() - started,
-            "models": dict(fitted.comparison.seconds),
-        },
+        "timing": {**output.timing, "models": dict(fitted.comparison.seconds)},
     }
     text = fit_text(fitted, findings)
     if tir is not None:

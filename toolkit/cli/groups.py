@@ -5,9 +5,9 @@ from __future__ import annotations
 import copy
 import inspect
 import json
+import pkgutil
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from functools import partial
-from importlib import import_module
 from typing import Any
 
 from typer import Typer
@@ -95,10 +95,7 @@ def declared_answers(group: Any) -> dict[str, Any]:
 
 def declared_type(declaration: Any) -> Any:
     """Return the type that a declaration stands for, imported where it is ``module:name``."""
-    if not isinstance(declaration, str):
-        return declaration
-    module, _, name = declaration.partition(":")
-    return getattr(import_module(module), name)
+    return pkgutil.resolve_name(declaration) if isinstance(declaration, str) else declaration
 
 
 def schema_text(command: str, declared: Mapping[str, Any]) -> str:

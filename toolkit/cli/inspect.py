@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
 from toolkit.cli.options import KnownAt, Output, RegistryOptions, day
 
 if TYPE_CHECKING:
@@ -19,17 +18,12 @@ NAME = "inspect"
 
 @answers("toolkit.lab.tire_tests.inspection_answer:InspectForms")
 def command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, under any name.")],
+    files: Annotated[list[Path], "Recordings, under any name.", ARGUMENT, Mark(metavar="FILE...")],
     machine: Annotated[
-        str | None,
-        typer.Option(
-            "--machine", help="Machine; default: that of test.toml, else of the file, else the packaged one."
-        ),
+        str | None, "Machine; default: that of test.toml, else of the file, else the packaged one."
     ] = None,
     known_at: KnownAt = None,
-    prove: Annotated[
-        bool, typer.Option("--prove", help="The interval that the printed digits allow each coefficient.")
-    ] = False,
+    prove: Annotated[bool, "The interval that the printed digits allow each coefficient."] = False,
     *,
     place: RegistryOptions,
     output: Output,

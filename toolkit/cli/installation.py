@@ -9,8 +9,8 @@ from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import answers
-from toolkit.cli.options import Output, into_file, into_folder
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.options import INTO_FILE, INTO_FOLDER, Output
 
 
 class InitAnswer(TypedDict):
@@ -29,7 +29,7 @@ class DocsAnswer(TypedDict):
 
 @answers(InitAnswer)
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", callback=into_folder, help="The home to make.")],
+    folder: Annotated[Path, "The home to make.", ARGUMENT, INTO_FOLDER, Mark(metavar="DIR")],
     *,
     output: Output,
 ) -> int:
@@ -54,9 +54,9 @@ def init(
 
 @answers("toolkit.lab.upkeep.migrate:MigrateAnswer")
 def migrate(
-    home: Annotated[Path, typer.Argument(metavar="HOME", help="The home, as an older version left it.")],
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check and tell; write nothing.")] = False,
-    undo: Annotated[bool, typer.Option("--undo", help="Put back what the last migration replaced.")] = False,
+    home: Annotated[Path, "The home, as an older version left it.", ARGUMENT, Mark(metavar="HOME")],
+    dry_run: Annotated[bool, "Check and tell; write nothing."] = False,
+    undo: Annotated[bool, "Put back what the last migration replaced."] = False,
     *,
     output: Output,
 ) -> int:
@@ -90,9 +90,7 @@ def doctor(*, output: Output) -> int:
 
 @answers(DocsAnswer)
 def docs(
-    no_browser: Annotated[
-        bool, typer.Option("--no-browser", help="Print the place of its first page and open nothing.")
-    ] = False,
+    no_browser: Annotated[bool, "Print the place of its first page and open nothing."] = False,
     *,
     output: Output,
 ) -> int:
@@ -112,10 +110,7 @@ def docs(
 
 @answers("toolkit.lab.upkeep.installation:QualifyAnswer")
 def qualify(
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", callback=into_file, help="Write the record here: .json, else as text."),
-    ] = None,
+    out: Annotated[Path | None, "Write the record here: .json, else as text.", INTO_FILE] = None,
     *,
     output: Output,
 ) -> int:
@@ -146,14 +141,14 @@ def explain(
     context: typer.Context,
     rule: Annotated[
         str | None,
-        typer.Argument(
-            metavar="RULE",
-            help="Rule id, or the name of an effect or of a characteristic; without it, all of them.",
-        ),
+        "Rule id, or the name of an effect or of a characteristic; without it, all of them.",
+        ARGUMENT,
+        Mark(metavar="RULE"),
     ] = None,
     answer_of: Annotated[
         str | None,
-        typer.Option("--answer", metavar="COMMAND", help="Print the JSON schema of a command's answer."),
+        "Print the JSON schema of a command's answer.",
+        Mark(names=("--answer",), metavar="COMMAND"),
     ] = None,
     *,
     output: Output,

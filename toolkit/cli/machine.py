@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 import typer
 
-from toolkit.cli.console import answers
-from toolkit.cli.options import Output, into_file, moment_of
-from toolkit.days import FORM
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.options import DAY, INTO_FILE, Output
 from toolkit.findings import FindingEntry
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ app = typer.Typer(help="Machine definitions: show one, correct one by an answer.
 @app.command("show")
 @answers(MachineAnswer)
 def show(
-    machine: Annotated[str, typer.Argument(help="Name of a packaged machine, or the path of a definition.")],
+    machine: Annotated[str, "Name of a packaged machine, or the path of a definition.", ARGUMENT],
     *,
     output: Output,
 ) -> int:
@@ -78,25 +77,14 @@ def show(
 @answers(MachineAnswer)
 def correct(
     source: Annotated[
-        Path, typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its model.toml.")
+        Path, "Folder of toolkit diagnose --out, or its model.toml.", ARGUMENT, Mark(metavar="ANSWER")
     ],
-    effect: Annotated[
-        str, typer.Option("--effect", help="What is corrected: an effect that the answer names.")
-    ],
-    reason: Annotated[str, typer.Option("--reason", help="Why it is taken for the machine's own.")],
-    by: Annotated[str, typer.Option("--by", help="Who decides it.")],
-    out: Annotated[
-        Path,
-        typer.Option("--out", callback=into_file, help="The new definition (.toml); it must not exist yet."),
-    ],
-    machine: Annotated[
-        str | None,
-        typer.Option("--machine", help="Machine that is corrected: a packaged name, or a definition."),
-    ] = None,
-    on: Annotated[
-        datetime | None,
-        typer.Option("--on", parser=moment_of, metavar=FORM, help="Day of the decision; default today."),
-    ] = None,
+    effect: Annotated[str, "What is corrected: an effect that the answer names."],
+    reason: Annotated[str, "Why it is taken for the machine's own."],
+    by: Annotated[str, "Who decides it."],
+    out: Annotated[Path, "The new definition (.toml); it must not exist yet.", INTO_FILE],
+    machine: Annotated[str | None, "Machine that is corrected: a packaged name, or a definition."] = None,
+    on: Annotated[datetime | None, "Day of the decision; default today.", DAY] = None,
     *,
     output: Output,
 ) -> int:

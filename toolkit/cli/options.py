@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -16,58 +17,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from toolkit.cli import console
+from toolkit.cli.command import ARGUMENT, Mark
 from toolkit.days import FORM, parse_day
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.answers import Timing
     from toolkit.lab.signatures.sealing import Sealing
     from toolkit.trust.keys import Signer
     from toolkit.trust.signing import Travel
     from toolkit.worker.posix import Limits
-
-
-def into_folder(folder: Path | None) -> Path | None:
-    """Refuse a folder that results cannot enter: the callback of an option, before anything is worked out."""
-    if folder is not None:
-        from toolkit.publication import check_folder
-
-        check_folder(folder)
-    return folder
-
-
-def into_file(path: Path | None) -> Path | None:
-    """Refuse a file that cannot be a result, as `into_folder` does."""
-    if path is not None:
-        from toolkit.publication import check_file
-
-        check_file(path)
-    return path
-
-
-def _home(folder: Path | None) -> Path | None:
-    """Refuse a home that is none: what is named is never passed over, whether it is needed or not."""
-    if folder is not None:
-        from toolkit.lab.home import find_home
-
-        find_home(folder)
-    return folder
-
-
-def _registry(folder: Path | None) -> Path | None:
-    if folder is not None:
-        from toolkit.lab.home import calibrations_folder
-
-        calibrations_folder(folder)
-    return folder
-
-
-def new_registry(folder: Path | None) -> Path | None:
-    """Refuse a registry folder that is none and cannot be made."""
-    if folder is not None:
-        from toolkit.lab.home import registry_to_write
-
-        registry_to_write(folder)
-    return folder
 
 
 def moment_of(text: str) -> datetime:
@@ -78,146 +37,84 @@ def moment_of(text: str) -> datetime:
         raise typer.BadParameter(f"'{text}' is not a valid day {FORM}, such as 2026-03-31") from None
 
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+DAY = Mark(parser=moment_of, metavar=FORM)
+INTO_FOLDER = Mark(check="toolkit.publication:check_folder")
+INTO_FILE = Mark(check="toolkit.publication:check_file")
+INTO_REGISTRY = Mark(check="toolkit.lab.home:registry_to_write")
+
+Json = Annotated[bool, "Print one JSON document and nothing else."]
+Quiet = Annotated[bool, "Print nothing but errors.", Mark(names=("--quiet", "-q"))]
 Calibrations = Annotated[
     Path | None,
-    typer.Option(
-        "--calibrations",
-        callback=_registry,
-        help="Registry folder; default: calibrations/ of the laboratory's home.",
-    ),
+    "Registry folder; default: calibrations/ of the laboratory's home.",
+    Mark(check="toolkit.lab.home:calibrations_folder"),
 ]
 NewCalibrations = Annotated[
     Path | None,
-    typer.Option(
-        "--calibrations",
-        callback=new_registry,
-        help="Registry folder, made where there is none; default: calibrations/ of the laboratory's home.",
-    ),
+    "Registry folder, made where there is none; default: calibrations/ of the laboratory's home.",
+    INTO_REGISTRY,
 ]
 LockFile = Annotated[
-    bool,
-    typer.Option(
-        "--lock-file",
-        help="Keep other writers out by a lock file, where the file system has no locks; all writers must.",
-    ),
+    bool, "Keep other writers out by a lock file, where the file system has no locks; all writers must."
 ]
 Sign = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--sign",
-        metavar="KEY",
-        help="Private SSH key that signs, or the public one of a key in the agent; once for each person.",
-    ),
+    "Private SSH key that signs, or the public one of a key in the agent; once for each person.",
+    Mark(metavar="KEY"),
 ]
 RequestFile = Annotated[
     Path | None,
-    typer.Option(
-        "--request",
-        metavar="FILE",
-        callback=into_file,
-        help="Write what is to be signed to FILE, for 'toolkit sign' on another computer; enter nothing.",
-    ),
+    "Write what is to be signed to FILE, for 'toolkit sign' on another computer; enter nothing.",
+    INTO_FILE,
+    Mark(metavar="FILE"),
 ]
 IssuedBy = Annotated[
     list[str] | None,
-    typer.Option(
-        "--issued-by",
-        metavar="ID",
-        help="With --request: who will sign, whose name the document states; once for each person.",
-    ),
+    "With --request: who will sign, whose name the document states; once for each person.",
+    Mark(metavar="ID"),
 ]
 Answers = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--answer",
-        metavar="FILE",
-        help="Enter what was requested, by the answer of 'toolkit sign'; once for each file.",
-    ),
+    "Enter what was requested, by the answer of 'toolkit sign'; once for each file.",
+    Mark(names=("--answer",), metavar="FILE"),
 ]
 Machine = Annotated[
     str | None,
-    typer.Option(
-        "--machine",
-        help="Machine definition that states the cells' polarity; default: the packaged one of the "
-        "instrument's name.",
-    ),
+    "Machine definition that states the cells' polarity; default: the packaged one of the instrument's name.",
 ]
 Home = Annotated[
     Path | None,
-    typer.Option(
-        "--home",
-        callback=_home,
-        help="Laboratory's home; default: the nearest folder upward with calibrations/.",
-    ),
+    "Laboratory's home; default: the nearest folder upward with calibrations/.",
+    Mark(check="toolkit.lab.home:find_home"),
 ]
-Id = Annotated[str, typer.Argument(help="Record id, such as rig-r2.")]
-ReportTemplate = Annotated[
-    Path | None,
-    typer.Option("--template", help="Word template; default: report_templates/org.docx of the home."),
-]
-AllowMissing = Annotated[
-    bool, typer.Option("--allow-missing", help="Print n/a for a value that the test does not have.")
-]
-CalibrationId = Annotated[
-    str | None,
-    typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
-]
-KnownAt = Annotated[
-    datetime | None,
-    typer.Option(
-        "--known-at", parser=moment_of, metavar=FORM, help="Judge the registry as known on this day."
-    ),
-]
+Id = Annotated[str, "Record id, such as rig-r2.", ARGUMENT]
+ReportTemplate = Annotated[Path | None, "Word template; default: report_templates/org.docx of the home."]
+AllowMissing = Annotated[bool, "Print n/a for a value that the test does not have."]
+CalibrationId = Annotated[str | None, "Record id; default: the one in force on the test's date."]
+KnownAt = Annotated[datetime | None, "Judge the registry as known on this day.", DAY]
 Draft = Annotated[
-    bool,
-    typer.Option(
-        "--draft",
-        help="Allow a record that is not approved and in force; everything made is then marked as a draft.",
-    ),
+    bool, "Allow a record that is not approved and in force; everything made is then marked as a draft."
 ]
 Seal = Annotated[
     Path | None,
-    typer.Option(
-        "--seal",
-        metavar="KEY",
-        help="Seal what is issued by this key, PKCS #12 or PEM; default: TOOLKIT_SEAL_KEY.",
-    ),
+    "Seal what is issued by this key, PKCS #12 or PEM; default: TOOLKIT_SEAL_KEY.",
+    Mark(metavar="KEY"),
 ]
-TimeStamp = Annotated[
-    str | None, typer.Option("--time-stamp", metavar="URL", help="Time-stamp server of the seal (RFC 3161).")
-]
+TimeStamp = Annotated[str | None, "Time-stamp server of the seal (RFC 3161).", Mark(metavar="URL")]
 ProtocolFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--protocol", metavar="FILE", help="Protocol (.toml); default: the test's own, else the machine's."
-    ),
+    Path | None, "Protocol (.toml); default: the test's own, else the machine's.", Mark(metavar="FILE")
 ]
 Isolated = Annotated[
     bool,
-    typer.Option(
-        "--isolated",
-        help="Run the case's own code without network, and with a read-only view of the files but for a "
-        "temporary folder; where the kernel cannot, stop.",
-    ),
+    "Run the case's own code without network, and with a read-only view of the files but for a temporary "
+    "folder; where the kernel cannot, stop.",
 ]
 Memory = Annotated[
-    float | None,
-    typer.Option(
-        "--memory", min=0.05, help="GB that each process of the case's own code may take; default 4."
-    ),
+    float | None, "GB that each process of the case's own code may take; default 4.", Mark(min=0.05)
 ]
-Processes = Annotated[
-    int | None,
-    typer.Option("--processes", min=1, help="Processes that this code may have at once; default 64."),
-]
-Units = Annotated[
-    str, typer.Option("--units", help="SI or lbf, for people; the JSON answer is always in SI.")
-]
-Reader = Annotated[
-    str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
-]
+Processes = Annotated[int | None, "Processes that this code may have at once; default 64.", Mark(min=1)]
+Units = Annotated[str, "SI or lbf, for people; the JSON answer is always in SI."]
+Reader = Annotated[str, "calamine, or both: read again with openpyxl and compare."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,6 +123,12 @@ class Output:
 
     json: Json = False
     quiet: Quiet = False
+    began: float = field(default_factory=time.perf_counter, init=False, repr=False, compare=False)
+
+    @property
+    def timing(self) -> Timing:
+        """How long the command has taken until now."""
+        return {"seconds": time.perf_counter() - self.began}
 
     @property
     def silent(self) -> bool:

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Annotated, TypedDict, cast
 
 import typer
 
-from toolkit.cli.console import answers, ask_passphrase
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import ask_passphrase
 from toolkit.cli.options import (
+    INTO_FILE,
+    INTO_FOLDER,
     DecisionOptions,
     Output,
     RegistryOptions,
     Sign,
-    into_file,
-    into_folder,
     open_signers,
 )
 
@@ -34,20 +35,16 @@ class KeyAnswer(TypedDict):
 person = typer.Typer(help="The people of the laboratory, their keys and roles.", no_args_is_help=True)
 ledger = typer.Typer(help="The ledger, as documents and witnesses know it.", no_args_is_help=True)
 
-By = Annotated[
-    str | None, typer.Option("--by", help="Who decides, by id; default: whose key signs or has answered.")
-]
-Why = Annotated[str, typer.Option("--reason", help="Why; the log of people keeps it.")]
-Instrument = Annotated[str, typer.Argument(help="Instrument, such as rig, or people: the log of people.")]
+By = Annotated[str | None, "Who decides, by id; default: whose key signs or has answered."]
+Why = Annotated[str, "Why; the log of people keeps it."]
+Instrument = Annotated[str, "Instrument, such as rig, or people: the log of people.", ARGUMENT]
 
 
 @person.command()
 @answers(KeyAnswer)
 def key(
-    file: Annotated[
-        Path, typer.Argument(callback=into_file, help="New private key; its public half is FILE.pub.")
-    ],
-    comment: Annotated[str, typer.Option("--comment", help="Whose it is.")] = "",
+    file: Annotated[Path, "New private key; its public half is FILE.pub.", ARGUMENT, INTO_FILE],
+    comment: Annotated[str, "Whose it is."] = "",
     *,
     output: Output,
 ) -> int:
@@ -66,14 +63,12 @@ def key(
 @person.command()
 @answers("toolkit.lab.signatures.people:PeopleAnswer")
 def enrol(
-    person_id: Annotated[str, typer.Argument(metavar="ID", help="Short name of the person.")],
-    name: Annotated[str, typer.Option("--name", help="As documents print it.")],
-    role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
-    key: Annotated[Path, typer.Option("--key", help="The person's public key, FILE.pub.")],
+    person_id: Annotated[str, "Short name of the person.", ARGUMENT, Mark(metavar="ID")],
+    name: Annotated[str, "As documents print it."],
+    role: Annotated[list[str], "operator, checker, head or auditor; repeat it."],
+    key: Annotated[Path, "The person's public key, FILE.pub."],
     reason: Why = "enrolled",
-    recovery: Annotated[
-        Path | None, typer.Option("--recovery", help="Key that is kept apart: first enrolment by one head.")
-    ] = None,
+    recovery: Annotated[Path | None, "Key that is kept apart: first enrolment by one head."] = None,
     by: By = None,
     *,
     entering: DecisionOptions,
@@ -111,12 +106,10 @@ def list_people(*, place: RegistryOptions, output: Output) -> int:
 @person.command()
 @answers("toolkit.lab.signatures.people:PeopleAnswer")
 def revoke(
-    person_id: Annotated[str, typer.Argument(metavar="ID", help="Whose key.")],
-    since: Annotated[
-        str, typer.Option("--from", help="First moment it signs nothing, 2026-11-22T10:11:12Z.")
-    ],
+    person_id: Annotated[str, "Whose key.", ARGUMENT, Mark(metavar="ID")],
+    since: Annotated[str, "First moment it signs nothing, 2026-11-22T10:11:12Z.", Mark(names=("--from",))],
     reason: Why,
-    key: Annotated[str | None, typer.Option("--key", help="Its fingerprint; default: every key.")] = None,
+    key: Annotated[str | None, "Its fingerprint; default: every key."] = None,
     by: By = None,
     *,
     entering: DecisionOptions,
@@ -137,12 +130,10 @@ def revoke(
 @person.command()
 @answers("toolkit.lab.signatures.people:PeopleAnswer")
 def policy(
-    action: Annotated[str, typer.Argument(help="enter, approve, withdraw, discard, import, issue or enrol.")],
-    role: Annotated[list[str], typer.Option("--role", help="operator, checker, head or auditor; repeat it.")],
+    action: Annotated[str, "enter, approve, withdraw, discard, import, issue or enrol.", ARGUMENT],
+    role: Annotated[list[str], "operator, checker, head or auditor; repeat it."],
     reason: Why,
-    signatures: Annotated[
-        int, typer.Option("--signatures", help="Number of signatures, each of another person.")
-    ] = 1,
+    signatures: Annotated[int, "Number of signatures, each of another person."] = 1,
     by: By = None,
     *,
     entering: DecisionOptions,
@@ -172,11 +163,9 @@ def policy(
 @answers("toolkit.lab.signatures.people:ProofAnswer")
 def prove(
     instrument: Instrument,
-    entry: Annotated[int | None, typer.Option("--entry", help="Entry, from 1; default: the last.")] = None,
+    entry: Annotated[int | None, "Entry, from 1; default: the last."] = None,
     sign: Sign = None,
-    time_stamp: Annotated[
-        str | None, typer.Option("--time-stamp", metavar="URL", help="Stamp the checkpoint (RFC 3161).")
-    ] = None,
+    time_stamp: Annotated[str | None, "Stamp the checkpoint (RFC 3161).", Mark(metavar="URL")] = None,
     *,
     place: RegistryOptions,
     output: Output,
@@ -203,14 +192,9 @@ def prove(
 @ledger.command()
 @answers("toolkit.lab.signatures.people:CheckLedgerAnswer")
 def check(
-    against: Annotated[
-        Path,
-        typer.Option(
-            "--against", help="A document as it was issued, a proof, a QR code's text, a checkpoint."
-        ),
-    ],
+    against: Annotated[Path, "A document as it was issued, a proof, a QR code's text, a checkpoint."],
     instrument: Annotated[
-        str | None, typer.Argument(help="Instrument; default: the one that the document's proof names.")
+        str | None, "Instrument; default: the one that the document's proof names.", ARGUMENT
     ] = None,
     *,
     place: RegistryOptions,
@@ -240,11 +224,9 @@ def check(
 @answers("toolkit.lab.signatures.people:WitnessAnswer")
 def witness(
     instrument: Instrument,
-    folder: Annotated[
-        Path, typer.Argument(callback=into_folder, help="The witness's folder: a share, a stick.")
-    ],
-    name: Annotated[str, typer.Option("--name", help="Of the witness.")],
-    key: Annotated[Path, typer.Option("--key", help="The witness's private key.")],
+    folder: Annotated[Path, "The witness's folder: a share, a stick.", ARGUMENT, INTO_FOLDER],
+    name: Annotated[str, "Of the witness."],
+    key: Annotated[Path, "The witness's private key."],
     sign: Sign = None,
     *,
     place: RegistryOptions,

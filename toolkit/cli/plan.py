@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast
 
 import typer
 
-from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import Draft, KnownAt, Output, RegistryOptions, day, into_folder, moment_of
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
+from toolkit.cli.options import DAY, INTO_FOLDER, Draft, KnownAt, Output, RegistryOptions, day
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -19,78 +19,41 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Plans: what to measure next: sessions, tests, runs, intervals.", no_args_is_help=True)
 
-Out = Annotated[
-    Path | None,
-    typer.Option("--out", callback=into_folder, help="Folder for the plan's files; none of them may exist."),
-]
-SheetTemplate = Annotated[
-    Path | None,
-    typer.Option("--template", help="Word template of the plan's sheet, plan.docx and plan.pdf in --out."),
-]
+Out = Annotated[Path | None, "Folder for the plan's files; none of them may exist.", INTO_FOLDER]
+SheetTemplate = Annotated[Path | None, "Word template of the plan's sheet, plan.docx and plan.pdf in --out."]
 
 
 @app.command("session")
 @answers("toolkit.lab.plans.plan_session:PlanSessionAnswer")
 def session(
-    instrument: Annotated[
-        str, typer.Argument(help="Instrument, such as rig: its record in force is the basis.")
-    ],
+    instrument: Annotated[str, "Instrument, such as rig: its record in force is the basis.", ARGUMENT],
     session_file: Annotated[
-        Path | None, typer.Option("--session", metavar="FILE", help="SESSION.toml to plan from instead.")
+        Path | None, "SESSION.toml to plan from instead.", Mark(names=("--session",), metavar="FILE")
     ] = None,
-    calibration: Annotated[
-        str | None,
-        typer.Option("--calibration", help="Record id to plan from; default: the one in force."),
-    ] = None,
+    calibration: Annotated[str | None, "Record id to plan from; default: the one in force."] = None,
     draft: Draft = False,
     fixtures: Annotated[
         Path | None,
-        typer.Option(
-            "--fixtures",
-            metavar="FILE",
-            help="Loading fixtures (.toml): weights, arms, minutes; default: the machine definition's, "
-            "else the loads of the last session.",
-        ),
+        "Loading fixtures (.toml): weights, arms, minutes; default: the machine definition's, else the "
+        "loads of the last session.",
+        Mark(metavar="FILE"),
     ] = None,
     machine: Annotated[
         str | None,
-        typer.Option(
-            "--machine",
-            help="Machine definition whose [loading] states the fixtures; default: the packaged one of the "
-            "instrument's name.",
-        ),
+        "Machine definition whose [loading] states the fixtures; default: the packaged one of the "
+        "instrument's name.",
     ] = None,
     demands: Annotated[
         list[str] | None,
-        typer.Option(
-            "--u",
-            metavar="LOAD=U",
-            help='U asked for at the largest load, "FY=20 N", or at another, "FY=20 N at 4 kN"; once a load.',
-        ),
+        'U asked for at the largest load, "FY=20 N", or at another, "FY=20 N at 4 kN"; once a load.',
+        Mark(names=("--u",), metavar="LOAD=U"),
     ] = None,
-    minutes: Annotated[
-        float | None, typer.Option("--minutes", help="Time at most, check loads included.")
-    ] = None,
-    loads: Annotated[int | None, typer.Option("--loads", help="Loads at most, check loads apart.")] = None,
-    criterion: Annotated[
-        str, typer.Option("--criterion", help="D, I or G: of what the loads are optimal.")
-    ] = "D",
-    two_levels: Annotated[
-        bool,
-        typer.Option("--two-levels", help="Allow plans at which no misfit of the equations can be seen."),
-    ] = False,
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Of the search and of the simulated sessions.")
-    ] = 0,
-    on: Annotated[
-        datetime | None,
-        typer.Option(
-            "--on",
-            parser=moment_of,
-            metavar="YYYY-MM-DD",
-            help="Day whose record in force is taken; default: today.",
-        ),
-    ] = None,
+    minutes: Annotated[float | None, "Time at most, check loads included."] = None,
+    loads: Annotated[int | None, "Loads at most, check loads apart."] = None,
+    criterion: Annotated[str, "D, I or G: of what the loads are optimal."] = "D",
+    two_levels: Annotated[bool, "Allow plans at which no misfit of the equations can be seen."] = False,
+    seed: Annotated[int, "Of the search and of the simulated sessions.", Mark(min=0)] = 0,
+    on: Annotated[datetime | None, "Day whose record in force is taken; default: today.", DAY] = None,
     out: Out = None,
     template: SheetTemplate = None,
     known_at: KnownAt = None,
@@ -120,7 +83,6 @@ def session(
             "an unknown criterion", where="--criterion", got=criterion, expected=", ".join(CRITERIA),
             next_step="name one of those", rule="usage",
         )  # fmt: skip
-    started = time.perf_counter()
     order = PlanOrder(
         instrument=instrument, session=session_file, calibration=calibration, draft=draft,
         fixtures=fixtures, machine=machine, demands=tuple(demands or ()),
@@ -128,7 +90,7 @@ def session(
         known_at=day(known_at), out=out, template=document_template(template, out),
     )  # fmt: skip
     planned, text, findings = session_plan_answer(place.registry(), order)
-    return max(answered(planned, text, started, output), exit_code(findings))
+    return max(answered(planned, text, output), exit_code(findings))
 
 
 class Planned(Protocol):
@@ -139,36 +101,23 @@ class Planned(Protocol):
         """Its sheet."""
 
 
-def answered(planned: Planned, text: str, started: float, output: Output) -> int:
+def answered(planned: Planned, text: str, output: Output) -> int:
     """Print a plan with the time that it took; return 1 where its sheet has warnings."""
     from toolkit.declared import answer
 
-    timing = {"seconds": time.perf_counter() - started}
-    output.answer(answer(dataclasses.replace(cast("Any", planned), timing=timing)), text)
+    output.answer(answer(dataclasses.replace(cast("Any", planned), timing=output.timing)), text)
     return int(planned.document is not None and bool(planned.document["warnings"]))
 
 
 @app.command("interval")
 @answers("toolkit.lab.plans.plan_interval:PlanIntervalAnswer")
 def interval(
-    instrument: Annotated[
-        str, typer.Argument(help="Instrument, such as rig: by the history of its check loads.")
-    ],
-    reliability: Annotated[
-        float, typer.Option("--reliability", help="Chance to be inside the tolerance at the interval's end.")
-    ] = 0.95,
-    tests: Annotated[
-        float | None, typer.Option("--tests", help="Tests a year, for how many of them are put at risk.")
-    ] = None,
-    load: Annotated[str | None, typer.Option("--load", help="By the errors of this load only.")] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", callback=into_folder, help="Folder for its sheet, plan.docx and plan.pdf."),
-    ] = None,
-    template: Annotated[
-        Path | None,
-        typer.Option("--template", help="Word template of --out; default: report_templates/plan.docx."),
-    ] = None,
+    instrument: Annotated[str, "Instrument, such as rig: by the history of its check loads.", ARGUMENT],
+    reliability: Annotated[float, "Chance to be inside the tolerance at the interval's end."] = 0.95,
+    tests: Annotated[float | None, "Tests a year, for how many of them are put at risk."] = None,
+    load: Annotated[str | None, "By the errors of this load only."] = None,
+    out: Annotated[Path | None, "Folder for its sheet, plan.docx and plan.pdf.", INTO_FOLDER] = None,
+    template: Annotated[Path | None, "Word template of --out; default: report_templates/plan.docx."] = None,
     *,
     place: RegistryOptions,
     output: Output,
@@ -184,9 +133,8 @@ def interval(
     from toolkit.lab.home import document_template
     from toolkit.lab.plans.plan_interval import interval_plan_answer
 
-    started = time.perf_counter()
     planned, text, findings = interval_plan_answer(
         place.registry(), instrument, reliability=reliability, tests_a_year=tests, load=load,
         out=out, template=document_template(template, out, default="plan.docx", home=place.home),
     )  # fmt: skip
-    return max(answered(planned, text, started, output), exit_code(findings))
+    return max(answered(planned, text, output), exit_code(findings))

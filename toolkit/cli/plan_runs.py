@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from toolkit.cli.console import answers
-from toolkit.cli.options import CalibrationId, Draft, Output, RegistryOptions, WorkerOptions, into_folder
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.options import INTO_FOLDER, CalibrationId, Draft, Output, RegistryOptions, WorkerOptions
 from toolkit.cli.plan import SheetTemplate, answered, app
 
 
@@ -19,58 +16,38 @@ from toolkit.cli.plan import SheetTemplate, answered, app
 def protocol(
     like: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--like",
-            metavar="TEST|TIRE",
-            help="Earlier test of such a tire, or a tire file (.tir, model.toml); repeatable: the plan "
-            "serves each of them. Default: passenger tires, by the published one on the virtual machine.",
-        ),
+        "Earlier test of such a tire, or a tire file (.tir, model.toml); repeatable: the plan serves each "
+        "of them. Default: passenger tires, by the published one on the virtual machine.",
+        Mark(metavar="TEST|TIRE"),
     ] = None,
     spread: Annotated[
         list[str] | None,
-        typer.Option(
-            "--spread",
-            metavar="NAME=LOW..HIGH",
-            help="How far tires of the class may be from it, as factors: stiffness=0.7..1.3, "
-            "friction=0.9..1.1; the plan serves all of them. Default: as tested; of passenger tires, "
-            "stiffness=0.41..1.11.",
-        ),
+        "How far tires of the class may be from it, as factors: stiffness=0.7..1.3, friction=0.9..1.1; the "
+        "plan serves all of them. Default: as tested; of passenger tires, stiffness=0.41..1.11.",
+        Mark(metavar="NAME=LOW..HIGH"),
     ] = None,
     u: Annotated[
         list[str] | None,
-        typer.Option(
-            "--u",
-            metavar="NAME=U",
-            help="Largest expanded uncertainty: 'conicity=2 N', 'slope_cornering=2 %', 'FY@8deg=40 N', "
-            "'peak=1 %'; a name alone: that of the machine's protocol. Repeatable; default: "
-            "slope_cornering, conicity, plysteer and peak as by the protocol.",
-        ),
+        "Largest expanded uncertainty: 'conicity=2 N', 'slope_cornering=2 %', 'FY@8deg=40 N', 'peak=1 %'; a "
+        "name alone: that of the machine's protocol. Repeatable; default: slope_cornering, conicity, "
+        "plysteer and peak as by the protocol.",
+        Mark(metavar="NAME=U"),
     ] = None,
     load: Annotated[
-        list[str] | None,
-        typer.Option("--load", metavar="LOAD", help="At which load, '833 lbf'; repeatable; default: all."),
+        list[str] | None, "At which load, '833 lbf'; repeatable; default: all.", Mark(metavar="LOAD")
     ] = None,
-    minutes: Annotated[
-        float, typer.Option("--minutes", help="Time on the machine at most.")
-    ] = math.inf,
+    minutes: Annotated[float, "Time on the machine at most."] = math.inf,
     between_files: Annotated[
-        float | None,
-        typer.Option("--between-files", metavar="SECONDS", min=0.0,
-                     help="From one recording to the next; default 30."),
+        float | None, "From one recording to the next; default 30.", Mark(metavar="SECONDS", min=0.0)
     ] = None,
     sliding: Annotated[
-        float, typer.Option("--sliding", metavar="KJ", help="Energy that may slide away: wear of the tread.")
+        float, "Energy that may slide away: wear of the tread.", Mark(metavar="KJ")
     ] = math.inf,
     rise: Annotated[
-        float, typer.Option("--rise", metavar="K", help="Warmth of the tread over the room; pauses keep it.")
+        float, "Warmth of the tread over the room; pauses keep it.", Mark(metavar="K")
     ] = math.inf,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            callback=into_folder,
-            help="Folder for protocol.toml and the plan.toml of `toolkit simulate`.",
-        ),
+        Path | None, "Folder for protocol.toml and the plan.toml of `toolkit simulate`.", INTO_FOLDER
     ] = None,
     template: SheetTemplate = None,
     calibration: CalibrationId = None,
@@ -78,7 +55,7 @@ def protocol(
     *,
     place: RegistryOptions,
     output: Output,
-) -> int:  # fmt: skip
+) -> int:
     """Plan the shortest test that reaches stated uncertainties.
 
     Slip angles, loads and directions, by the budget that `toolkit process` prints. A demand that no
@@ -89,7 +66,6 @@ def protocol(
     from toolkit.lab.home import document_template
     from toolkit.lab.plans.protocol_plan import ProtocolOrder, plan_test
 
-    started = time.perf_counter()
     order = ProtocolOrder(
         like=tuple(like or ()), spread=tuple(spread or ()), demands=tuple(u or ()), loads=tuple(load or ()),
         minutes=minutes,
@@ -100,35 +76,24 @@ def protocol(
     opened = document_template(template, out)
     with output.progress("planning") as step:
         planned, text = plan_test(order, out, template=opened, tell=step)
-    return answered(planned, text, started, output)
+    return answered(planned, text, output)
 
 
 @app.command("next")
 @answers("toolkit.lab.plans.next_run:PlanNextAnswer")
 def following(
     source: Annotated[
-        Path,
-        typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its diagnosis.json."),
+        Path, "Folder of toolkit diagnose --out, or its diagnosis.json.", ARGUMENT, Mark(metavar="ANSWER")
     ],
-    case: Annotated[
-        Path | None, typer.Option("--case", help="The case; default: the one that the answer's model names.")
-    ] = None,
+    case: Annotated[Path | None, "The case; default: the one that the answer's model names."] = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(
-            "--limit",
-            metavar="NAME=LOW..HIGH",
-            help="What an input may reach, in its unit; repeatable; default: what was recorded.",
-        ),
+        "What an input may reach, in its unit; repeatable; default: what was recorded.",
+        Mark(metavar="NAME=LOW..HIGH"),
     ] = None,
-    budget: Annotated[float, typer.Option("--budget", min=1.0, help="Seconds of the search.")] = 45.0,
+    budget: Annotated[float, "Seconds of the search.", Mark(min=1.0)] = 45.0,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            callback=into_folder,
-            help="Folder for the inputs, what each member predicts, and the steps.",
-        ),
+        Path | None, "Folder for the inputs, what each member predicts, and the steps.", INTO_FOLDER
     ] = None,
     template: SheetTemplate = None,
     *,
@@ -147,7 +112,6 @@ def following(
     from toolkit.lab.home import document_template
     from toolkit.lab.plans.next_run import plan_next
 
-    started = time.perf_counter()
     opened = document_template(template, out)
     with output.progress("planning") as step:
         planned, text = plan_next(
@@ -155,4 +119,4 @@ def following(
             calibrations=place.calibrations, home=place.home, worker=worker.limits(), template=opened,
             tell=step,
         )  # fmt: skip
-    return answered(planned, text, started, output)
+    return answered(planned, text, output)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
 from toolkit.cli.options import (
+    INTO_FILE,
     CalibrationId,
     Draft,
     KnownAt,
@@ -19,7 +18,6 @@ from toolkit.cli.options import (
     RegistryOptions,
     Units,
     day,
-    into_file,
 )
 from toolkit.cli.options import reader as choose_reader
 
@@ -31,13 +29,10 @@ NAME = "process"
 
 @answers("toolkit.lab.tire_tests.process_answer:ProcessAnswer")
 def command(
-    test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
+    test: Annotated[Path, "Folder with test.toml and the recordings.", ARGUMENT, Mark(metavar="TEST")],
     calibration: CalibrationId = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", callback=into_file, help="Write the reduced test (.xlsx: the whole test in one file)."
-        ),
+        Path | None, "Write the reduced test (.xlsx: the whole test in one file).", INTO_FILE
     ] = None,
     known_at: KnownAt = None,
     draft: Draft = False,
@@ -63,7 +58,6 @@ def command(
     engine, style = choose_reader(reader), unit_choice(units)
     if out is not None:
         refuse_original(out, suffix=".xlsx")
-    started = time.perf_counter()
     with output.progress("reading") as step:
         resolved = resolve_test(
             test,
@@ -81,7 +75,7 @@ def command(
         **process_payload(resolved),
         "out": out,
         "content_sha256": digest,
-        "timing": {"seconds": time.perf_counter() - started},
+        "timing": output.timing,
     }
     output.answer(payload, process_text(resolved, out, style))
     return exit_code(resolved.findings)

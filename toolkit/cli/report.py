@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from toolkit.cli.console import answers
+from toolkit.cli.command import ARGUMENT, Mark, answers
 from toolkit.cli.options import (
+    INTO_FOLDER,
     AllowMissing,
     CalibrationId,
     Draft,
@@ -20,7 +18,6 @@ from toolkit.cli.options import (
     Reader,
     ReportTemplate,
     day,
-    into_folder,
 )
 from toolkit.cli.options import reader as choose_reader
 
@@ -31,75 +28,49 @@ NAME = "report"
 def command(
     tests: Annotated[
         list[Path],
-        typer.Argument(metavar="TEST...", help="Folders with test.toml and recordings, or reduced tests."),
+        "Folders with test.toml and recordings, or reduced tests.",
+        ARGUMENT,
+        Mark(metavar="TEST..."),
     ],
     template: ReportTemplate = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            callback=into_folder,
-            help="Output folder; of several tests, each has its own in it. Default: report-<test name> here.",
-        ),
+        "Output folder; of several tests, each has its own in it. Default: report-<test name> here.",
+        INTO_FOLDER,
     ] = None,
     details: Annotated[
-        Path | None,
-        typer.Option("--details", help="TOML file with customer, method, opinions ... in place of [report]."),
+        Path | None, "TOML file with customer, method, opinions ... in place of [report]."
     ] = None,
-    xlsx: Annotated[
-        bool, typer.Option("--xlsx", help="Hand over test.xlsx: the whole test in one file.")
-    ] = False,
-    tydex: Annotated[bool, typer.Option("--tydex", help="Hand over test.tdx (TYDEX 1.3).")] = False,
-    tir: Annotated[
-        bool, typer.Option("--tir", help="Hand over tire.tir: MF 6.1 over all loads, forward run.")
-    ] = False,
-    hand_over: Annotated[
-        bool, typer.Option("--hand-over", help="All of the three: test.xlsx, test.tdx, tire.tir.")
-    ] = False,
+    xlsx: Annotated[bool, "Hand over test.xlsx: the whole test in one file."] = False,
+    tydex: Annotated[bool, "Hand over test.tdx (TYDEX 1.3)."] = False,
+    tir: Annotated[bool, "Hand over tire.tir: MF 6.1 over all loads, forward run."] = False,
+    hand_over: Annotated[bool, "All of the three: test.xlsx, test.tdx, tire.tir."] = False,
     models: Annotated[
         list[str] | None,
-        typer.Option(
-            "--models",
-            help="Compare tire models in the report (tk:table.models): a name, may be repeated; 'all' is "
-            "every one. Fits take seconds.",
-        ),
+        "Compare tire models in the report (tk:table.models): a name, may be repeated; 'all' is every one. "
+        "Fits take seconds.",
     ] = None,
     units: Annotated[
         str | None,
-        typer.Option(
-            "--units",
-            help="SI or lbf: N and N*m, or lbf and lbf*ft, in tables, figures and text of the report. "
-            "Default: the style file's. What is handed over beside it stays in SI, a diagnosis in the units "
-            "of its case.",
-        ),
+        "SI or lbf: N and N*m, or lbf and lbf*ft, in tables, figures and text of the report. Default: the "
+        "style file's. What is handed over beside it stays in SI, a diagnosis in the units of its case.",
     ] = None,
     diagnosis: Annotated[
         Path | None,
-        typer.Option(
-            "--diagnosis",
-            metavar="DIR_OR_JSON",
-            help="Tell the answer of 'toolkit diagnose' in a chapter of the report (tk:diagnosis.*).",
-        ),
+        "Tell the answer of 'toolkit diagnose' in a chapter of the report (tk:diagnosis.*).",
+        Mark(metavar="DIR_OR_JSON"),
     ] = None,
-    by: Annotated[
-        str | None,
-        typer.Option("--by", help="Who releases the diagnosis' opinion on the cause; else a draft."),
-    ] = None,
+    by: Annotated[str | None, "Who releases the diagnosis' opinion on the cause; else a draft."] = None,
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     draft: Draft = False,
     issue: Annotated[
-        bool,
-        typer.Option(
-            "--issue", help="Enter the report in the ledger; its PDF carries the proof. With --seal always."
-        ),
+        bool, "Enter the report in the ledger; its PDF carries the proof. With --seal always."
     ] = False,
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: AllowMissing = False,
-    keep: Annotated[
-        bool, typer.Option("--keep", help="Keep a report that was not verified in rejected/ of the folder.")
-    ] = False,
+    keep: Annotated[bool, "Keep a report that was not verified in rejected/ of the folder."] = False,
     *,
     issuing: IssueOptions,
     output: Output,
@@ -118,7 +89,6 @@ def command(
     from toolkit.report.word.office import Office
 
     engine = choose_reader(reader)
-    started = time.perf_counter()
     issued = None
     if issue or issuing.asked:
         from toolkit.lab.signatures.issuing import open_issuing
@@ -174,7 +144,7 @@ def command(
             issuing=issued,
         )
         delivered = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
-    payload = reports_payload(delivered, {"seconds": time.perf_counter() - started})
+    payload = reports_payload(delivered, output.timing)
     output.answer(payload, "\n\n".join(report_text(report) for report in delivered))
     return max(
         2 if report.resolved is None or isinstance(report.outcome, Exception) else int(attention(report))

@@ -8,8 +8,9 @@ from typing import Annotated, TypedDict
 
 import typer
 
-from toolkit.cli.console import answers, ask_passphrase, say
-from toolkit.cli.options import Output, into_file
+from toolkit.cli.command import ARGUMENT, answers
+from toolkit.cli.console import ask_passphrase, say
+from toolkit.cli.options import INTO_FILE, Output
 from toolkit.errors import ConfigError
 
 
@@ -26,23 +27,12 @@ NAME = "sign"
 
 @answers(SignAnswer)
 def command(
-    request: Annotated[Path, typer.Argument(help="What --request wrote, or the answer of another person.")],
-    key: Annotated[
-        Path | None, typer.Option("--key", help="Private SSH key, or the public one of a key in the agent.")
-    ] = None,
-    agent: Annotated[
-        bool, typer.Option("--agent", help="The key of the SSH agent that may sign it.")
-    ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", callback=into_file, help="Answer; default: beside the request, by who signs."),
-    ] = None,
-    passphrase_fd: Annotated[
-        int | None, typer.Option("--passphrase-fd", help="File descriptor that gives the key's passphrase.")
-    ] = None,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Sign without asking, for use without a terminal.")
-    ] = False,
+    request: Annotated[Path, "What --request wrote, or the answer of another person.", ARGUMENT],
+    key: Annotated[Path | None, "Private SSH key, or the public one of a key in the agent."] = None,
+    agent: Annotated[bool, "The key of the SSH agent that may sign it."] = False,
+    out: Annotated[Path | None, "Answer; default: beside the request, by who signs.", INTO_FILE] = None,
+    passphrase_fd: Annotated[int | None, "File descriptor that gives the key's passphrase."] = None,
+    yes: Annotated[bool, "Sign without asking, for use without a terminal."] = False,
     *,
     output: Output,
 ) -> int:

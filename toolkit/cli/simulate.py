@@ -5,52 +5,34 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from toolkit.cli.console import answers, exit_code
-from toolkit.cli.options import Output, RegistryOptions, WorkerOptions, into_folder
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import exit_code
+from toolkit.cli.options import INTO_FOLDER, Output, RegistryOptions, WorkerOptions
 
 NAME = "simulate"
 
 
 @answers("toolkit.lab.studies.simulate:SimulateForms")
 def command(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="What the machine does, and what it is.")],
-    out: Annotated[
-        Path, typer.Option("--out", callback=into_folder, help="Folder for the files; new or empty.")
-    ],
-    seed: Annotated[int | None, typer.Option("--seed", help="Replaces the plan's seed.")] = None,
+    plan: Annotated[Path, "What the machine does, and what it is.", ARGUMENT, Mark(metavar="PLAN.toml")],
+    out: Annotated[Path, "Folder for the files; new or empty.", INTO_FOLDER],
+    seed: Annotated[int | None, "Replaces the plan's seed."] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option(
-            "--effect",
-            metavar="NAME[.CHANNEL][@KEY:VALUE][=VALUE]",
-            help="Switch an effect of the catalogue on, beside the plan's own; repeatable.",
-        ),
+        "Switch an effect of the catalogue on, beside the plan's own; repeatable.",
+        Mark(metavar="NAME[.CHANNEL][@KEY:VALUE][=VALUE]"),
     ] = None,
-    csv: Annotated[
-        Path | None,
-        typer.Option("--csv", callback=into_folder, help="Folder for the recordings as CSV, every column."),
-    ] = None,
+    csv: Annotated[Path | None, "Folder for the recordings as CSV, every column.", INTO_FOLDER] = None,
     case: Annotated[
-        Path | None,
-        typer.Option(
-            "--case",
-            callback=into_folder,
-            help="Folder for a case that `toolkit diagnose` reads; it names no effect.",
-        ),
+        Path | None, "Folder for a case that `toolkit diagnose` reads; it names no effect.", INTO_FOLDER
     ] = None,
     inputs: Annotated[
-        list[Path] | None,
-        typer.Option("--inputs", metavar="FILE.csv", help="Inputs of a model file; repeatable."),
+        list[Path] | None, "Inputs of a model file; repeatable.", Mark(metavar="FILE.csv")
     ] = None,
     condition: Annotated[
-        list[str] | None,
-        typer.Option("--condition", metavar="KEY=VALUE", help="Condition of all inputs; repeatable."),
+        list[str] | None, "Condition of all inputs; repeatable.", Mark(metavar="KEY=VALUE")
     ] = None,
-    budget: Annotated[
-        float, typer.Option("--budget", min=1.0, help="Seconds that a model's own code may take.")
-    ] = 600.0,
+    budget: Annotated[float, "Seconds that a model's own code may take.", Mark(min=1.0)] = 600.0,
     *,
     worker: WorkerOptions,
     place: RegistryOptions,

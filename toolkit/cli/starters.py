@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypedDict
 
 import typer
 
-from toolkit.cli.console import answers
+from toolkit.cli.command import ARGUMENT, Mark, answers
 from toolkit.cli.options import Output
 
 
@@ -24,23 +24,21 @@ class StarterAnswer(TypedDict):
 
 
 NEW = "new"
-_FILE = typer.Argument(metavar="FILE", help="A new .toml file; nothing is written over.")
+File = Annotated[Path, "A new .toml file; nothing is written over.", ARGUMENT, Mark(metavar="FILE")]
 Set = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="State an entry; KEY may be TABLE.KEY; once for each entry."
-    ),
+    "State an entry; KEY may be TABLE.KEY; once for each entry.",
+    Mark(names=("--set",), metavar="KEY=VALUE"),
 ]
 From = Annotated[
     Path | None,
-    typer.Option("--from", metavar="RECORDING", help="Guess from the columns and units of a recording."),
+    "Guess from the columns and units of a recording.",
+    Mark(names=("--from",), metavar="RECORDING"),
 ]
 Ask = Annotated[
     bool | None,
-    typer.Option(
-        "--ask/--no-ask",
-        help="Ask for what must be stated; default: on a terminal, without --json and --quiet.",
-    ),
+    "Ask for what must be stated; default: on a terminal, without --json and --quiet.",
+    Mark(names=("--ask/--no-ask",)),
 ]
 
 session = typer.Typer(help="Calibration sessions: begin a file.", no_args_is_help=True)
@@ -58,7 +56,7 @@ def _group() -> None:
 @session.command(NEW)
 @answers(StarterAnswer)
 def new_session(
-    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None, *,
+    file: File, entries: Set = None, recording: From = None, ask: Ask = None, *,
     output: Output,
 ) -> int:  # fmt: skip
     """Begin a session file; --from takes loads and indications from a table's headers and units.
@@ -70,7 +68,7 @@ def new_session(
 
 @answers(StarterAnswer)
 def new_machine(
-    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None, *,
+    file: File, entries: Set = None, recording: From = None, ask: Ask = None, *,
     output: Output,
 ) -> int:  # fmt: skip
     """Begin a machine definition; --from takes the columns from a recording's headers and units.
@@ -83,7 +81,7 @@ def new_machine(
 @test.command(NEW)
 @answers(StarterAnswer)
 def new_test(
-    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, *, output: Output,
+    file: File, entries: Set = None, ask: Ask = None, *, output: Output,
 ) -> int:  # fmt: skip
     """Begin the test.toml of a folder of recordings.
 
@@ -95,7 +93,7 @@ def new_test(
 @case.command(NEW)
 @answers(StarterAnswer)
 def new_case(
-    file: Annotated[Path, _FILE], entries: Set = None, recording: From = None, ask: Ask = None, *,
+    file: File, entries: Set = None, recording: From = None, ask: Ask = None, *,
     output: Output,
 ) -> int:  # fmt: skip
     """Begin a case: a simulation and the recordings that it is held against; --from takes the channels.
@@ -107,7 +105,7 @@ def new_case(
 
 @answers(StarterAnswer)
 def new_plan(
-    file: Annotated[Path, _FILE], entries: Set = None, ask: Ask = None, *, output: Output,
+    file: File, entries: Set = None, ask: Ask = None, *, output: Output,
 ) -> int:  # fmt: skip
     """Begin a plan of the virtual machine.
 

@@ -8,8 +8,8 @@ from typing import Annotated, NotRequired, TypedDict
 
 import typer
 
-from toolkit.cli.console import answers
-from toolkit.cli.options import Draft, Output, RegistryOptions, into_file
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.options import INTO_FILE, Draft, Output, RegistryOptions
 
 
 class LintEntry(TypedDict):
@@ -78,7 +78,7 @@ app = typer.Typer(help="The contract of report templates.", no_args_is_help=True
 @app.command("check")
 @answers(TemplateCheckAnswer)
 def check(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Word template, .docx or .dotx.")],
+    file: Annotated[Path, "Word template, .docx or .dotx.", ARGUMENT, Mark(metavar="FILE")],
     *,
     output: Output,
 ) -> int:
@@ -112,23 +112,15 @@ def check(
 @app.command("tags")
 @answers(TagsAnswer)
 def tags(
-    test: Annotated[
-        Path | None, typer.Option("--test", help="Show which tags this test has, and their values.")
-    ] = None,
-    template: Annotated[
-        Path | None, typer.Option("--template", help="Take units and required tags from its style file.")
-    ] = None,
-    calibration: Annotated[str | None, typer.Option("--calibration", help="Record id.")] = None,
+    test: Annotated[Path | None, "Show which tags this test has, and their values."] = None,
+    template: Annotated[Path | None, "Take units and required tags from its style file."] = None,
+    calibration: Annotated[str | None, "Record id."] = None,
     draft: Draft = False,
     kind: Annotated[
-        str,
-        typer.Option(
-            "--kind", help="report, certificate, comparison, diagnosis or audit: tags of that document."
-        ),
+        str, "report, certificate, comparison, diagnosis or audit: tags of that document."
     ] = "report",
     for_print: Annotated[
-        Path | None,
-        typer.Option("--for-print", metavar="FILE.docx", help="Also a Word file of them, to copy from."),
+        Path | None, "Also a Word file of them, to copy from.", Mark(metavar="FILE.docx")
     ] = None,
     *,
     place: RegistryOptions,
@@ -179,12 +171,8 @@ def tags(
 @app.command("words")
 @answers(WordsAnswer)
 def words(
-    language: Annotated[
-        str | None, typer.Option("--language", help="This language alone; default: all but English.")
-    ] = None,
-    template: Annotated[
-        Path | None, typer.Option("--template", help="Only the texts that stand in this template.")
-    ] = None,
+    language: Annotated[str | None, "This language alone; default: all but English."] = None,
+    template: Annotated[Path | None, "Only the texts that stand in this template."] = None,
     *,
     output: Output,
 ) -> int:
@@ -229,21 +217,14 @@ def words(
 @app.command("new")
 @answers(NewTemplateAnswer)
 def new(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", callback=into_file, help="Where to write it: NAME.docx.")
-    ],
+    file: Annotated[Path, "Where to write it: NAME.docx.", ARGUMENT, INTO_FILE, Mark(metavar="FILE")],
     like: Annotated[
         str,
-        typer.Option(
-            "--like",
-            help="Which to copy: org, summary, pruefbericht, certificate, comparison, laboratories, "
-            "diagnosis, audit, plan.",
-        ),
+        "Which to copy: org, summary, pruefbericht, certificate, comparison, laboratories, diagnosis, "
+        "audit, plan.",
     ] = "org",
-    language: Annotated[
-        str, typer.Option("--language", help="Its texts in this language: en, de or fr.")
-    ] = "en",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    language: Annotated[str, "Its texts in this language: en, de or fr."] = "en",
+    force: Annotated[bool, "Overwrite an existing file."] = False,
     *,
     output: Output,
 ) -> int:

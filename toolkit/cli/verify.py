@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from toolkit.cli.console import answers
+from toolkit.cli.command import ARGUMENT, Mark, answers
 from toolkit.cli.options import Output, RegistryOptions
 
 NAME = "verify"
@@ -16,12 +14,12 @@ NAME = "verify"
 @answers("toolkit.lab.signatures.verification:VerifyForms")
 def command(
     files: Annotated[
-        list[Path],
-        typer.Argument(help="PDF, DCC (.xml), manifest.json, Word file, record (.json), ledger, proof."),
+        list[Path], "PDF, DCC (.xml), manifest.json, Word file, record (.json), ledger, proof.", ARGUMENT
     ],
     trusted: Annotated[
         list[Path] | None,
-        typer.Option("--trust", help="Trust the certificates of this file too; may be repeated."),
+        "Trust the certificates of this file too; may be repeated.",
+        Mark(names=("--trust",)),
     ] = None,
     *,
     place: RegistryOptions,

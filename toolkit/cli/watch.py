@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from toolkit.cli.console import answers, say
-from toolkit.cli.options import AllowMissing, Output, RegistryOptions, ReportTemplate, into_folder
+from toolkit.cli.command import ARGUMENT, Mark, answers
+from toolkit.cli.console import say
+from toolkit.cli.options import INTO_FOLDER, AllowMissing, Output, RegistryOptions, ReportTemplate
 
 NAME = "watch"
 
@@ -20,36 +19,24 @@ NAME = "watch"
 @answers("toolkit.lab.tire_tests.watch:WatchAnswer")
 def command(
     folder: Annotated[
-        Path, typer.Argument(metavar="FOLDER", help="Folder in which tests arrive, each with test.toml.")
+        Path, "Folder in which tests arrive, each with test.toml.", ARGUMENT, Mark(metavar="FOLDER")
     ],
     template: ReportTemplate = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", callback=into_folder, help="Where reports and the state go; default: FOLDER/reports."
-        ),
+        Path | None, "Where reports and the state go; default: FOLDER/reports.", INTO_FOLDER
     ] = None,
-    once: Annotated[bool, typer.Option("--once", help="Look until nothing more arrives, then end.")] = False,
-    interval: Annotated[float, typer.Option("--interval", min=0.05, help="Seconds between looks.")] = 2.0,
+    once: Annotated[bool, "Look until nothing more arrives, then end."] = False,
+    interval: Annotated[float, "Seconds between looks.", Mark(min=0.05)] = 2.0,
     settle: Annotated[
-        float,
-        typer.Option("--settle", min=0.0, help="Seconds after which an unchanged file counts as complete."),
+        float, "Seconds after which an unchanged file counts as complete.", Mark(min=0.0)
     ] = 3.0,
     patience: Annotated[
-        float,
-        typer.Option(
-            "--patience",
-            min=0.0,
-            help="Seconds without a change after which an incomplete test is judged.",
-        ),
+        float, "Seconds without a change after which an incomplete test is judged.", Mark(min=0.0)
     ] = 900.0,
     units: Annotated[
         str | None,
-        typer.Option(
-            "--units",
-            help="SI or lbf: N and N*m, or lbf and lbf*ft, in the reports made from now on; those made "
-            "before stay. Default: the style file's.",
-        ),
+        "SI or lbf: N and N*m, or lbf and lbf*ft, in the reports made from now on; those made before stay. "
+        "Default: the style file's.",
     ] = None,
     allow_missing: AllowMissing = False,
     *,

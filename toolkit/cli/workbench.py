@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, NotRequired, TypedDict
 
-import typer
-
-from toolkit.cli.console import answers
+from toolkit.cli.command import ARGUMENT, Mark, answers
 from toolkit.cli.options import Output
 
 
@@ -27,23 +25,17 @@ NAME = "open"
 def command(
     home: Annotated[
         Path | None,
-        typer.Argument(metavar="[HOME]", help="Laboratory's home; default: the nearest folder upward."),
+        "Laboratory's home; default: the nearest folder upward.",
+        ARGUMENT,
+        Mark(metavar="[HOME]"),
     ] = None,
-    no_browser: Annotated[
-        bool, typer.Option("--no-browser", help="Print the address and open nothing.")
-    ] = False,
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; default: a free one.")] = 0,
+    no_browser: Annotated[bool, "Print the address and open nothing."] = False,
+    port: Annotated[int, "Port; default: a free one.", Mark(min=0, max=65535)] = 0,
     host: Annotated[
-        str | None,
-        typer.Option(
-            "--host",
-            help="Address that other computers reach; needs --certificate and --key, and people enrolled.",
-        ),
+        str | None, "Address that other computers reach; needs --certificate and --key, and people enrolled."
     ] = None,
-    certificate: Annotated[
-        Path | None, typer.Option("--certificate", metavar="FILE", help="Certificate of the host, PEM.")
-    ] = None,
-    key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="Its private key, PEM.")] = None,
+    certificate: Annotated[Path | None, "Certificate of the host, PEM.", Mark(metavar="FILE")] = None,
+    key: Annotated[Path | None, "Its private key, PEM.", Mark(metavar="FILE")] = None,
     *,
     output: Output,
 ) -> int:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple, NotRequired, Protocol, 
 from toolkit.effects.effect import STAGES, Effect, EffectParameter, Stage
 
 if TYPE_CHECKING:
-    from toolkit.channels import Axes
     from toolkit.effects.surroundings import Surroundings
 
 Condition = tuple[str, tuple[str, ...]]
@@ -172,10 +171,6 @@ class AppliedEffect:
         if self.condition is not None:
             return conditions.get(self.condition[0]) in self.condition[1]
         return self.runs is None or run in self.runs
-
-    def sign(self, parameter: str, axes: Axes) -> int:
-        """Return the factor, +1 or -1, of a parameter in some axes, the drum running forward."""
-        return self.effect.parameter(parameter).sign_in(axes)
 
     @property
     def history(self) -> str:

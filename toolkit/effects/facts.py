@@ -61,11 +61,6 @@ class ChannelFacts:
     inverse: InverseHook | None = None
 
     @property
-    def exchanges(self) -> bool:
-        """The other channel gets this one's values in return."""
-        return self.second == "with"
-
-    @property
     def paired(self) -> bool:
         """It joins two channels."""
         return self.second in ("with", "from")

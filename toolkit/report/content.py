@@ -49,8 +49,7 @@ class Value:
             return style.date(self.value) if self.kind == "date" else self.value
         assert self.value is not None  # noqa: S101  missing values are refused before
         if spec is None and self.U is not None:
-            text = round_to_uncertainty(self.value, self.U)
-            return text.replace(".", ",") if style.decimal_comma else text
+            return style.decimal(round_to_uncertainty(self.value, self.U))
         return format_number(self.value, spec or self.spec, decimal_comma=style.decimal_comma)
 
 

@@ -132,6 +132,14 @@ class Style:
         except ValueError:
             return iso
 
+    def decimal(self, number: str) -> str:
+        """Return a number, written with a decimal point, with the organisation's decimal sign.
+
+        >>> Style(decimal_comma=True).decimal("0.25")
+        '0,25'
+        """
+        return number.replace(".", ",") if self.decimal_comma else number
+
     @property
     def texts(self) -> frozenset[str]:
         """What the organisation states of itself: nobody says it in other words."""

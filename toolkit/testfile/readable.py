@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.characteristics.catalogue import summary
 from toolkit.characteristics.model import summary_estimates, summary_load
-from toolkit.units import from_si
+from toolkit.units import from_si, printed
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import Characteristic
@@ -54,9 +54,9 @@ class Sheet:
 def in_unit(value: float | None, unit: str, digits: int) -> Shown:
     """Return a number whose cell shows its unit: the value itself stays a number."""
     place = f"0.{'0' * digits}" if digits else "0"
-    printed = unit.replace("*", "·").replace("deg", "°")
+    shown = printed(unit).replace("deg", "°")
     finite = None if value is None or not math.isfinite(value) else value
-    return Shown(value=finite, number_format=f'#,##{place}" {printed}"')
+    return Shown(value=finite, number_format=f'#,##{place}" {shown}"')
 
 
 def readable_sheets(result: TestResult) -> tuple[Sheet, ...]:

@@ -233,7 +233,7 @@ class Seeds:
 
     ``load`` [N]; ``stiffness`` -dFY/dSA in SAE and ISO [N/rad]; ``peak`` largest |FY| that the curve reaches
     within twice the measured angles [N]; ``peak_angle`` |SA| there [rad]; ``trail`` aligning over cornering
-    stiffness [m], NaN without MZ; ``FNOMIN`` [N]; ``reach`` the largest |SA| measured [rad].
+    stiffness [m], NaN without MZ; ``FNOMIN`` [N].
     """
 
     load: Array
@@ -242,7 +242,6 @@ class Seeds:
     peak_angle: Array
     trail: Array
     FNOMIN: float
-    reach: float
 
     def at_nominal(self, values: Array) -> tuple[float, float]:
         """Return value at FNOMIN and change with dfz (a straight line; no change from one load)."""
@@ -324,7 +323,6 @@ class GlobalModel:
     joint: bool = False
     grid: int = 1
     moment_alone: bool = False
-    per_load: bool = False
     reads: tuple[str, ...] = ()
     bounded: tuple[Factor, ...] = ()
     factors: Factors | None = None

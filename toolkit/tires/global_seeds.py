@@ -70,7 +70,7 @@ def seeds_of(data: Measured) -> SeedFits:
         angle, trail = [0.1] * len(loads), [0.03] * len(loads)
     seeds = Seeds(
         load=np.array(loads), stiffness=np.array(stiffness), peak=np.array(peak), peak_angle=np.array(angle),
-        trail=np.array(trail), FNOMIN=data.rows.FNOMIN, reach=reach,
+        trail=np.array(trail), FNOMIN=data.rows.FNOMIN,
     )  # fmt: skip
     return SeedFits(seeds=seeds, fits=tuple(fits))
 

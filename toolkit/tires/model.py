@@ -112,7 +112,6 @@ class TireModel(Protocol):
     name: str
     title: str
     reference: str
-    per_load: bool
     fitter: str
     reads: tuple[str, ...]
     channels: tuple[str, ...]

@@ -75,7 +75,7 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     slips = bool(np.ptp(turned.KAPPA))
     sections: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
     for channel in _SECTIONS:
-        if any(channel_fit.channel == channel for channel_fit in fit.fits):
+        if fit.fit(channel) is not None:
             channel_fits = [
                 parameter
                 for parameter in model.parameters

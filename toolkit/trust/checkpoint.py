@@ -32,7 +32,7 @@ from toolkit.files import write_atomic
 from toolkit.inputs import read_regular
 from toolkit.trust.keys import Signer
 from toolkit.trust.merkle import HASH_BYTES, consistency_proof, consistent, leaf_hash
-from toolkit.trust.ssh import ED25519, BadSignatureError, PublicKey, check_raw
+from toolkit.trust.ssh import PublicKey
 
 _NOTE, _COSIGNATURE = b"\x01", b"\x04"
 _ID = 4  # bytes of a key's hash before the signature
@@ -56,7 +56,7 @@ class NoteSignature:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checkpoint:
-    """Size and root of a log, by its name; ``signatures`` are held against keys by `signed_by`."""
+    """Size and root of a log, by its name, with its signatures."""
 
     origin: str
     size: int
@@ -84,24 +84,6 @@ class Checkpoint:
         value = struct.pack(">Q", time) + _raw(signer, _witnessed(self.body, time))
         signature = NoteSignature(name, key_id(name, signer.public, _COSIGNATURE), value)
         return replace(self, signatures=(*self.signatures, signature))
-
-    def signed_by(self, name: str, key: PublicKey) -> bool:
-        """Tell whether a key's owner signed this checkpoint under that name."""
-        return any(
-            _holds(key, signature.value, self.body.encode())
-            for signature in self._of(name, key_id(name, key, _NOTE))
-        )
-
-    def witnessed_at(self, name: str, key: PublicKey) -> int | None:
-        """Return the time (POSIX seconds) at which a witness signed; None where it did not."""
-        for signature in self._of(name, key_id(name, key, _COSIGNATURE)):
-            (time,) = struct.unpack(">Q", signature.value[:8])
-            if _holds(key, signature.value[8:], _witnessed(self.body, time)):
-                return int(time)
-        return None
-
-    def _of(self, name: str, key: bytes) -> list[NoteSignature]:
-        return [line for line in self.signatures if line.name == name and line.key_id == key]
 
 
 def parse_checkpoint(text: str, *, where: object = None) -> Checkpoint:
@@ -157,15 +139,6 @@ def _witnessed(body: str, time: int) -> bytes:
 def _raw(signer: Signer, data: bytes) -> bytes:
     """Return the 64 bytes of an Ed25519 signature; the key's kind was asked for by `PublicKey.raw`."""
     return signer.sign(data)[-_SIGNATURE:] if signer.public.raw else b""
-
-
-def _holds(key: PublicKey, value: bytes, data: bytes) -> bool:
-    signature = b"".join(struct.pack(">I", len(part)) + part for part in (ED25519.encode(), value))
-    try:
-        check_raw(key, signature, data)
-    except BadSignatureError:
-        return False
-    return True
 
 
 SUFFIX = ".checkpoint"

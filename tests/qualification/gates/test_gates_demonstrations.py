@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import toolkit
+from tests.recording.fig4_4 import ROWS, SYMBOLS
 from toolkit.calibration.registry import gates, judgement
-from toolkit.examples import ROWS, SYMBOLS
 from toolkit.files import read_toml
 from toolkit.qualification.gates import bench, check_gates, demonstrations, virtual_hub
 from toolkit.qualification.gates.values import FIGURE

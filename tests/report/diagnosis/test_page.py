@@ -66,7 +66,7 @@ def test_a_search_that_was_cut_off_does_not_say_that_no_effect_explains(dragged)
 def test_no_chance_is_zero(dragged):
     assert chance(0.0) == "p < 1e-300"
     assert chance(float("nan")) == "p unknown"
-    assert chance(0.0312, decimal_comma=True) == "p = 0,031"
+    assert chance(0.0312) == "p = 0.031"
     assert not re.search(r"(p =|is) 0[.)]", page(dragged))
 
 

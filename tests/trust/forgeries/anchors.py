@@ -18,6 +18,7 @@ from tests.trust.forgeries.laboratory import (
     lines_of,
     signed_again,
 )
+from tests.trust.signatures import signed_by
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
 from toolkit.lab.signatures.people import anchor_document, check_against, checkpoint_of
@@ -112,7 +113,7 @@ def _proof_holds(text: str) -> bool:
         path.write_text(text)
         try:
             anchor = parse_anchor(json.loads(text))
-            signed = anchor.checkpoint.signed_by("anna", KEYS["anna"].public)
+            signed = signed_by(anchor.checkpoint, "anna", KEYS["anna"].public)
             continues = _continues(Registry(home / "calibrations"), path)
         except ToolkitError:
             return False
@@ -124,7 +125,7 @@ def _checkpoint_holds(text: str) -> bool:
         path = Path(place) / "checkpoint"
         path.write_text(text)
         try:
-            signed = parse_checkpoint(text).signed_by("anna", KEYS["anna"].public)
+            signed = signed_by(parse_checkpoint(text), "anna", KEYS["anna"].public)
             continues = _continues(Registry(home / "calibrations"), path)
         except ToolkitError:
             return False

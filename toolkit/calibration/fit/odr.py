@@ -121,7 +121,6 @@ def fit_odr(
         residuals=residuals,
         leverage=factor.leverage,
         weights=spread**-2.0,
-        singular_values=np.asarray(np.linalg.svd(basis.design, compute_uv=False), dtype=np.float64),
         scaled=scaled,
         chi2=float(scaled @ scaled),
     )

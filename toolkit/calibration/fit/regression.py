@@ -120,9 +120,9 @@ class TermFit:
 
     ``residual_sd`` = sqrt(sum of squared residuals / dof) in the load's unit; ``residuals`` and
     ``leverage`` (rows,); ``weights`` the diagonal of the inverse covariance of the rows (1/u^2 for
-    independent ones) or None; ``singular_values`` of the scaled term matrix. ``scaled`` (rows,) are the
-    residuals that `diagnostics` judges: e for least squares, e/u for weighted, see `gls` and `odr` for the
-    others. ``chi2`` is the weighted sum of squares at the minimum, None where no uncertainty is known.
+    independent ones) or None. ``scaled`` (rows,) are the residuals that `diagnostics` judges: e for least
+    squares, e/u for weighted, see `gls` and `odr` for the others. ``chi2`` is the weighted sum of squares
+    at the minimum, None where no uncertainty is known.
     """
 
     terms: tuple[str, ...]
@@ -133,7 +133,6 @@ class TermFit:
     residuals: NDArray[np.float64]
     leverage: NDArray[np.float64]
     weights: NDArray[np.float64] | None
-    singular_values: NDArray[np.float64]
     scaled: NDArray[np.float64]
     chi2: float | None = None
 
@@ -192,7 +191,6 @@ def fit_loads(
                 residuals=residuals,
                 leverage=factor.leverage,
                 weights=weights,
-                singular_values=factor.singular_values,
                 scaled=scaled,
                 chi2=None if u is None else inner(scaled, scaled),
             )
@@ -205,7 +203,7 @@ class Factor:
     """One QR decomposition of a design (rows, terms), weighted row by row where ``root`` = 1/u is given.
 
     ``q`` (rows, terms) and ``r`` (terms, terms) are its factors, ``inverse`` (terms, terms) that of the
-    normal matrix, ``leverage`` (rows,), ``singular_values`` those of the design without weights.
+    normal matrix, ``leverage`` (rows,).
     """
 
     design: NDArray[np.float64]
@@ -214,13 +212,14 @@ class Factor:
     r: NDArray[np.float64]
     inverse: NDArray[np.float64]
     leverage: NDArray[np.float64]
-    singular_values: NDArray[np.float64]
 
     @classmethod
     def of(cls, design: NDArray[np.float64], root: NDArray[np.float64] | None) -> Factor:
-        """Decompose; LinAlgError where the columns are dependent."""
+        """Decompose; LinAlgError where the columns are dependent, or not finite."""
         from scipy.linalg import qr
 
+        if not np.isfinite(design).all():
+            raise np.linalg.LinAlgError("a term is not finite")
         weighted = design if root is None else design * root[:, None]
         factors = qr(weighted, mode="economic", check_finite=False)
         q, r = (np.asarray(factor, dtype=np.float64) for factor in factors)
@@ -228,7 +227,6 @@ class Factor:
             raise np.linalg.LinAlgError("the terms are exactly dependent")
         # Elimination has nothing to do in a triangle: this is back-substitution.
         r_inverse = np.linalg.solve(r, np.eye(len(r)))
-        of_design = r if root is None else np.linalg.qr(design, mode="r")
         return cls(
             design=design,
             root=root,
@@ -236,7 +234,6 @@ class Factor:
             r=r,
             inverse=r_inverse @ r_inverse.T,
             leverage=np.einsum("ij,ij->i", q, q),
-            singular_values=np.asarray(np.linalg.svd(of_design, compute_uv=False), dtype=np.float64),
         )
 
     def solve(self, loads: NDArray[np.float64]) -> tuple[NDArray[np.longdouble], NDArray[np.float64]]:

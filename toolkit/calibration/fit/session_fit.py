@@ -99,7 +99,6 @@ def fit_gls(
         residuals=residuals,
         leverage=np.einsum("ij,jk,ik->i", rows, factor.inverse, rows) / diagonal,
         weights=diagonal,
-        singular_values=np.asarray(np.linalg.svd(basis.design, compute_uv=False), dtype=np.float64),
         scaled=pull / np.sqrt(diagonal),
         chi2=float(white @ white),
     )

@@ -48,14 +48,6 @@ class RecordStatus:
         """Whether the record was withdrawn or discarded."""
         return self.state in ENDED
 
-    def covers(self, on: date) -> bool:
-        """Tell whether the record may serve a test of this day (it may still be superseded)."""
-        return (
-            self.in_force_from is not None
-            and self.in_force_from <= on
-            and (self.void_from is None or on < self.void_from)
-        )
-
 
 def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> RecordStatus:
     """Return a record's state from its own ledger entries (oldest first).

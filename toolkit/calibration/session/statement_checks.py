@@ -179,22 +179,6 @@ def temperature_effect(
     return span, zero
 
 
-def stated(entry: object, text: str, place: str, where: object) -> float:
-    """Return a number, or ``{ value, unit }`` of the same dimension as a unit, in that unit.
-
-    Raises
-    ------
-    ConfigError, UnitError
-    """
-    found = unit(text)
-    value = quantity(entry, found.dimension, f"{where}: {place}") / found.factor if isinstance(
-        entry, dict
-    ) else entry  # fmt: skip
-    if not is_number(value):
-        raise wrong(where, place, entry, f"a number in {text}, or {{ value, unit }}")
-    return float(value)
-
-
 def _check_between(entries: Mapping[str, Any], table: Table, where: object) -> None:
     for name, entry in entries.items():
         place = f"between_runs.{name}"

@@ -127,11 +127,11 @@ class Reference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellStatement:
-    """One indication. ``resolution`` and ``u`` (standard) in its unit, ``excitation`` in V, as stated.
+    """One indication. ``resolution`` and ``u`` (standard) in its unit, as stated.
 
     ``found``: the resolution is not stated, it is the step that the readings show (`fit.reading_steps`).
     ``span_per_K`` [1/K] and ``zero_per_K`` [unit/K] are its temperature coefficients, None where not stated.
-    ``column_unit`` is the unit of the stored data, and of bare numbers in ``scale`` and ``shunt_expected``.
+    ``column_unit`` is the unit of the stored data, and of bare numbers in ``scale``.
     """
 
     name: str
@@ -139,9 +139,7 @@ class CellStatement:
     serial: str | None
     resolution: float | None
     u: float | None
-    excitation_V: float | None
     scale: Any
-    shunt_expected: Any
     column_unit: str
     span_per_K: float | None
     zero_per_K: float | None
@@ -308,9 +306,7 @@ def _cell(
         resolution=step if resolution is None else resolution,
         found=resolution is None and step is not None,
         u=number("u"),
-        excitation_V=bridge.excitation_V,
         scale=entry.get("scale"),
-        shunt_expected=entry.get("shunt_expected"),
         column_unit=column,
         span_per_K=span,
         zero_per_K=zero,

@@ -10,8 +10,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from toolkit.estimate import Estimate
-
 Evaluation = Literal["A", "B"]
 Distribution = Literal["normal", "student", "rectangular"]
 
@@ -72,11 +70,6 @@ class Budget:
     def not_stated(self) -> tuple[str, ...]:
         """Names of the components that nothing was stated or measured for."""
         return tuple(component.name for component in self.components if not component.stated)
-
-    @property
-    def estimate(self) -> Estimate:
-        """The load with its uncertainty."""
-        return Estimate(value=self.at, u=self.u, unit=self.unit, dof=self.dof)
 
     def component(self, name: str) -> Component:
         """Return one component."""

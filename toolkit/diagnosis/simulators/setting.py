@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,8 +107,3 @@ def nominal_load(case: Case) -> float:
     values = np.concatenate(loads)
     values = np.abs(values[np.isfinite(values) & (np.abs(values) > 0)])
     return float(np.median(values)) if len(values) else 4000.0
-
-
-def is_tire(names: Mapping[str, object] | set[str]) -> bool:
-    """Tell whether channels are those of a tire test: slip angle, load, and a force or moment."""
-    return ("SA" in names or "SA_CMD" in names) and ("FZ" in names or "FZ_CMD" in names)

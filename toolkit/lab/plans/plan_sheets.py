@@ -15,6 +15,7 @@ from toolkit.planning.printed_units import title_of
 from toolkit.planning.sweep_plan import sweep_lines
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -104,7 +105,7 @@ def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date)
 
     def applied(row: PlannedLoad | None) -> str:
         loads = zip(record.loads, () if row is None else row.loads, strict=False)
-        return ", ".join(f"{fit.load} {value:.5g} {_dotted(fit.unit)}" for fit, value in loads if value)
+        return ", ".join(f"{fit.load} {value:.5g} {printed(fit.unit)}" for fit, value in loads if value)
 
     minutes = "" if plan.minutes is None else f", {plan.minutes:.0f} minutes"
     largest = max(plan.outlook, key=lambda load: load.U / load.U_today)
@@ -118,7 +119,7 @@ def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date)
         issued=issued,
         uncertainties=tuple(
             Expected(
-                quantity=load.load, at=f"{load.at:.5g}", unit=_dotted(load.unit),
+                quantity=load.load, at=f"{load.at:.5g}", unit=printed(load.unit),
                 reference=round_uncertainty(load.U_today),
                 asked="-" if load.U_asked is None else f"{load.U_asked:.3g}",
                 expected=round_uncertainty(load.U_expected),
@@ -138,7 +139,7 @@ def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date)
 def protocol_sheet(plan: ProtocolPlan, issued: dt.date, units: PrintedUnits) -> PlanSheet:
     """Return the sheet of a test: a step is a recording, which runs through all loads."""
     design, own = plan.plan, plan.protocol
-    force = _dotted(units.force)
+    force = printed(units.force)
     sizes = (units.shown(load, "N")[0] for load in design.loads_N)
     loads = f"{', '.join(f'{size:.0f}' for size in sizes)} {force}"
     record = "" if plan.calibration is None else f", {plan.calibration}"
@@ -180,7 +181,7 @@ def _sweep_steps(plan: ProtocolPlan, units: PrintedUnits) -> tuple[Step, ...]:
         Step(
             run=sweep.rotation, action=f"sweep in time: {line}",
             applied=", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in sweep.loads_N) + " "
-            + _dotted(units.force),
+            + printed(units.force),
         )
         for sweep, line in zip(plan.sweeps.recordings, sweep_lines(plan.sweeps), strict=True)
     )  # fmt: skip
@@ -193,7 +194,7 @@ def _expected(value: PlannedValue, units: PrintedUnits) -> Expected:
     return Expected(
         quantity=title_of(value.name),
         at="{:.0f} {}".format(*units.shown(value.load_N, "N")),
-        unit=_dotted(units.shown(value.planned_U, value.unit)[1]),
+        unit=printed(units.shown(value.planned_U, value.unit)[1]),
         reference="-" if value.protocol_U is None else U(value.protocol_U),
         asked=U(value.demanded_U),
         expected=U(value.planned_U),
@@ -255,10 +256,6 @@ def interval_sheet(
         assumptions=ASSUMPTIONS,
         findings=tuple(findings),
     )  # fmt: skip
-
-
-def _dotted(unit: str) -> str:
-    return unit.replace("*", "·")
 
 
 def _risk_plot(risks: Sequence[IntervalRisk], reliability: float) -> Plot:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from toolkit.errors import ColumnError
 from toolkit.lab.faces import Face, Facts
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -285,7 +286,7 @@ class Loads(Face):
         def plot(name: str, values: NDArray[np.float64]) -> Plot:
             rows = tuple(float(row) for row in range(1, len(values) + 1))
             curve = Curve(label=name, x=rows, y=tuple(values.tolist()), style="line")
-            unit = self.units[name].replace("*", "·")
+            unit = printed(self.units[name])
             return Plot(
                 name=name, x_label="row", y_label=f"{name} / ({unit})" if "·" in unit else f"{name} / {unit}",
                 curves=(curve,), caption=f"{name} of every row.", alt=f"{name} over the rows.",

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
-from toolkit.lab.answers import findings_text, one_line, refuse_unwritable, table
+from toolkit.lab.answers import Timing, findings_text, one_line, refuse_unwritable, table
 
 if TYPE_CHECKING:
     from datetime import date
@@ -194,8 +194,9 @@ def laboratories_answer(
         document = None
         if opened is not None and out is not None:
             document = _document(comparison, path, opened, out, issued, together)
+    timing: Timing = {"seconds": time.perf_counter() - started}
     keys: LaboratoryKeys = {
-        "mode": "laboratories", "source": str(path), **written_keys(drawn, document, started),
+        "mode": "laboratories", "source": str(path), **written_keys(drawn, document, timing),
     }  # fmt: skip
     lines = [line for measurand in comparison.measurands for line in _lines(measurand)]
     lines += [f"written: {one_line(file)}" for file in drawn.values()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypedDict
@@ -16,6 +15,7 @@ from toolkit.lab.answers import (
     DraftKeys,
     EstimateEntry,
     Timed,
+    Timing,
     delivered_keys,
     draft_keys,
     estimate_keys,
@@ -173,12 +173,9 @@ def compare_answer(
     findings: Sequence[Finding],
     drawn: Mapping[str, Path],
     document: Delivered | None,
-    started: float,
+    timing: Timing,
 ) -> CompareAnswer:
-    """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes.
-
-    ``started`` is when the command began, by the clock of `time.perf_counter`.
-    """
+    """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes."""
     repeats = comparison.repeats
     return {
         "mode": comparison.mode,
@@ -203,16 +200,16 @@ def compare_answer(
         ],
         "left_out": list(comparison.left_out),
         "findings": [finding.as_dict() for finding in findings],
-        **written_keys(drawn, document, started),
+        **written_keys(drawn, document, timing),
     }
 
 
-def written_keys(drawn: Mapping[str, Path], document: Delivered | None, started: float) -> WrittenComparison:
-    """Return what an answer says of a comparison's files, and the time since ``started``."""
+def written_keys(drawn: Mapping[str, Path], document: Delivered | None, timing: Timing) -> WrittenComparison:
+    """Return what an answer says of a comparison's files and of its time."""
     return {
         "figures": drawn,
         "document": None if document is None else delivered_keys(document),
-        "timing": {"seconds": time.perf_counter() - started},
+        "timing": timing,
     }
 
 

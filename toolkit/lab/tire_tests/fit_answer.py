@@ -11,6 +11,7 @@ from toolkit.estimate import plus_minus
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import Timing, draft_keys, findings_text, mark_words, signature_words, table
 from toolkit.tires.table_fit import slope_sign
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.estimate import Estimate
@@ -325,7 +326,7 @@ def _global_text(fit: GlobalFit) -> str:
         [
             p.name,
             *_value_and_error(p.value, p.standard_error),
-            p.unit.replace("*", "·"),
+            printed(p.unit),
             "not determined" if p.name in fit.not_determined else "",
         ]
         for p in fit.parameters

@@ -17,6 +17,7 @@ from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import rows_of, timeline
 from toolkit.report.content import signature_text
 from toolkit.report.pages.kit import Column, Table, number, page_parts, table
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -159,7 +160,7 @@ def _tests(audit: ArchiveAudit) -> Table | None:
         return None
     # A stiffness changes by a share of itself; what is near zero by nature, in its unit.
     characteristics = [
-        (str(entry.summary), None if entry.scope == "direction" else entry.printed_unit.replace("*", "·"))
+        (str(entry.summary), None if entry.scope == "direction" else printed(entry.printed_unit))
         for entry in summary()
     ]
     rows = [

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.report.figures import _RC, COLOURS, DPI
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -254,4 +255,4 @@ def _order(report: FitReport) -> np.ndarray:
 
 
 def _unit(report: FitReport) -> str:
-    return report.unit.replace("*", "·")
+    return printed(report.unit)

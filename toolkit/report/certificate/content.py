@@ -14,6 +14,7 @@ from toolkit.report.certificate.statements import RULES
 from toolkit.report.content import ReportContent
 from toolkit.report.document import Document
 from toolkit.report.style import Style
+from toolkit.units import printed
 from toolkit.version import __version__
 
 GAP = "NOT STATED"
@@ -74,7 +75,7 @@ def traceability(c: Certificate, style: Style | None = None) -> str:
         # As the standard's own certificate states it, where that takes fewer digits.
         stated = min(round_uncertainty(U), f"{U:g}", key=len)
         text += (
-            f" Its uncertainty for {load}: U = {signed(stated, style)} {shown(unit)}, "
+            f" Its uncertainty for {load}: U = {signed(stated, style)} {printed(unit)}, "
             f"k = {signed(f'{k:g}', style)}."
         )
     return text + _digital(c)
@@ -109,7 +110,7 @@ def conformity(c: Certificate, style: Style | None = None) -> str:
         return "No conformity is stated: the session has no check loads."
     parts = []
     for load in c.loads:
-        limit = f"tolerance {signed(f'{load.tolerance:.4g}', style)} {shown(load.unit)}"
+        limit = f"tolerance {signed(f'{load.tolerance:.4g}', style)} {printed(load.unit)}"
         if load.verdict is None:
             parts.append(f"{load.load}: not stated for all check loads ({limit})")
         else:
@@ -126,18 +127,9 @@ def unverifiable(c: Certificate) -> str:
     return "The check loads could not verify these terms: a wrong value would not have shown in them."
 
 
-def shown(unit: str) -> str:
-    """Return a unit as it is printed.
-
-    >>> shown("lbf*ft/(mV/V)")
-    'lbf·ft/(mV/V)'
-    """
-    return unit.replace("*", "·")
-
-
 def signed(number: str, style: Style | None) -> str:
     """Return a number as text with the decimal sign of the organisation."""
-    return number.replace(".", ",") if style and style.decimal_comma else number
+    return style.decimal(number) if style else number
 
 
 def _temperature(c: Certificate, style: Style) -> str:

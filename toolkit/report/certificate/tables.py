@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.files import reads_as_number
-from toolkit.report.certificate.content import CERTIFICATE, GAP, shown, signed
+from toolkit.report.certificate.content import CERTIFICATE, GAP, signed
 from toolkit.report.certificate.model import MOST_FIGURES, VERDICTS, Certificate, LoadResult
 from toolkit.report.content import Cell, Curve, Plot
 from toolkit.report.document import DeclaredTable, Rows
 from toolkit.report.style import Style
+from toolkit.units import printed
 
 # Columns of names: a serial number such as 12.5 stays what it is.
 _NAMES = {"cell", "serial", "load", "term", "unit", "found_by", "row"}
@@ -68,7 +69,7 @@ def cells(c: Certificate) -> Texts:
     """Return the indications."""
     for cell, resolution in zip(c.cells, c.resolutions, strict=True):
         ends = _g(cell.minimum), _g(cell.maximum)
-        yield cell.name, cell.serial or GAP, shown(cell.unit), *ends, _g(resolution)
+        yield cell.name, cell.serial or GAP, printed(cell.unit), *ends, _g(resolution)
 
 
 @_table(
@@ -88,7 +89,7 @@ def coefficients(c: Certificate) -> Texts:
     for load in c.loads:
         for t in load.terms:
             error = round_uncertainty(t.standard_error)
-            yield load.load, t.term, repr(t.full), repr(t.issued), error, shown(t.unit)
+            yield load.load, t.term, repr(t.full), repr(t.issued), error, printed(t.unit)
 
 
 @_table(
@@ -112,7 +113,7 @@ def uncertainty(c: Certificate) -> Texts:
         for at in load.range:
             yield (
                 load.load, round_to_uncertainty(at.at, at.U), f"{100 * at.at / full:.0f}",
-                round_uncertainty(at.U), shown(load.unit), f"{at.k:.2f}", f"{100 * at.probability:g}",
+                round_uncertainty(at.U), printed(load.unit), f"{at.k:.2f}", f"{100 * at.probability:g}",
                 _dof(at.dof),
             )  # fmt: skip
 
@@ -139,7 +140,7 @@ def budget(c: Certificate) -> Texts:
             if part.stated:
                 yield (
                     load.load, part.name, part.evaluation, part.distribution, round_uncertainty(part.u),
-                    shown(load.unit), _dof(part.dof), f"{100 * part.share:.1f}", part.source,
+                    printed(load.unit), _dof(part.dof), f"{100 * part.share:.1f}", part.source,
                 )  # fmt: skip
 
 
@@ -161,7 +162,7 @@ def fit(c: Certificate) -> Texts:
     """Return the reference loads and residuals of every load."""
     for load in c.loads:
         yield (
-            load.load, shown(load.unit), f"{load.minimum:g}", f"{load.maximum:g}", str(load.n),
+            load.load, printed(load.unit), f"{load.minimum:g}", f"{load.maximum:g}", str(load.n),
             str(load.dof), f"{load.residual_sd:.3g}", f"{max(load.residuals, key=abs):+.3g}",
         )  # fmt: skip
 
@@ -190,7 +191,7 @@ def check(c: Certificate) -> Texts:
             yield (
                 load.load, str(line.row), f"{line.reference:.10g}", round_to_uncertainty(line.result, U),
                 round_to_uncertainty(line.deviation, U), round_uncertainty(U), f"{load.tolerance:.4g}",
-                shown(load.unit), VERDICTS[line.verdict] if line.verdict else unstated,
+                printed(load.unit), VERDICTS[line.verdict] if line.verdict else unstated,
             )  # fmt: skip
 
 
@@ -223,7 +224,7 @@ def adjustment(c: Certificate) -> Texts:
         U = change.found.U
         yield (
             load.load, change.found_by, round_to_uncertainty(change.as_found, U), f"{change.found.at:.6g}",
-            as_left, f"{load.tolerance:.4g}", shown(load.unit), round_uncertainty(U), left_U,
+            as_left, f"{load.tolerance:.4g}", printed(load.unit), round_uncertainty(U), left_U,
         )  # fmt: skip
 
 
@@ -255,7 +256,7 @@ def residuals(c: Certificate, _style: Style) -> Iterator[Plot]:
 
 
 def _plot(name: str, load: LoadResult, mark: str | None) -> Plot:
-    unit = load.unit.replace("*", "·")
+    unit = printed(load.unit)
     ends = (load.minimum, load.maximum)
     # A cross-section of the budget between the loads at which it was told is straight enough to draw.
     at = tuple(e.at for e in load.range)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import by_name
 from toolkit.estimate import plus_minus
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, FactorSpread, Section
@@ -21,7 +22,7 @@ def shown_unit(name: str, style: Style) -> tuple[str, float]:
     """Return a quantity's unit as it is shown, and the factor from SI."""
     declared = by_name()[name]
     unit, factor = style.unit(declared.printed_unit)
-    return str(unit).replace("*", "·"), factor * declared.factor
+    return printed(str(unit)), factor * declared.factor
 
 
 def with_U(estimate: Estimate, factor: float, style: Style) -> str:
@@ -32,12 +33,7 @@ def with_U(estimate: Estimate, factor: float, style: Style) -> str:
 
 def p_text(p: float | None, style: Style) -> str:
     """Return a p value; a dash where none was decided."""
-    return "-" if p is None else comma("< 0.0001" if p < 1e-4 else f"{p:.4f}", style)
-
-
-def comma(text: str, style: Style) -> str:
-    """Return a number with the decimal mark of the style."""
-    return text.replace(".", ",") if style.decimal_comma else text
+    return "-" if p is None else style.decimal("< 0.0001" if p < 1e-4 else f"{p:.4f}")
 
 
 def named(name: str, rotation: str, SA_rad: float | None = None, *, title: bool = False) -> str:
@@ -66,7 +62,7 @@ def shown_rows(comparison: Comparison, part: Section) -> tuple[tuple[Difference,
 
 def factor_text(spread: FactorSpread, factor: float, style: Style) -> str:
     """Return an intermediate precision; a star where its factor adds significantly."""
-    return comma(f"{spread.s * factor:.3g}", style) + (" *" if spread.significant else "")
+    return style.decimal(f"{spread.s * factor:.3g}") + (" *" if spread.significant else "")
 
 
 def conclusion(comparison: Comparison) -> str:

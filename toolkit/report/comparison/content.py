@@ -15,7 +15,6 @@ from toolkit.characteristics.catalogue import comparison_figures
 from toolkit.estimate import plus_minus
 from toolkit.files import sha256_bytes
 from toolkit.report.comparison.cells import (
-    comma,
     conclusion,
     factor_text,
     named,
@@ -28,6 +27,7 @@ from toolkit.report.content import Curve, Plot, ReportContent
 from toolkit.report.document import Document, Row, Rows, finding_table
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
+from toolkit.units import printed
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
@@ -298,14 +298,14 @@ def precision(source: Compared, style: Style) -> Rows:
         unit, factor = shown_unit(row.name, style)
 
         def number(value: float | None, factor: float = factor) -> str:
-            return "-" if value is None else comma(f"{value * factor:.3g}", style)
+            return "-" if value is None else style.decimal(f"{value * factor:.3g}")
 
         yield (
             named(row.name, row.rotation, title=True),
             _load(row.load_N, style),
             unit,
             str(row.n),
-            comma(f"{row.mean * factor:.4g}", style),
+            style.decimal(f"{row.mean * factor:.4g}"),
             number(row.total.value),
             number(row.repeatability.value if row.repeatability else None),
             number(row.limit_r),
@@ -359,7 +359,7 @@ def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: 
     unit, factor = style.unit(drawn.printed_unit)
     load_unit, load_factor = style.unit("N")
     scale = factor * drawn.factor
-    shown_unit = str(unit).replace("*", "·")
+    shown_unit = printed(str(unit))
     curves, sentences = [], []
     for place, entry in enumerate(comparison.entries):
         x, y, U = _series(entry, drawn.name)

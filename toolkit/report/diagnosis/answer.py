@@ -18,6 +18,7 @@ from toolkit.report.diagnosis.numbers import chance, few, over, rounded
 from toolkit.report.diagnosis.page import headline
 from toolkit.report.diagnosis.plots import errors_plot
 from toolkit.report.document import Document, Rows, finding_table
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
@@ -67,9 +68,11 @@ def _summary(source: Told, style: Style) -> str:
     sentences = []
     for fit in source.answer.held_out:
         if source.answer.effects:
-            ends = f"from {_n(fit.refitted_rmse, style)} to {_n(fit.augmented_rmse, style)} {_unit(fit.unit)}"
+            ends = (
+                f"from {_n(fit.refitted_rmse, style)} to {_n(fit.augmented_rmse, style)} {printed(fit.unit)}"
+            )
         else:
-            ends = f"is {_n(fit.refitted_rmse, style)} {_unit(fit.unit)}"
+            ends = f"is {_n(fit.refitted_rmse, style)} {printed(fit.unit)}"
         sentences.append(f"{fit.channel} {ends} (noise {_n(fit.noise_floor, style)})")
     fell = "With the effects the error on held-out rows falls: " if source.answer.effects else None
     text = f"{fell or 'Error on held-out rows: '}{'; '.join(sentences)}."
@@ -104,8 +107,8 @@ def _where(source: Told, style: Style) -> str | None:
         for at in mismatch.where[:1]:
             ends = at.ends(lambda value: _n(value, style, 4))
             extent = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
-            text += f", {extent} {ends} {_unit(at.unit)}".rstrip()
-        sentences.append(f"{text} ({chance(mismatch.p_value, decimal_comma=style.decimal_comma)}).")
+            text += f", {extent} {ends} {printed(at.unit)}".rstrip()
+        sentences.append(f"{text} ({style.decimal(chance(mismatch.p_value))}).")
     return " ".join(sentences) or None
 
 
@@ -201,11 +204,13 @@ def found_parameters(source: Told, style: Style) -> Rows:
     for effect in source.answer.effects:
         for parameter in effect.parameters:
             value = parameter.value
-            texts = (value, "") if isinstance(value, str) else rounded(value, parameter.ci95)
-            if style.decimal_comma and not isinstance(value, str):
-                texts = (texts[0].replace(".", ","), texts[1].replace(".", ","))
+            texts = (
+                (value, "")
+                if isinstance(value, str)
+                else tuple(map(style.decimal, rounded(value, parameter.ci95)))
+            )
             yield (
-                effect.name, parameter.name, texts[0], _unit(parameter.unit) or "-", texts[1] or "-",
+                effect.name, parameter.name, texts[0], printed(parameter.unit) or "-", texts[1] or "-",
                 "all" if parameter.runs is None else ", ".join(parameter.runs),
             )  # fmt: skip
 
@@ -226,7 +231,7 @@ def errors(source: Told, style: Style) -> Rows:
     """Return the errors of every output."""
     for fit in source.answer.held_out:
         yield (
-            fit.channel, _unit(fit.unit), _n(fit.nominal_rmse, style), _n(fit.refitted_rmse, style),
+            fit.channel, printed(fit.unit), _n(fit.nominal_rmse, style), _n(fit.refitted_rmse, style),
             _n(fit.augmented_rmse, style) if source.answer.effects else "-", _n(fit.noise_floor, style),
         )  # fmt: skip
 
@@ -264,7 +269,7 @@ def nominal(source: Told, style: Style) -> Rows:
     for parameter in source.answer.nominal_parameters:
         prior, shift = parameter.prior_sd, parameter.shift_in_sd
         yield (
-            parameter.name, _unit(parameter.unit), _n(parameter.before, style, 6),
+            parameter.name, printed(parameter.unit), _n(parameter.before, style, 6),
             _n(parameter.after, style, 6),
             "known exactly" if prior is None else _n(prior, style),
             "-" if shift is None else _n(shift, style, 2),
@@ -285,7 +290,7 @@ def not_found(source: Told, style: Style) -> Rows:
     for effect in source.answer.not_found:
         if effect.observable:
             size = effect.minimum_detectable
-            yield effect.name, "-" if size is None else _n(size, style), _unit(effect.unit) or "-"
+            yield effect.name, "-" if size is None else _n(size, style), printed(effect.unit) or "-"
 
 
 @DIAGNOSIS.table("next", "what to measure next", "measure|measurement")
@@ -308,12 +313,7 @@ def _label(effect: FoundEffect) -> str:
     return f"{effect.name} on {effect.channel}" if effect.channel else effect.name
 
 
-def _unit(text: str) -> str:
-    return text.replace("*", "·")
-
-
 def _n(value: float, style: Style, digits: int = 3) -> str:
     if not math.isfinite(value):
         return "-"
-    text = few(value, digits)
-    return text.replace(".", ",") if style.decimal_comma else text
+    return style.decimal(few(value, digits))

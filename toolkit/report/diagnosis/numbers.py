@@ -64,7 +64,7 @@ def over(channel: str, variables: Sequence[str]) -> str:
 _LEAST = 1e-300
 
 
-def chance(p_value: float, *, decimal_comma: bool = False) -> str:
+def chance(p_value: float) -> str:
     """Return a p-value in words for people.
 
     >>> chance(0.0312), chance(0.0)
@@ -72,5 +72,4 @@ def chance(p_value: float, *, decimal_comma: bool = False) -> str:
     """
     if math.isnan(p_value):
         return "p unknown"
-    text = f"p = {p_value:.2g}" if p_value >= _LEAST else f"p < {_LEAST:g}"
-    return text.replace(".", ",") if decimal_comma else text
+    return f"p = {p_value:.2g}" if p_value >= _LEAST else f"p < {_LEAST:g}"

@@ -13,6 +13,7 @@ from toolkit.diagnosis.answer.locate import time_unit
 from toolkit.report.content import Curve, Plot
 from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
 from toolkit.report.diagnosis.numbers import few
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -148,9 +149,8 @@ def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
 
 def _unit(search: Search, channel: str) -> str:
     text = next(output.unit for output in search.problem.model.outputs if output.name == channel)
-    return text.replace("*", "·")
+    return printed(text)
 
 
 def _number(value: float, style: Style) -> str:
-    text = few(value)
-    return text.replace(".", ",") if style.decimal_comma else text
+    return style.decimal(few(value))

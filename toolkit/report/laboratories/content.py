@@ -16,6 +16,7 @@ from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.files import sha256_bytes
 from toolkit.report.content import Curve, Plot, ReportContent
 from toolkit.report.document import Document, Rows, finding_table
+from toolkit.units import printed
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
@@ -126,26 +127,18 @@ DECLARED = (
 )
 
 
-def _in(style: Style, number: str) -> str:
-    return number.replace(".", ",") if style.decimal_comma else number
-
-
-def _dotted(unit: str) -> str:
-    return unit.replace("*", "·")
-
-
 def _ratio(style: Style, value: float | None) -> str:
-    return "-" if value is None else _in(style, f"{value:.2f}")
+    return "-" if value is None else style.decimal(f"{value:.2f}")
 
 
 def _mean(style: Style, measurand: Measurand, score: Score) -> str:
     """Return a laboratory's mean to the last place of its U, else to that of the assigned value's."""
     U = score.U or 2 * measurand.u_assigned
-    return _in(style, round_to_uncertainty(score.mean, U) if U else f"{score.mean:.5g}")
+    return style.decimal(round_to_uncertainty(score.mean, U) if U else f"{score.mean:.5g}")
 
 
 def _uncertain(style: Style, value: float | None) -> str:
-    return "-" if value is None else _in(style, round_uncertainty(value))
+    return "-" if value is None else style.decimal(round_uncertainty(value))
 
 
 @LABORATORIES.table(
@@ -165,8 +158,8 @@ def assigned(compared: ComparedLaboratories, style: Style) -> Rows:
     """Return the assigned values."""
     for m in compared.comparison.measurands:
         value = round_to_uncertainty(m.assigned, 2 * m.u_assigned) if m.u_assigned else f"{m.assigned:.6g}"
-        texts = (_in(style, value), _uncertain(style, m.u_assigned))
-        yield m.name, _dotted(m.unit), *texts, m.assigned_by, _uncertain(style, m.sigma_pt), m.sigma_by
+        texts = (style.decimal(value), _uncertain(style, m.u_assigned))
+        yield m.name, printed(m.unit), *texts, m.assigned_by, _uncertain(style, m.sigma_pt), m.sigma_by
 
 
 @LABORATORIES.table(
@@ -237,9 +230,9 @@ def precision(compared: ComparedLaboratories, style: Style) -> Rows:
     for m in compared.comparison.measurands:
         if (p := m.precision) is not None:
             spreads = (None if p.s_r is None else p.s_r.value, p.r, p.s_L, p.s_R, p.R)
-            mean = _in(style, round_to_uncertainty(p.mean, p.s_R) if p.s_R else f"{p.mean:.5g}")
+            mean = style.decimal(round_to_uncertainty(p.mean, p.s_R) if p.s_R else f"{p.mean:.5g}")
             texts = (_uncertain(style, value) for value in spreads)
-            yield m.name, _dotted(m.unit), str(p.laboratories), str(p.n), mean, *texts
+            yield m.name, printed(m.unit), str(p.laboratories), str(p.n), mean, *texts
 
 
 @LABORATORIES.table(
@@ -262,7 +255,7 @@ def outliers(compared: ComparedLaboratories, style: Style) -> Rows:
             )
             for test, laboratory, chance in tests:
                 if chance is not None:
-                    yield m.name, test, laboratory, _in(style, f"{chance:.2g}")
+                    yield m.name, test, laboratory, style.decimal(f"{chance:.2g}")
 
 
 @LABORATORIES.figures(

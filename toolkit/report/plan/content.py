@@ -116,10 +116,6 @@ DECLARED = (
 )
 
 
-def _in(style: Style, number: str) -> str:
-    return number.replace(".", ",") if style.decimal_comma else number
-
-
 @PLAN.table(
     "plan_uncertainties",
     "what a session or a test is expected to give: one row a load or characteristic",
@@ -137,7 +133,7 @@ def uncertainties(sheet: PlanSheet, style: Style) -> Rows:
     """Return the uncertainties that are expected."""
     for row in sheet.uncertainties:
         numbers = (row.reference, row.asked, row.expected, row.span)
-        yield row.quantity, _in(style, row.at), row.unit, *(_in(style, text) for text in numbers)
+        yield row.quantity, style.decimal(row.at), row.unit, *(style.decimal(text) for text in numbers)
 
 
 @PLAN.table(
@@ -154,7 +150,7 @@ def uncertainties(sheet: PlanSheet, style: Style) -> Rows:
 def steps(sheet: PlanSheet, style: Style) -> Rows:
     """Return the steps, numbered."""
     return (
-        (str(number), step.run, step.action, _in(style, step.applied), "")
+        (str(number), step.run, step.action, style.decimal(step.applied), "")
         for number, step in enumerate(sheet.steps, start=1)
     )
 
@@ -172,7 +168,7 @@ def steps(sheet: PlanSheet, style: Style) -> Rows:
 )
 def pairs(sheet: PlanSheet, style: Style) -> Rows:
     """Return the pairs of members."""
-    return ((true, false, *(_in(style, text) for text in gains)) for true, false, *gains in sheet.pairs)
+    return ((true, false, *(style.decimal(text) for text in gains)) for true, false, *gains in sheet.pairs)
 
 
 @PLAN.table(
@@ -187,7 +183,7 @@ def pairs(sheet: PlanSheet, style: Style) -> Rows:
 )
 def risks(sheet: PlanSheet, style: Style) -> Rows:
     """Return the intervals with their risks."""
-    return (tuple(_in(style, text) for text in row) for row in sheet.risks)
+    return (tuple(style.decimal(text) for text in row) for row in sheet.risks)
 
 
 @PLAN.table("plan_assumptions", "what the plan rests on", "text|statement")

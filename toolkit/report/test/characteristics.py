@@ -15,6 +15,7 @@ from toolkit.report.document import DeclaredTable, Rows
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, ReportedTest
 from toolkit.report.vocabulary import QUANTITIES
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import WideTable
@@ -106,7 +107,7 @@ def long_rows(report: ReportedTest, style: Style) -> Rows:
                     "value": row.estimate.value * scale,
                     "U": U * scale if math.isfinite(U) else None,
                     "k": k if math.isfinite(k) else None,
-                    "unit": str(unit).replace("*", "·"),
+                    "unit": printed(str(unit)),
                 }
             )
     return lines
@@ -144,7 +145,7 @@ def _budget(row: Row, style: Style) -> Cells:
     cells: Cells = {
         "quantity": characteristic.title,
         "rotation": row.rotation,
-        "unit": str(unit).replace("*", "·"),
+        "unit": printed(str(unit)),
     }
     total = math.hypot(*sources.values()) * factor
     for column in BUDGET:
@@ -161,7 +162,7 @@ def _to_place(value: float, total: float, style: Style) -> str:
     text = round_to_uncertainty(value, total)
     if not float(text):
         return "-"
-    return text.replace(".", ",") if style.decimal_comma else text
+    return style.decimal(text)
 
 
 def summary_load(result: TestResult) -> float | None:

@@ -14,6 +14,7 @@ from toolkit.report.content import Curve, Plot
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
 from toolkit.report.test.content import REPORT, ReportedTest
+from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import Characteristic, Figure
@@ -86,7 +87,7 @@ class _Plots:
 
     def _scale(self, channel: str) -> tuple[str, float]:
         unit, factor = self.style.unit("N" if channel in ("FY", "FZ") else "N*m")
-        return str(unit).replace("*", "·"), factor
+        return printed(str(unit)), factor
 
     def _number(self, value: float, spec: str = ".0f") -> str:
         return format_number(value, spec, decimal_comma=self.style.decimal_comma)
@@ -277,7 +278,7 @@ class _Plots:
         """Characteristics of one figure against load: (label, what it is, its rows)."""
         first = series[0][1]
         style_unit, factor = self.style.unit(first.printed_unit)
-        unit, load_unit = str(style_unit).replace("*", "·"), self._scale("FZ")[0]
+        unit, load_unit = printed(str(style_unit)), self._scale("FZ")[0]
         factor *= first.factor
         curves, listed = [], []
         for index, (label, declared, rows) in enumerate(series):

@@ -11,7 +11,7 @@ from toolkit.report.style import Style
 from toolkit.report.tags import format_number
 from toolkit.report.test.content import REPORT, ReportedTest
 from toolkit.report.vocabulary import columns_of, number_column
-from toolkit.units import from_si
+from toolkit.units import from_si, printed
 
 if TYPE_CHECKING:
     from toolkit.machine import TypeB
@@ -69,21 +69,21 @@ def stated(report: ReportedTest, style: Style) -> Rows:
 
 
 def _parts(statement: TypeB, style: Style) -> list[str]:
-    def printed(value: float, unit: str) -> str:
+    def shown(value: float, unit: str) -> str:
         return f"{format_number(value, '.3g', decimal_comma=style.decimal_comma)} {unit}"
 
     parts = []
     if statement.u and statement.symbol == "FZ":
         unit, factor = style.unit("N")
-        parts.append(printed(statement.u * factor, str(unit)))
+        parts.append(shown(statement.u * factor, str(unit)))
     elif statement.u and statement.symbol == "P":
-        parts.append(printed(float(from_si(statement.u, "kPa")), "kPa"))
+        parts.append(shown(float(from_si(statement.u, "kPa")), "kPa"))
     elif statement.u:
-        parts.append(printed(math.degrees(statement.u), "deg"))
+        parts.append(shown(math.degrees(statement.u), "deg"))
     if statement.relative:
-        parts.append(printed(100 * statement.relative, "%"))
+        parts.append(shown(100 * statement.relative, "%"))
     if statement.effect and parts:
-        parts[-1] += f", of which a force follows {printed(100 * statement.effect, '%')}"
+        parts[-1] += f", of which a force follows {shown(100 * statement.effect, '%')}"
     return parts
 
 
@@ -158,7 +158,7 @@ def calibration(report: ReportedTest, _style: Style) -> Rows:
                 load.coefficients[i],
                 load.issued[i] if i < len(load.issued) else None,
                 errors[i] if i < len(errors) else None,
-                (f"{load.unit} per {unit}" if unit else load.unit).replace("*", "·"),
+                printed(f"{load.unit} per {unit}" if unit else load.unit),
             )
 
 

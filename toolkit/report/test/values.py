@@ -20,6 +20,7 @@ from toolkit.report.test.characteristics import summary_estimates, summary_load
 from toolkit.report.test.content import REPORT, ReportedTest, report_id
 from toolkit.report.test.figures import TURNED, load_groups
 from toolkit.report.vocabulary import Entry
+from toolkit.units import printed
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
@@ -86,9 +87,7 @@ def _item(t: ReportedTest, _style: Style) -> str | None:
 
 
 def _unit(name: str, description: str, unit: str) -> DeclaredValue[ReportedTest]:
-    return REPORT.text(
-        f"unit.{name}", description, lambda _, style: str(style.unit(unit)[0]).replace("*", "·")
-    )
+    return REPORT.text(f"unit.{name}", description, lambda _, style: printed(str(style.unit(unit)[0])))
 
 
 def _machine(t: ReportedTest, _style: Style) -> str:

@@ -29,8 +29,7 @@ def cell_text(value: Cell, spec: str, style: Style, U: Cell = None) -> str:
     if value is None or not math.isfinite(value):
         return style.missing
     if isinstance(U, float) and has_interval(value, U):
-        text = round_to_uncertainty(value, U)
-        return text.replace(".", ",") if style.decimal_comma else text
+        return style.decimal(round_to_uncertainty(value, U))
     return format_number(value, spec, decimal_comma=style.decimal_comma)
 
 

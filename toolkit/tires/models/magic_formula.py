@@ -28,7 +28,6 @@ class MagicFormula:
     name = "magic_formula"
     title = "Magic Formula at one load"
     reference = "Bakker, Nyborg, Pacejka, SAE 870421 (1987); Pacejka (2012) eq. 4.6-4.8"
-    per_load = True
     fitter = "toolkit.tires.fit"
     reads = ()
     channels = ("FY", "MZ")
