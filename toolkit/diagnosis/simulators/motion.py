@@ -273,10 +273,8 @@ def motion_of(case: Case) -> Motion | None:
     position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
     force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)
     if force is not None and (velocity is not None or position is not None):
-        speed = _speed(case, position) if velocity is None and position is not None else 0.0
-        return Motion(
-            case=case, kind="force", output=force, position=position, velocity=velocity, speed=speed
-        )
+        rate = _speed(case, position) if velocity is None and position is not None else 0.0
+        return Motion(case=case, kind="force", output=force, position=position, velocity=velocity, speed=rate)
     if not case.has_time:
         return None
     moved = next((name for name, kind in outputs.items() if kind in _LENGTHS), None)
