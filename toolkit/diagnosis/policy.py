@@ -496,29 +496,3 @@ SECTIONS = (
     BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, RATES, PAST, SCATTER, SCREENING, STARTS, STEP,
     PAIRS, UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Threshold:
-    """One number of the policy."""
-
-    section: str
-    name: str
-    value: float | tuple[int, ...]
-    unit: str
-    why: str
-
-
-def thresholds() -> tuple[Threshold, ...]:
-    """Return every number of the policy, section by section."""
-    return tuple(
-        Threshold(
-            section=type(section).__name__.removeprefix("_").lower(),
-            name=field.name,
-            value=getattr(section, field.name),
-            unit=field.metadata["unit"],
-            why=field.metadata["why"],
-        )
-        for section in SECTIONS
-        for field in dataclasses.fields(section)
-    )
