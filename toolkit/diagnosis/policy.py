@@ -156,6 +156,33 @@ class _Averages:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Rates:
+    """Over how many rows the rate of a recorded position is a velocity."""
+
+    noise: float = _set(
+        0.05, "of the usual speed", "noise of a rate: by more, a force that follows it is found too small"
+    )
+    windows: int = _set(10, "windows of a run", "fewer show no motion that turns, but its mean")
+    within: float = _set(2.0, "standard deviations of its noise", "a rate within them has no sign")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Past:
+    """What the state of an effect with a memory may have been before a run's first row."""
+
+    spread: float = _set(
+        1.0,
+        "of the range of what it follows",
+        "standard deviation of its departure from rest: what was not recorded was hardly another motion",
+    )
+    cost: float = _set(
+        1.0,
+        "of the log score of unseen rows",
+        "of a state that they choose themselves: Akaike's, as of chance",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Scatter:
     """How far runs of the same thing may differ."""
 
@@ -461,37 +488,11 @@ class _Surface:
 
 
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
-SCATTER, AVERAGES = _Scatter(), _Averages()
+PAST, RATES, SCATTER, AVERAGES = _Past(), _Rates(), _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
 DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN,
-    FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, RATES, PAST, SCATTER, SCREENING, STARTS, STEP,
+    PAIRS, UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Threshold:
-    """One number of the policy."""
-
-    section: str
-    name: str
-    value: float | tuple[int, ...]
-    unit: str
-    why: str
-
-
-def thresholds() -> tuple[Threshold, ...]:
-    """Return every number of the policy, section by section."""
-    return tuple(
-        Threshold(
-            section=type(section).__name__.removeprefix("_").lower(),
-            name=field.name,
-            value=getattr(section, field.name),
-            unit=field.metadata["unit"],
-            why=field.metadata["why"],
-        )
-        for section in SECTIONS
-        for field in dataclasses.fields(section)
-    )

@@ -135,8 +135,9 @@ class Effect:
 
     Of the search: a ``discrete`` effect is there or not, and nothing of it is fitted; ``form_error`` is the
     share of what it does by which its law may be off, ``size_error`` that of its sizes where it is known to
-    be less; ``histories`` are the pasts that shape it beside an uneventful one; ``numerics`` are numbers of
-    its computation in a case, which no fit moves; ``from_digits`` says that it is read off the recorded
+    be less; ``histories`` are the pasts that shape it beside an uneventful one; ``remembers`` says that it
+    has a state, which at a run's first row nobody knows (`filters.PAST` moves it); ``numerics`` are numbers
+    of its computation in a case, which no fit moves; ``from_digits`` says that it is read off the recorded
     digits and not searched; ``needs_signal`` that its output must have
     most of the simulated signal in it; ``nuisance`` that it is fitted beside the effects and never named;
     ``reshapes`` that it changes the shape of an answer, as every discrete effect does (`misleads`).
@@ -175,6 +176,7 @@ class Effect:
     form_error: float = 0.0
     size_error: float | None = None
     histories: tuple[History, ...] = ()
+    remembers: bool = False
     numerics: Callable[[Surroundings], Mapping[str, float]] | None = None
     from_digits: bool = False
     needs_signal: bool = False

@@ -7,12 +7,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
 
 _FINER = 4
 _CORNER = 0.5  # of the largest step between two rows: by so much more or less in the next one is a corner
 STRAIGHT = "_straight"  # among an effect's values: the rows are fine enough for straight lines
+PAST = "_past"
+"""Among an effect's values: how far its state was, at a run's first row, from where a long rest on that row
+would have left it, in units of the range of what it follows. What came before that row is not recorded."""
+
+
+def begun(x: NDArray[np.float64], values: Mapping[str, float]) -> float | None:
+    """Return where a state that follows a signal was at the first row, None for at rest on it."""
+    past = values.get(PAST, 0.0)
+    return float(x[0] + past * np.ptp(x)) if past and len(x) else None
 
 
 def lag(
@@ -51,9 +62,11 @@ def lag(
 
 
 def delayed(
-    t: NDArray[np.float64], x: NDArray[np.float64], delay: float, *, straight: bool = False
+    t: NDArray[np.float64], x: NDArray[np.float64], delay: float, *, straight: bool = False, past: float = 0.0
 ) -> NDArray[np.float64]:
     """Return x(t - delay), cubic between rows; beyond the ends the end value.
+
+    With a ``past`` it goes on in a straight line there, which is off by so much of the range a delay away.
 
     Straight lines would take a tenth of what changes within a few rows, and the delay would be found too
     short by as much; a step between two rows overshoots by 7 % beside it. Where x has gaps, straight lines;
@@ -62,29 +75,35 @@ def delayed(
     if delay == 0 or not len(t):
         return x.copy()
     at = np.clip(t - delay, t[0], t[-1])
-    return np.interp(at, t, x) if straight else _between(t, x, at)
+    y = np.interp(at, t, x) if straight else _between(t, x, at)
+    return y + past * np.ptp(x) * np.abs(t - delay - at) / abs(delay) if past else y
 
 
 def filtered(
-    t: NDArray[np.float64], x: NDArray[np.float64], time_constant: float, *, straight: bool = False
+    t: NDArray[np.float64],
+    x: NDArray[np.float64],
+    time_constant: float,
+    *,
+    straight: bool = False,
+    start: float | None = None,
 ) -> NDArray[np.float64]:
-    """Return a signal behind a first-order filter, cubic between rows as in `delayed`."""
+    """Return a signal behind a first-order filter, cubic as in `delayed`, from a ``start`` as in `lag`."""
     if straight or len(t) < 3 or not time_constant > 0:
-        return lag(t, x, time_constant)
+        return lag(t, x, time_constant, start)
     fine = np.interp(np.arange(_FINER * (len(t) - 1) + 1) / _FINER, np.arange(len(t)), t)
-    return lag(fine, _between(t, x, fine), time_constant)[::_FINER]
+    return lag(fine, _between(t, x, fine), time_constant, start)[::_FINER]
 
 
 def followed(
-    t: NDArray[np.float64], command: NDArray[np.float64], time_constant: float
+    t: NDArray[np.float64], command: NDArray[np.float64], time_constant: float, start: float | None = None
 ) -> NDArray[np.float64]:
-    """Return what follows a command with a time constant.
+    """Return what follows a command with a time constant; ``start`` as in `lag`.
 
     A command of steps and ramps is straight between its rows; one without corners is cubic, as in `filtered`.
     """
     steps = np.abs(np.diff(command)).max(initial=0.0)
     corners = np.abs(np.diff(command, 2)).max(initial=0.0) > _CORNER * steps
-    return filtered(t, command, time_constant, straight=bool(corners))
+    return filtered(t, command, time_constant, straight=bool(corners), start=start)
 
 
 def _between(t: NDArray[np.float64], x: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -96,19 +115,24 @@ def _between(t: NDArray[np.float64], x: NDArray[np.float64], at: NDArray[np.floa
     return np.asarray(CubicHermiteSpline(t, x, np.gradient(x, t))(at))
 
 
-def play(x: NDArray[np.float64], width: float) -> NDArray[np.float64]:
-    """Return the play operator's output for a gap of full ``width``, starting in the middle of the gap."""
+def play(x: NDArray[np.float64], width: float, past: float = 0.0) -> NDArray[np.float64]:
+    """Return the play operator's output for a gap of full ``width``.
+
+    It starts in the middle of the gap, or off it by the share ``past`` of half the gap.
+    """
     half = 0.5 * abs(width)
     y = np.empty_like(x)
-    last = float(x[0]) if len(x) else 0.0
+    last = float(x[0]) + past * half if len(x) else 0.0
     for i, value in enumerate(x.tolist()):
         last = min(max(last, value - half), value + half)
         y[i] = last
     return y
 
 
-def plays(x: NDArray[np.float64], halves: NDArray[np.float64]) -> NDArray[np.float64]:
+def plays(x: NDArray[np.float64], halves: NDArray[np.float64], past: float = 0.0) -> NDArray[np.float64]:
     """Return the mean of play operators with several half gaps, loaded from zero for the first time.
+
+    With a ``past`` each has gone by this share of the way from there to the farther end of its gap.
 
     A row clips the state to an interval, and one clip after another is a clip again: all rows at once by
     doubling the number of rows that stand behind one clip (Hillis and Steele's scan).
@@ -116,10 +140,12 @@ def plays(x: NDArray[np.float64], halves: NDArray[np.float64]) -> NDArray[np.flo
     if not len(x):
         return x
     low, high = x[:, None] - halves, x[:, None] + halves
+    state = np.clip(0.0, low[0], high[0])
+    state = state + past * (np.where(state > x[0], low[0], high[0]) - state)
     reach = 1
     while reach < len(x):
         first = np.maximum(np.minimum(low[:-reach], high[reach:]), low[reach:])
         last = np.maximum(np.minimum(high[:-reach], high[reach:]), low[reach:])
         low[reach:], high[reach:] = first, last
         reach *= 2
-    return np.asarray(np.minimum(np.maximum(0.0, low), high).mean(axis=1))
+    return np.asarray(np.minimum(np.maximum(state, low), high).mean(axis=1))

@@ -1,11 +1,20 @@
 """What is told of a refit: parameters at the end of their priors, rows that it makes worse."""
 
+from pathlib import Path
+from types import SimpleNamespace as Of
+
 import numpy as np
 import pandas as pd
+import pytest
 
 from tests.diagnosis.cases import CELL, cell_case, write_case
+from toolkit.diagnosis.answer.answer import FoundParameter
+from toolkit.diagnosis.answer.refit_findings import confounded_findings
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effect
+from toolkit.effects.law import law_effect
 
 WARM = """
 import pandas as pd
@@ -52,3 +61,22 @@ def test_a_refit_that_makes_unseen_rows_worse_is_told(tmp_path):
 def test_a_refit_within_its_priors_is_not_talked_of(tmp_path):
     findings, _ = told(tmp_path, cell_case(0.01), CELL, [table(k).drop(columns="T") for k in range(2)])
     assert not {"parameter-at-bound", "refit-worse"} & set(findings)
+
+
+@pytest.mark.parametrize(("beside", "predicts", "told"), [(3.0, True, 1), (5.7, True, 0), (3.0, False, 0)])
+def test_a_size_that_a_law_moves_by_more_than_its_interval_is_confounded(beside, predicts, told):
+    def friction(size):
+        return AppliedEffect(effect=effect("coulomb_friction"), channel="F", values={"coulomb": size})
+
+    law = AppliedEffect(effect=law_effect("law adds: a*[v]"), channel="F", values={"a": 1.0})
+    size = FoundParameter(name="coulomb", value=5.9, unit="N", ci95=(5.4, 6.4), runs=None)
+    findings = confounded_findings(
+        Of(path=Path("CASE.toml")),
+        Of(augmented=Of(active=(friction(5.9),))),
+        Of(listed=(Of(applied=law, predicts=predicts),), fit=Of(active=(friction(beside), law))),
+        (Of(key=friction(5.9).key, parameters=(size,)),),
+    )
+    assert len(findings) == told
+    for finding in findings:
+        assert finding.rule == "size-confounded"
+        assert "coulomb is 5.9 N, and 3 N beside the law" in finding.message

@@ -7,8 +7,9 @@ import pytest
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.folds import folds_of, hold_out
 from toolkit.diagnosis.fit.problem import problem_of
-from toolkit.diagnosis.fit.run_scatter import with_run_scatter
+from toolkit.diagnosis.fit.run_scatter import held_out_beside_scatter, with_run_scatter
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effect
@@ -89,3 +90,31 @@ def test_a_run_that_an_effect_is_bound_to_has_that_effect_and_no_scatter(tmp_pat
     made, scatter = with_run_scatter(problem, fit(problem, (offset, drift)))
     assert scatter == ()
     assert abs(dict(made.active[0].values)["offset"]) == pytest.approx(4.0, abs=0.3)
+
+
+def test_unseen_rows_are_told_by_fits_that_have_their_values_as_the_told_one(tmp_path):
+    case = case_of(tmp_path, 0, zero_sd=0.6, gain_sd=0.004)
+    problem = problem_of(case, model_of(case, None, None))
+    drift = AppliedEffect(effect=effect("zero_drift"), channel="F", values={"rate": 0.5})
+    made = fit(problem, (drift,))
+    folds = folds_of(problem, made)
+    held_out = hold_out(problem, folds, made.active, made)
+    told = held_out_beside_scatter(problem, folds, held_out)
+    assert told.scores == held_out.scores
+    for k, rows in enumerate(problem.slices):
+        four = problem_of(case, model_of(case, None, None))
+        for i in range(rows.start, rows.stop):
+            four.kept["F"][i] = False
+        beside = with_run_scatter(four, held_out.fits[k])[0]
+        assert told.simulated["F"][rows] == pytest.approx(beside.simulated["F"][rows], abs=1e-9)
+    assert np.abs(told.simulated["F"] - held_out.simulated["F"]).max() > 1e-3
+
+
+def test_unseen_rows_of_runs_that_are_alike_stay(tmp_path):
+    case = case_of(tmp_path, 1, zero_sd=0.0, gain_sd=0.0)
+    problem = problem_of(case, model_of(case, None, None))
+    made = fit(problem, ())
+    folds = folds_of(problem, made)
+    held_out = hold_out(problem, folds, (), made)
+    told = held_out_beside_scatter(problem, folds, held_out)
+    assert np.array_equal(told.simulated["F"], held_out.simulated["F"])

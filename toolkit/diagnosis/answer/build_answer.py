@@ -23,7 +23,7 @@ from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.naming import mostly_unknown
 from toolkit.diagnosis.answer.next_measurements import equivalent_to, next_measurements
 from toolkit.diagnosis.answer.power import not_found
-from toolkit.diagnosis.answer.refit_findings import refit_findings
+from toolkit.diagnosis.answer.refit_findings import confounded_findings, refit_findings
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
@@ -78,7 +78,12 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
             units=units,
         ),
         next_measurements=next_measurements(search, effects, verdict),
-        findings=(*findings, *_outliers(case, search), *refit_findings(case, search)),
+        findings=(
+            *findings,
+            *_outliers(case, search),
+            *refit_findings(case, search),
+            *confounded_findings(case, search, laws, effects),
+        ),
         complete=not search.skipped and laws.complete,
         skipped=search.skipped if laws.complete or search.skipped else (LAWS_STEP,),
         recordings=recorded(case.runs),

@@ -10,7 +10,9 @@ from toolkit.diagnosis.policy import PRIORS, VERDICT
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.diagnosis.answer.answer import FoundEffect
     from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.search import Search
 
 
@@ -19,6 +21,41 @@ def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
     return (
         *_at_bounds(case, search), *_scatter(case, search), *_worse(case, search), *_drifting(case, search)
     )  # fmt: skip
+
+
+def confounded_findings(
+    case: Case, search: Search, laws: Laws, effects: tuple[FoundEffect, ...]
+) -> tuple[Finding, ...]:
+    """Return the effects whose size a law beside them moves by more than its interval.
+
+    A law that goes with an effect takes part of it, or gives it part of its own: neither of the two sizes is
+    then that of the effect.
+    """
+    predicting = [law.applied.key for law in laws.listed if law.predicts]
+    beside = {applied.key: applied for applied in laws.fit.active}
+    findings = []
+    for effect in effects if any(key in beside for key in predicting) else ():
+        applied = beside.get(effect.key)
+        alone = next((each for each in search.augmented.active if each.key == effect.key), None)
+        if applied is None or alone is None:
+            continue
+        for parameter in effect.parameters:
+            if parameter.ci95 is None or parameter.name not in alone.values:
+                continue
+            moved = applied.values[parameter.name] - alone.values[parameter.name]
+            if abs(moved) > max(abs(end - float(parameter.value)) for end in parameter.ci95):
+                unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
+                findings.append(
+                    Finding(
+                        rule="size-confounded",
+                        where=f"{case.path.name}: {effect.key.label}",
+                        level="warning",
+                        message=f"{parameter.name} is {alone.values[parameter.name]:.4g}{unit}, and "
+                        f"{applied.values[parameter.name]:.4g}{unit} beside the law without a name: "
+                        "this recording does not part the two",
+                    )
+                )
+    return tuple(findings)
 
 
 def _drifting(case: Case, search: Search) -> tuple[Finding, ...]:

@@ -16,7 +16,7 @@ Source: Laird and Ware, Biometrics 38 (1982) 963, random effects with a variance
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,8 @@ from toolkit.diagnosis.fit.descent import Derivatives, Space
 from toolkit.diagnosis.fit.fit import Fit, fit, jacobian
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, log_likelihood, whiten
 from toolkit.diagnosis.fit.scatter_sizes import likeliest_sizes
-from toolkit.diagnosis.policy import ROWS, SCATTER
+from toolkit.diagnosis.fit.unknown_past import past_responses, taken_by_past
+from toolkit.diagnosis.policy import PAST, ROWS, SCATTER
 from toolkit.effects.applied import AppliedEffect
 
 if TYPE_CHECKING:
@@ -120,11 +121,12 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], st
         for name in problem.names:
             simulated[name][mask] = trained.simulated[name][mask]
     scores = np.zeros(len(fits))
+    pasts = [past_responses(problem, trained) for trained in fits]
     for name in problem.names:
         unseen = [
             (k, run)
             for k, (mask, trained) in enumerate(zip(folds.held, fits, strict=True))
-            for run in _unseen(problem, name, mask, trained)
+            for run in _unseen(problem, name, mask, trained, pasts[k])
         ]
         of_runs = scattered_scores([run for _, run in unseen], by_run=folds.by_run)
         for (k, _), score in zip(unseen, of_runs, strict=True):
@@ -132,8 +134,10 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], st
     return HeldOut(scores=tuple(scores.tolist()), simulated=simulated, fits=tuple(fits))
 
 
-def _unseen(problem: Problem, name: str, mask: NDArray[np.bool_], trained: Fit) -> list[UnseenRun]:
-    """Return the rows of one output that a fold holds out, run by run."""
+def _unseen(
+    problem: Problem, name: str, mask: NDArray[np.bool_], trained: Fit, past: Mapping[str, Array]
+) -> list[UnseenRun]:
+    """Return the rows of one output that a fold holds out, run by run, each with an unknown past."""
     runs = []
     for rows in problem.slices:
         within = np.zeros_like(mask)
@@ -141,9 +145,14 @@ def _unseen(problem: Problem, name: str, mask: NDArray[np.bool_], trained: Fit) 
         where = problem.layout(name, within)
         if where.n:
             at = where.index
+            before = past[name][at] if name in past else np.zeros((where.n, 0))
             runs.append(
                 UnseenRun.of(
-                    trained.residual[name][at], trained.simulated[name][at], where, trained.noise[name]
+                    trained.residual[name][at],
+                    trained.simulated[name][at],
+                    where,
+                    trained.noise[name],
+                    before[:, before.any(axis=0)],
                 )
             )
     return runs
@@ -203,19 +212,31 @@ class UnseenRun:
     outer: Array
 
     @staticmethod
-    def of(residual: Array, simulated: Array, where: Layout, noise: Autoregression) -> UnseenRun:
-        """Return a run from its kept values (n,) and their layout."""
+    def of(
+        residual: Array, simulated: Array, where: Layout, noise: Autoregression, before: Array | None = None
+    ) -> UnseenRun:
+        """Return a run from its kept values (n,) and their layout.
+
+        Parameters
+        ----------
+        before : how they answer to states of effects at the run's first row, (n, states), which are what
+            suits them best where that is worth its cost
+        """
         size = math.sqrt(float(np.mean(simulated**2))) or 1.0
-        stacked = np.stack([residual, np.ones(where.n), simulated / size], axis=1)
-        white = whiten(stacked, where, noise)
-        columns, innovations = white[:, 1:], white[:, 0]
-        remainder = float(innovations @ innovations)
+        white = whiten(np.stack([residual, np.ones(where.n), simulated / size], axis=1), where, noise)
+        constant = log_likelihood(residual, where, noise) + 0.5 * float(white[:, 0] @ white[:, 0])
+        left, cost = white, 0.0 if before is None else PAST.cost * before.shape[1]
+        if before is not None and cost:
+            taken = taken_by_past(whiten(before, where, noise), white)
+            if 0.5 * float(white[:, 0] @ taken[:, 0]) > cost:
+                left, constant = white - taken, constant - cost
+        product = white.T @ left
         return UnseenRun(
             n=where.n,
-            constant=log_likelihood(residual, where, noise) + 0.5 * remainder,
-            rest=remainder,
-            inner=columns.T @ columns,
-            outer=columns.T @ innovations,
+            constant=constant,
+            rest=float(product[0, 0]),
+            inner=product[1:, 1:],
+            outer=product[1:, 0],
         )
 
 

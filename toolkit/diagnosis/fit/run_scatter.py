@@ -32,6 +32,7 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.diagnosis.fit.folds import Folds, HeldOut
     from toolkit.diagnosis.fit.problem import Problem
 
     Array = NDArray[np.float64]
@@ -101,6 +102,21 @@ def with_run_scatter(problem: Problem, made: Fit) -> tuple[Fit, tuple[RunScatter
         if zero or gain
     )
     return replace(about.made, covariance=covariance), scatter
+
+
+def held_out_beside_scatter(problem: Problem, folds: Folds, held_out: HeldOut) -> HeldOut:
+    """Return unseen rows by fits that have their values as a fit of all rows has: beside zeros and gains.
+
+    A size and the share of the error that it takes are then of one kind of fit. The scores stay.
+    """
+    simulated = {name: column.copy() for name, column in held_out.simulated.items()}
+    for mask, trained in zip(folds.held, held_out.fits, strict=True):
+        seen = replace(problem, kept={name: kept & ~mask for name, kept in problem.kept.items()})
+        with contextlib.suppress(FitError):  # the fit stays what it is
+            beside, scatter = with_run_scatter(seen, trained)
+            for name, column in simulated.items() if scatter else ():
+                column[mask] += (beside.simulated[name] - trained.simulated[name])[mask]
+    return replace(held_out, simulated=simulated)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,6 +12,7 @@ from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
+from toolkit.diagnosis.fit.unknown_past import past_gain
 from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
@@ -40,11 +41,21 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Joint:
-    """A candidate fitted jointly with what is there; ``score``: log-posterior less its parameters' cost."""
+    """A candidate fitted jointly with what is there; ``score``: log-posterior less its parameters' cost.
+
+    ``past`` is what the score gains where the states of effects before the first rows are free: by both
+    together candidates are held against each other.
+    """
 
     scored: Scored
     fit: Fit
     score: float
+    past: float = 0.0
+
+    @property
+    def compared(self) -> float:
+        """What is compared between candidates."""
+        return self.score + self.past
 
 
 def step_groups(
@@ -95,7 +106,7 @@ def joint_fits(
         fitted = joint_fit(problem, base, (scored.active,), begin=scored.p, least=least + dear)
         if fitted is not None and fitted.log_posterior - dear >= least:
             score = fitted.log_posterior - dear
-            joints.append(Joint(scored=scored, fit=fitted, score=score))
+            joints.append(Joint(scored=scored, fit=fitted, score=score, past=past_gain(problem, fitted)))
     return ranked(problem, joints)
 
 
@@ -107,13 +118,13 @@ def cost(problem: Problem, added: Sequence[AppliedEffect]) -> float:
 
 def ranked(problem: Problem, joints: Sequence[Joint]) -> tuple[Joint, ...]:
     """Return joint fits in their order, the best first; of equals the likeliest."""
-    best = max((joint.score for joint in joints), default=0.0)
+    best = max((joint.compared for joint in joints), default=0.0)
 
     def order(joint: Joint) -> tuple[bool, float]:
-        behind = joint.score <= best - VERDICT.close
+        behind = joint.compared <= best - VERDICT.close
         active = joint.fit.active[-1]
         prior = 0.0 if behind else active.log_prior(CaseView(problem, active.channel, active.source))
-        return behind, -joint.score - prior
+        return behind, -joint.compared - prior
 
     return tuple(sorted(joints, key=order))
 
@@ -216,8 +227,8 @@ def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Riv
     return tuple(
         Rival(
             active=rival.fit.active[-1],
-            difference=rival.score
-            - chosen.score
+            difference=rival.compared
+            - chosen.compared
             + weight * (_shapes(rival.scored.active) - _shapes(chosen.scored.active)),
         )
         for rival in joint
@@ -228,13 +239,19 @@ def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Riv
 def score_in_place(problem: Problem, made: Fit, active: AppliedEffect) -> float:
     """Return by what effects are compared in one place: the log-posterior less the cost of their sizes.
 
-    Parameters that only shape an effect make it no less able to imitate another.
+    Parameters that only shape an effect make it no less able to imitate another; what came before the first
+    rows is free.
     """
-    return made.log_posterior - _cost_in_place(problem, active)
+    return made.log_posterior + past_gain(problem, made) - _cost_in_place(problem, active)
 
 
 def least_in_place(problem: Problem, score: float, active: AppliedEffect) -> float:
-    """Return the log-posterior with which an effect comes so near to a score that the two are one class."""
+    """Return the log-posterior with which an effect comes so near to a score that the two are one class.
+
+    Of one that remembers, a fit does not show what a free past would add.
+    """
+    if active.effect.remembers:
+        return -math.inf
     return score - VERDICT.close + _cost_in_place(problem, active)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.fit.unknown_past import past_gain
 from toolkit.diagnosis.policy import PAIRS, SCREENING, STEP
 from toolkit.diagnosis.search.forward_step import Rival, Step, at_bound, drifts_faster, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
@@ -174,12 +175,13 @@ def _needed(
     gain = held_out.total - without.total
     if gain < STEP.least_gain:
         return None
-    rivals = []
+    rivals, own = [], joint.log_posterior + past_gain(problem, joint)
     for _, rival in fitted:
         keys = [each.key for each in rival.active[-2:]]
         if rival is not joint and other.key in keys:
             instead = rival.active[-2] if keys[1] == other.key else rival.active[-1]
-            rivals.append(Rival(active=instead, difference=rival.log_posterior - joint.log_posterior))
+            difference = rival.log_posterior + past_gain(problem, rival) - own
+            rivals.append(Rival(active=instead, difference=difference))
     return Step(
         active=effect,
         p_value=p_value,

@@ -15,7 +15,7 @@ from toolkit.diagnosis.fit.drift import judged_by_rates
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
-from toolkit.diagnosis.fit.run_scatter import RunScatter, with_run_scatter
+from toolkit.diagnosis.fit.run_scatter import RunScatter, held_out_beside_scatter, with_run_scatter
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
@@ -452,6 +452,8 @@ def _beside_scatter(
         if not listed:
             return bare, scores, [], scatter
         return _beside_scatter(problem, folds, bare, scores, listed)
+    if scatter:
+        held_base = held_out_beside_scatter(problem, folds, held_base)
     return scattered, held_base, steps, scatter
 
 

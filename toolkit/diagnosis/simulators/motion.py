@@ -1,7 +1,8 @@
 """Equations of motion behind a simulator that cannot be opened: force-like terms on its outputs.
 
 Two shapes are told apart by units. An output that is a force or a moment, beside a recorded velocity, is
-the sum of the terms of the equation: a missing one is added to it. An output that is a position or a
+the sum of the terms of the equation: a missing one is added to it. Where only the position was recorded in
+time, its rate is the velocity. An output that is a position or a
 velocity moves by the simulator's own acceleration along its trajectory; a missing term changes that
 acceleration, and the motion is integrated anew (exact where the simulator's acceleration depends on time
 alone, as in a free fall).
@@ -10,6 +11,7 @@ alone, as in a free fall).
 from __future__ import annotations
 
 import dataclasses
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -18,6 +20,7 @@ import numpy as np
 
 from toolkit.diagnosis.simulators.channels import slopes
 from toolkit.diagnosis.simulators.linear_response import integrated
+from toolkit.diagnosis.simulators.rates import Track, reach_of, usual_speed
 from toolkit.diagnosis.simulators.setting import dimension
 from toolkit.diagnosis.simulators.simulator import Moving
 from toolkit.effects.applied import AppliedEffect
@@ -41,13 +44,19 @@ _SUBSTEPS = 4
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """Which output a term enters, and which channels are its position and velocity."""
+    """Which output a term enters, and which channels are its position and velocity.
+
+    ``speed`` is the usual rate of a position beside which a force stands and no velocity, zero where there
+    is none that its noise would leave.
+    """
 
     case: Case
     kind: str
     output: str
     position: str | None
     velocity: str | None
+    speed: float = 0.0
+    _rates: dict[Run, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the output that a dynamic effect could enter."""
@@ -56,14 +65,14 @@ class Motion:
             return []
         if term.of == "position" and self.position is None:
             return []
-        if term.of == "velocity" and self.velocity is None and self.kind == "force":
+        if term.of == "velocity" and self.velocity is None and not self.speed and self.kind == "force":
             return []
         return [(self.output, None)]
 
     def sizes(self, force: float, largest: Largest) -> MotionSizes:
         """Return sizes of the motion; those of the recorded channels where the output is a force."""
         if self.kind == "force":
-            speed = largest(self.velocity) if self.velocity else 1.0
+            speed = largest(self.velocity) if self.velocity else self._fastest()
             place = largest(self.position) if self.position else 1.0
         else:
             force, speed, place = self._scales()
@@ -76,10 +85,29 @@ class Motion:
         """Return units of a force-like term, of its velocity and of its position."""
         output = self.case.unit(self.output)
         if self.kind == "force":
-            speed = "1" if self.velocity is None else self.case.unit(self.velocity)
-            return output, speed, f"{speed}*s" if self.position is None else self.case.unit(self.position)
+            place = None if self.position is None else self.case.unit(self.position)
+            if self.velocity is not None:
+                speed = self.case.unit(self.velocity)
+            else:
+                speed = "1" if place is None or not self.speed else f"{place}/s"
+            return output, speed, place or f"{speed}*s"
         length = output if self.kind == "position" else f"{output}*s"
         return f"{length}/s^2", f"{length}/s", length
+
+    def speeds(self, run: Run) -> NDArray[np.float64]:
+        """Return the velocity of a run beside a force, (n,): as recorded, or the rate of its position."""
+        if self.velocity is not None:
+            return run.columns[self.velocity]
+        if not self.speed or self.position is None:
+            return np.zeros(run.rows)
+        if run not in self._rates:
+            track = _track(self.case, run, self.position)
+            self._rates[run] = track.rate(reach_of(track, self.speed) or track.longest)
+        return self._rates[run]
+
+    def _fastest(self) -> float:
+        largest = [float(np.abs(self.speeds(run)).max(initial=0.0)) for run in self.case.runs]
+        return max(largest, default=0.0) or 1.0
 
     def _scales(self) -> tuple[float, float, float]:
         """Return sizes of acceleration, velocity and position of an output that moves."""
@@ -131,8 +159,8 @@ class Motion:
         if self.kind == "force":
             zero = np.zeros(run.rows)
             x = zero if self.position is None else run.columns[self.position]
-            v = zero if self.velocity is None else run.columns[self.velocity]
-            result[self.output] = simulated[self.output] + resisting(forces, run.t, x, v)
+            push = resisting(forces, run.t, x, self.speeds(run))
+            result[self.output] = simulated[self.output] + push
             return result
         return self._moved(result, forces, run)
 
@@ -245,7 +273,8 @@ def motion_of(case: Case) -> Motion | None:
     position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
     force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)
     if force is not None and (velocity is not None or position is not None):
-        return Motion(case=case, kind="force", output=force, position=position, velocity=velocity)
+        rate = _speed(case, position) if velocity is None and position is not None else 0.0
+        return Motion(case=case, kind="force", output=force, position=position, velocity=velocity, speed=rate)
     if not case.has_time:
         return None
     moved = next((name for name, kind in outputs.items() if kind in _LENGTHS), None)
@@ -255,6 +284,21 @@ def motion_of(case: Case) -> Motion | None:
     if speed is not None:
         return Motion(case=case, kind="velocity", output=speed, position=None, velocity=speed)
     return None
+
+
+def _speed(case: Case, position: str) -> float:
+    """Return the usual rate of a position, zero where some run's noise would hide it."""
+    if not case.has_time:
+        return 0.0
+    tracks = [_track(case, run, position) for run in case.runs if position in run.columns and run.rows]
+    speed = usual_speed(tracks)
+    return speed if speed and all(reach_of(track, speed) for track in tracks) else 0.0
+
+
+def _track(case: Case, run: Run, position: str) -> Track:
+    of = unit(case.unit(position))
+    turn = 2 * math.pi / of.factor if of.dimension == "angle" else None
+    return Track.of(run.t, run.columns[position], turn)
 
 
 def _is_speed(case: Case, name: str, kind: str) -> bool:

@@ -9,14 +9,14 @@ import numpy as np
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Values
-from toolkit.effects.filters import play
+from toolkit.effects.filters import PAST, play
 
 if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
 
 def _followed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
-    return dataclasses.replace(drive, SA=play(drive.SA, np.deg2rad(values["gap"])))
+    return dataclasses.replace(drive, SA=play(drive.SA, np.deg2rad(values["gap"]), values.get(PAST, 0.0)))
 
 
 EFFECT = Effect(
@@ -37,5 +37,6 @@ EFFECT = Effect(
         ),
     ),
     drive=_followed,
+    remembers=True,
     reshapes=True,
 )

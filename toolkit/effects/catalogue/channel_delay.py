@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import ChannelFacts, Values
-from toolkit.effects.filters import STRAIGHT, delayed
+from toolkit.effects.filters import PAST, STRAIGHT, delayed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 def _late(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    return delayed(setting.t, y, values["delay"], straight=STRAIGHT in values)
+    straight, past = STRAIGHT in values, values.get(PAST, 0.0)
+    return delayed(setting.t, y, values["delay"], straight=straight, past=past)
 
 
 EFFECT = Effect(
@@ -39,5 +40,6 @@ EFFECT = Effect(
         ),
     ),
     channel=_late,
+    remembers=True,
     on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True, between_rows=True),
 )

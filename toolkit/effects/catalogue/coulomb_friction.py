@@ -8,6 +8,7 @@ import numpy as np
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Term, Values
+from toolkit.effects.filters import PAST
 from toolkit.effects.surroundings import Surroundings, of_force
 
 if TYPE_CHECKING:
@@ -33,7 +34,9 @@ def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Val
         return values["coulomb"] * np.sign(velocity)
     knots, travelled, strokes = _path(t, velocity)
     sizes = np.diff(travelled)
-    z, bent = _bristle(sizes, strokes, reach, start=float(np.sign(velocity[0])))
+    # Bent by the way before the first row, which is not recorded: as if it had gone on as it begins.
+    start = float(np.sign(velocity[0])) + 2 * values.get(PAST, 0.0)
+    z, bent = _bristle(sizes, strokes, reach, start=start)
     # The bristle's mean over a piece, at an even speed along it.
     slow = sizes > 1e-9 * reach if reach > 0 else sizes > 0
     settled = np.where(slow, (z - bent) * reach / np.where(slow, sizes, 1.0) + strokes, z)
@@ -139,6 +142,7 @@ EFFECT = Effect(
     ),
     term=Term(of="velocity", force=_resisting, recorded=_recorded, bristle=_bristle_of),
     numerics=_smoothing,
+    remembers=True,
     form_error=0.03,
     reshapes=True,
 )

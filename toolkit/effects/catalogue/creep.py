@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import ChannelFacts, History, Values
-from toolkit.effects.filters import lag
+from toolkit.effects.filters import PAST, begun, lag
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from toolkit.effects.signals import Setting
@@ -19,7 +20,9 @@ FROM_REST = "_from_rest"
 
 
 def _creeping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    start = 0.0 if values.get(FROM_REST) else None
+    start = begun(y, values)
+    if values.get(FROM_REST):
+        start = values.get(PAST, 0.0) * float(np.ptp(y)) if len(y) else 0.0
     return y + values["fraction"] * lag(setting.t, y, values["time_constant"], start)
 
 
@@ -52,6 +55,7 @@ EFFECT = Effect(
         ),
     ),
     channel=_creeping,
+    remembers=True,
     on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True),
     histories=(History(values={FROM_REST: 1.0}, text="unloaded before each run"),),
 )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import ChannelFacts, Values
-from toolkit.effects.filters import STRAIGHT, filtered
+from toolkit.effects.filters import STRAIGHT, begun, filtered
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def _filtered(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    return filtered(setting.t, y, values["time_constant"], straight=STRAIGHT in values)
+    return filtered(
+        setting.t, y, values["time_constant"], straight=STRAIGHT in values, start=begun(y, values)
+    )
 
 
 EFFECT = Effect(
@@ -40,5 +42,6 @@ EFFECT = Effect(
         ),
     ),
     channel=_filtered,
+    remembers=True,
     on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True, between_rows=True),
 )

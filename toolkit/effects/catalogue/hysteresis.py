@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import ChannelFacts, Values
-from toolkit.effects.filters import plays
+from toolkit.effects.filters import PAST, plays
 from toolkit.effects.surroundings import Surroundings, of_channel
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArra
     if height <= 0:
         return y
     middle = values.get("_middle", 0.5 * float(np.max(y) + np.min(y)))
-    loop = (plays(y, halves) - y + _line(halves, span) * (y - middle)) / height
+    loop = (plays(y, halves, values.get(PAST, 0.0)) - y + _line(halves, span) * (y - middle)) / height
     return y + values["gain"] * y + values["width"] * loop
 
 
@@ -99,6 +99,7 @@ EFFECT = Effect(
         ),
     ),
     channel=_looping,
+    remembers=True,
     on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True),
     numerics=_span,
     zero_beside=_half_loop,

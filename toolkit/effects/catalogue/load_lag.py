@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Values
-from toolkit.effects.filters import followed
+from toolkit.effects.filters import begun, followed
 
 if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
 
 def _followed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
-    return dataclasses.replace(drive, FZ=followed(drive.t, drive.FZ, values["time_constant"]))
+    return dataclasses.replace(
+        drive, FZ=followed(drive.t, drive.FZ, values["time_constant"], begun(drive.FZ, values))
+    )
 
 
 EFFECT = Effect(
@@ -38,6 +40,7 @@ EFFECT = Effect(
         ),
     ),
     drive=_followed,
+    remembers=True,
     confined_by=("repeat_of", "date", "order"),
     akin="a load that is slow to come, or a tire that is slow to settle",
     follows_command="FZ",

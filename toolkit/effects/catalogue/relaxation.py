@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Values
-from toolkit.effects.filters import lag
+from toolkit.effects.filters import begun, lag
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,7 +39,7 @@ def _relaxed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Driv
             slope = _slope(tire, dataclasses.replace(drive, SA=slip))
             ratio = np.maximum(1 + falling * (_over(slope, at_zero * nominal) - 1), _LEAST)
         length = values["relaxation_length"] * ratio * by_load
-        slip = lag(drive.t, drive.SA, length / np.maximum(np.abs(drive.V), 1e-6))
+        slip = lag(drive.t, drive.SA, length / np.maximum(np.abs(drive.V), 1e-6), begun(drive.SA, values))
     return dataclasses.replace(drive, SA=slip)
 
 
@@ -106,5 +106,6 @@ EFFECT = Effect(
         ),
     ),
     drive=_relaxed,
+    remembers=True,
     form_error=0.03,
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Values
-from toolkit.effects.filters import lag
+from toolkit.effects.filters import PAST, lag
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +38,8 @@ def _rise(drive: Drive, values: Values, setting: Setting, tire: Tire) -> NDArray
         return recorded - setting.first.get(name, float(recorded[0])) - values.get("reference", 0.0)
     power_kW = np.abs(tire(drive).FY * drive.V * np.sin(drive.SA)) * 1e-3
     tau = max(values["time_constant"], 1e-3)
-    return HEATING_K_PER_KJ * tau * lag(drive.t, power_kW, tau, start=0.0)
+    start = values.get(PAST, 0.0) * float(np.ptp(power_kW)) if len(power_kW) else 0.0
+    return HEATING_K_PER_KJ * tau * lag(drive.t, power_kW, tau, start=start)
 
 
 def _temperature_recorded(case: Surroundings) -> bool:
@@ -92,6 +93,7 @@ EFFECT = Effect(
         ),
     ),
     drive=_heated,
+    remembers=True,
     form_error=0.03,
     by_temperature=True,
 )

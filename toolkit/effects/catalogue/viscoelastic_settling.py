@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Values
-from toolkit.effects.filters import lag
+from toolkit.effects.filters import begun, lag
 
 if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
@@ -19,13 +19,12 @@ def _settled(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Driv
         forces, of_force = tire(drive), (1 - of_load) * f
         drive = dataclasses.replace(
             drive,
-            FY=drive.FY + of_force * (forces.FY - lag(drive.t, forces.FY, tau)),
-            MZ=drive.MZ + of_force * (forces.MZ - lag(drive.t, forces.MZ, tau)),
+            FY=drive.FY + of_force * (forces.FY - lag(drive.t, forces.FY, tau, begun(forces.FY, values))),
+            MZ=drive.MZ + of_force * (forces.MZ - lag(drive.t, forces.MZ, tau, begun(forces.MZ, values))),
         )
     if of_load > 0:
-        drive = dataclasses.replace(
-            drive, FZ=drive.FZ + of_load * f * (drive.FZ - lag(drive.t, drive.FZ, tau))
-        )
+        late = lag(drive.t, drive.FZ, tau, begun(drive.FZ, values))
+        drive = dataclasses.replace(drive, FZ=drive.FZ + of_load * f * (drive.FZ - late))
     return drive
 
 
@@ -70,6 +69,7 @@ EFFECT = Effect(
         ),
     ),
     drive=_settled,
+    remembers=True,
     confined_by=("repeat_of", "date", "order"),
     form_error=0.03,
     akin="a load that is slow to come, or a tire that is slow to settle",
