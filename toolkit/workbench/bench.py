@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from toolkit.calibration.registry.clock import today
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk.pending import agent_people, pending_request
+from toolkit.lab.desk.versions import Versions
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -38,6 +39,7 @@ class Bench:
 
     def __init__(self, home: Path, registry: Registry, keys: Keys, *, person: Person | None = None) -> None:
         self.home, self.registry, self.keys, self.person = home, registry, keys, person
+        self.versions = Versions()
         self._answers: dict[tuple[object, ...], object] = {}
         self._asked: dict[tuple[str, str | None], threading.Lock] = {}
         self._holdings: Holdings | None = None
