@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.desk.audited import Audited
-    from toolkit.lab.desk.holdings import Holdings, Kind
+    from toolkit.lab.desk.holdings import Holdings, Kind, Reported
     from toolkit.trust.people import Person
     from toolkit.workbench.guard import Keys
 
@@ -45,7 +45,7 @@ class Bench:
         self._holdings: Holdings | None = None
         self._audited: dict[Path, tuple[object, Audited]] = {}
         self._reading = threading.Lock()
-        self._reported: tuple[Holdings, frozenset[str]] | None = None
+        self._reported: tuple[Holdings, Reported] | None = None
 
     @property
     def is_own(self) -> bool:
@@ -70,8 +70,8 @@ class Bench:
         path = self.holdings().path(kind, holding_id)
         return path or self.holdings(again=True).path(kind, holding_id)
 
-    def reported(self) -> frozenset[str]:
-        """Return the hashes that the reports of the home rest on, read once for each look through it."""
+    def reported(self) -> Reported:
+        """Return what the reports of the home rest on, read once for each look through it."""
         from toolkit.lab.desk.holdings import reported_inputs
 
         holdings = self.holdings()

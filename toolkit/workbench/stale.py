@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import secrets
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from toolkit.workbench.page import is_part, page
@@ -29,11 +30,11 @@ def stale(
     request: Request,
     error: StaleError,
     *,
-    kept: Mapping[str, str],
-    typed: Mapping[str, str],
     look: str,
+    kept: Mapping[str, str] = MappingProxyType({}),
+    typed: Mapping[str, str] = MappingProxyType({}),
     again: str = "",
-    hidden: Mapping[str, str] | None = None,
+    hidden: Mapping[str, str] = MappingProxyType({}),
 ) -> Response:
     """Return the refusal of a change that was made from an older version.
 
@@ -51,7 +52,7 @@ def stale(
     }
     return page(
         request, "part_stale" if is_part(request) else "stale", status=409, error=error.as_dict(),
-        pairs=pairs, look=look, again=again, hidden=hidden or {},
+        pairs=pairs, look=look, again=again, hidden=hidden,
     )  # fmt: skip
 
 
