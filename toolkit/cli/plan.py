@@ -63,7 +63,7 @@ def session(
     demands: Annotated[
         list[str] | None,
         typer.Option(
-            "--u", metavar="LOAD=U", help='U asked for at the largest load, "FY=20 N"; once a load.'
+            "--u", metavar="LOAD=U", help='U asked for at the largest load, "FY=20 N"; once for each load.'
         ),
     ] = None,
     minutes: Annotated[

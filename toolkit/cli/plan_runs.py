@@ -62,7 +62,11 @@ def protocol(
         float, typer.Option("--sliding", metavar="KJ", help="Energy that may slide away: wear of the tread.")
     ] = math.inf,
     rise: Annotated[
-        float, typer.Option("--rise", metavar="K", help="Warmth of the tread over the room; pauses keep it.")
+        float,
+        typer.Option(
+            "--rise", metavar="K",
+            help="Largest temperature rise of the tread above the room; pauses keep it below.",
+        ),
     ] = math.inf,
     out: Annotated[
         Path | None,
