@@ -46,7 +46,7 @@ def report(request: Request) -> Response:
     """Return the page: the templates to choose from, and a place for the preview."""
     bench, test_id, place_of = _requested(request)
     return page(
-        request, "report", test_id=test_id, place_of=place_of, choices=templates_of(bench.home),
+        request, "report", test_id=test_id, place_of=place_of, choices=templates_of(bench.home, "report"),
         people=bench.registry.people().history.now is not None,
     )  # fmt: skip
 
@@ -80,7 +80,7 @@ def start(request: Request) -> Response:
     """Start the job that makes the preview, or that issues the report."""
     bench, test_id, place_of = _requested(request)
     step, form = request.path_params["step"], request.state.form
-    template = templates_of(bench.home).get(form.get("template", ""))
+    template = templates_of(bench.home, "report").get(form.get("template", ""))
     if step not in STEPS or template is None:
         raise HTTPException(404)
     if step == "preview":
