@@ -25,7 +25,7 @@ from toolkit.lab.desk.versions import Origin, StaleError
 from toolkit.lab.records.decisions import Order
 from toolkit.trust.requested import Requested
 from toolkit.workbench.bench import Bench, waiting
-from toolkit.workbench.page import fragment, is_part, page
+from toolkit.workbench.page import Instead, fragment, is_part, page
 from toolkit.workbench.record_page import PARTS
 from toolkit.workbench.stale import new_page, stale
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
-    from toolkit.workbench.page import Page, Routes
+    from toolkit.workbench.page import Routes
 
 
 def sessions(request: Request) -> Response:
@@ -285,34 +285,18 @@ def _requested(request: Request) -> tuple[Bench, str]:
         ended = drafts.ended_draft(bench.home, draft_id)
         if ended is None:
             raise HTTPException(404)
-        raise Ended(draft_id, ended)
+        raise Instead(_told_the_end(request, draft_id, ended))
     return bench, draft_id
 
 
-class Ended(Exception):  # noqa: N818  no error: where a draft is now
-    """A draft that somebody entered or removed while its page was open elsewhere."""
-
-    def __init__(self, draft_id: str, ended: drafts.Ended) -> None:
-        super().__init__(draft_id)
-        self.draft_id, self.ended = draft_id, ended
-
-
-def _telling_the_end(handler: Page) -> Page:
-    """Return a page that says what became of a draft that is no longer there, and keeps what was typed."""
-
-    def answer(request: Request) -> Response:
-        try:
-            return handler(request)
-        except Ended as gone:
-            form = getattr(request.state, "form", {})
-            typed = {key: form[key] for key in ("session", *drafts.GRIDS) if form.get(key)}
-            name = "part_ended" if is_part(request) else "ended"
-            return page(
-                request, name, status=410, draft_id=gone.draft_id, ended=gone.ended,
-                typed={} if is_part(request) else typed,
-            )  # fmt: skip
-
-    return answer
+def _told_the_end(request: Request, draft_id: str, ended: drafts.Ended) -> Response:
+    """Return what became of a draft that is no longer there, with what was typed and not kept."""
+    form = getattr(request.state, "form", {})
+    typed = {key: form[key] for key in ("session", *drafts.GRIDS) if form.get(key)}
+    return page(
+        request, "part_ended" if is_part(request) else "ended", status=410, draft_id=draft_id, ended=ended,
+        typed={} if is_part(request) else typed,
+    )  # fmt: skip
 
 
 def _to(bench: Bench, place: str) -> Response:
@@ -336,15 +320,10 @@ def _unstated(where: str, got: str, expected: str) -> ConfigError:
 ROUTES: Routes = (
     ("GET", "/session", sessions),
     ("POST", "/session", begin),
-    *(
-        (method, path, _telling_the_end(handler))
-        for method, path, handler in (
-            ("GET", "/session/{draft}", session),
-            ("POST", "/session/{draft}/save", save),
-            ("POST", "/session/{draft}/rehearse", rehearse),
-            ("POST", "/session/{draft}/files", add_files),
-            ("POST", "/session/{draft}/enter", enter),
-            ("POST", "/session/{draft}/discard", discard),
-        )
-    ),
+    ("GET", "/session/{draft}", session),
+    ("POST", "/session/{draft}/save", save),
+    ("POST", "/session/{draft}/rehearse", rehearse),
+    ("POST", "/session/{draft}/files", add_files),
+    ("POST", "/session/{draft}/enter", enter),
+    ("POST", "/session/{draft}/discard", discard),
 )
