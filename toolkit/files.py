@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import hashlib
 import json
 import math
@@ -17,6 +16,7 @@ from typing import Any, TypeGuard
 from toolkit.errors import ConfigError, OutputError
 from toolkit.inputs import SETTINGS_FILE, open_regular, read_input
 from toolkit.printable import check_entries
+from toolkit.spelling import nearest
 from toolkit.system import sync_file, sync_folder
 
 _AT_ONCE = 2**20
@@ -270,17 +270,12 @@ def check_keys(table: Mapping[str, Any], known: Iterable[str], *, where: object)
     names = sorted(known)
     for key in table:
         if key not in names:
-            # Without regard to case: "dot" is DOT.
-            lowered = {name.lower(): name for name in names}
-            near = [
-                lowered[match]
-                for match in difflib.get_close_matches(key.lower(), list(lowered), n=1, cutoff=0.5)
-            ]
+            near = nearest(key, names)
             raise ConfigError(
                 f"unknown key {key!r}",
                 where=where,
                 got=key,
                 expected=near[0] if near else ", ".join(names),
-                next_step=f"did you mean {near[0]!r}?" if near else "remove it or use one of those expected",
+                next_step=f"did you mean {near!r}?" if near else "remove it or use one of those expected",
                 rule="unknown-key",
             )

@@ -106,7 +106,7 @@ def test_conditions():
         ("relaxation.D51=0.5m", "whole machine"),
         ("channel_swap.D51", "two signals"),
         ("wrong_calibration.FY=m15-r1", "whole machine"),
-        ("zero_offset.D53=1", "did you mean 'D52'?"),
+        ("zero_offset.D53=1", "D52"),
         ("zero_offset.D51.D52=1", "one signal"),
         ("zero_offset.D51=1N", "another dimension"),
         ("zero_offset.SA=1deg", "SA"),

@@ -67,7 +67,7 @@ def looked_at(page: Page, name: str) -> None:
 def typed_session(page: Page, source: Path) -> None:
     """Type a session as a person does: its columns, then its rows from a spreadsheet with decimal commas."""
     page.get_by_role("link", name="Sessions", exact=True).click()
-    new = page.locator("form", has_text="Of a new instrument")
+    new = page.locator("form", has_text="For a new instrument")
     new.get_by_label("Instrument").fill("cell")
     new.get_by_label("Date").fill("2025-03-01")
     new.get_by_label("Operator").fill("Carl Example")

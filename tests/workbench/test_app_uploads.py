@@ -12,6 +12,7 @@ from tests.lab.desk.test_uploads import CASE, ORG, contents
 from tests.workbench.conftest import Answer, Served, serving
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.desk.previews import template_findings
+from toolkit.lab.desk.versions import version_of
 from toolkit.trust.people import Person
 from toolkit.workbench.app import application
 from toolkit.workbench.guard import Keys
@@ -41,8 +42,24 @@ def test_a_template_is_kept_and_its_page_says_what_template_check_says(bench: Se
     assert contents(bench.home) == {"report_templates/own.docx": ORG}
 
 
+def test_a_template_that_was_replaced_meanwhile_is_not_replaced_unseen(bench: Served) -> None:
+    sent(bench, "/templates", [("own.docx", ORG)])
+    (bench.home / "report_templates" / "own.toml").write_text("")
+    old = version_of(bench.home / "report_templates")
+    assert f'name="version" value="{old}"' in bench.page("/templates").body
+    (bench.home / "report_templates" / "own.toml").write_text("# another\n")
+    refused = sent(bench, "/templates", [("own.docx", ORG)], replace="yes", version=old)
+    assert (refused.status, "SHA-256" in refused.body) == (409, False), "the two are the same"
+    style = sent(bench, "/templates", [("own.docx", ORG), ("own.toml", b"")], replace="yes", version=old)
+    assert (style.status, "SHA-256" in style.body) == (409, True)
+    assert (bench.home / "report_templates" / "own.toml").read_text() == "# another\n"
+    now = version_of(bench.home / "report_templates")
+    assert sent(bench, "/templates", [("own.docx", ORG)], replace="yes", version=now).status == 303
+    assert sent(bench, "/templates", [("new.docx", ORG)]).status == 303, "it replaces nothing"
+
+
 def test_what_is_no_template_is_refused_on_the_page(bench: Served) -> None:
-    answer = sent(bench, "/templates", [("own.docx", b"no zip")], replace="yes")
+    answer = sent(bench, "/templates", [("own.docx", b"no zip")])
     assert (answer.status, "own.docx" in answer.body, 'type="file"' in answer.body) == (400, True, True)
     assert contents(bench.home) == {}
 

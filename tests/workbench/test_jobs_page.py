@@ -47,7 +47,8 @@ def test_an_archive_is_audited_seen_and_repaired_with_consent(home: Path) -> Non
     with serving(home) as bench:
         assert f'value="{ARCHIVE}"' in bench.page("/jobs").body
         page = done(bench, bench.send("/jobs/audit", {"archive": ARCHIVE}))
-        assert 'data-state="findings"' in page.body
+        assert 'class="bad" data-state="findings"' in page.body, "the file is wrong: nothing of it is good"
+        assert 'class="bad" data-state="findings"' in bench.page("/jobs").body
         audit = re.search(r"/audit/([0-9a-f]{16})", page.body)
         assert audit is not None
         answer = bench.page(f"/audit/{audit[1]}/part/answer")

@@ -15,6 +15,7 @@ from tests.workbench.conftest import ROOT, Served, plain, serving
 from tests.workbench.test_home_page import command
 from tests.workbench.test_jobs_page import done
 from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.previews import templates_of
 from toolkit.lab.laboratory import example
 
 TEST = holding_id("tests/few")
@@ -117,6 +118,22 @@ def test_templates_say_what_template_check_says(home: Path, capsys: pytest.Captu
         broken = holding_id("report_templates/broken.docx")
         refused = bench.page(f"/template/{broken}/check", HX_Request="true")
         assert (refused.status, "broken.docx" in refused.body) == (400, True)
+
+
+def test_a_test_is_offered_the_templates_of_reports_alone(home: Path) -> None:
+    for name in ("certificate.docx", "plan.docx", "audit.docx", "pruefbericht.docx"):
+        shutil.copy(ROOT / "report_templates" / name, home / "report_templates")
+    (home / "report_templates" / "broken.docx").write_bytes(b"no zip")
+    assert list(templates_of(home, "report").values()) == ["org.docx", "pruefbericht.docx"]
+    assert list(templates_of(home, "plan").values()) == ["plan.docx"]
+    with serving(home) as bench:
+        body = bench.page(f"/test/{TEST}/report").body
+        assert re.findall(r"<option[^>]*>([^<]*)</option>", body) == ["org.docx", "pruefbericht.docx"]
+        other = {"template": holding_id("report_templates/certificate.docx")}
+        assert bench.send(f"/test/{TEST}/report/preview", other).status == 404
+        body = bench.page("/plans/list").body
+        assert "plan.docx" in body
+        assert "certificate.docx" not in body
 
 
 def test_only_templates_and_tests_of_the_home_make_reports(home: Path) -> None:

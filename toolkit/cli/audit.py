@@ -58,6 +58,7 @@ def command(
 
     from toolkit.lab.archives.audit import AuditOrder, audit
     from toolkit.lab.archives.audit_answer import payload_of, text_of
+    from toolkit.lab.progress_note import note_level
 
     if workers is not None and scheduler is not None:
         raise typer.BadParameter("either workers here or those of a cluster", param_hint="--scheduler")
@@ -77,4 +78,5 @@ def command(
     elif not output.quiet:
         width = shutil.get_terminal_size().columns
         say("\n".join([text_of(result, width=width), *(str(path) for path in written)]))
+    note_level(finding.level for finding in result.made.findings)
     return 0 if result.made.clean else 1

@@ -130,7 +130,9 @@ def _json(value: Any) -> str:
 def exit_code(findings: Sequence[Finding]) -> int:
     """Return 1 where a finding asks for a person's attention, else 0."""
     from toolkit.lab.answers import needs_attention
+    from toolkit.lab.progress_note import note_level
 
+    note_level(finding.level for finding in findings)
     return int(needs_attention(findings))
 
 

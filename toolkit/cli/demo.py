@@ -16,7 +16,7 @@ import typer
 from toolkit.cli.command import answers
 from toolkit.cli.options import INTO_FOLDER, Output
 from toolkit.estimate import plus_minus, round_uncertainty
-from toolkit.lab.answers import Timing
+from toolkit.lab.answers import Timing, counted
 
 if TYPE_CHECKING:
     from toolkit.lab.tire_tests.resolve import Resolved
@@ -95,7 +95,7 @@ def command(
         outcome = _tire_file(resolved, stage / "tire.tir")
         figures = _figures(resolved, stage)
         certificates = sorted(path.name for path in (stage / "certificate").iterdir())
-        say(f"      {outcome}\n      {len(figures)} figures\n")
+        say(f"      {outcome}\n      {counted(len(figures), 'figure')}\n")
         report = steps_run[-1]
         (stage / _MARK).write_text(
             json.dumps({"generator": "toolkit", "content": "demo", "steps": steps_run}, indent=2)

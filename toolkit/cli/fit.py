@@ -65,7 +65,7 @@ def command(
 
     Example: toolkit fit tire.csv --model magic_formula --model mf61 --model brush --figures figures
     """
-    from toolkit.lab.answers import refuse_unwritable
+    from toolkit.lab.answers import counted, refuse_unwritable
     from toolkit.lab.tire_tests.convert import check_fmu, write_fit_fmu
     from toolkit.lab.tire_tests.fit_answer import fit_payload, fit_text
     from toolkit.lab.tire_tests.fit_models import (
@@ -122,6 +122,6 @@ def command(
     if fmu is not None:
         text += f"\n\n{fmu} written: {modelled}, FMI {fmi}"
     if written:
-        text += f"\n\n{len(written)} figures in {figures}"
+        text += f"\n\n{counted(len(written), 'figure')} in {figures}"
     output.answer(payload, text)
     return exit_code(findings)

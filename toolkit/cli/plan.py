@@ -45,7 +45,7 @@ def session(
     ] = None,
     demands: Annotated[
         list[str] | None,
-        'U asked for at the largest load, "FY=20 N", or at another, "FY=20 N at 4 kN"; once a load.',
+        'U asked for at the largest load, "FY=20 N", or at another, "FY=20 N at 4 kN"; once for each load.',
         Mark(names=("--u",), metavar="LOAD=U"),
     ] = None,
     minutes: Annotated[float | None, "Time at most, check loads included."] = None,

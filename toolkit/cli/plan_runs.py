@@ -44,7 +44,9 @@ def protocol(
         float, "Energy that may slide away: wear of the tread.", Mark(metavar="KJ")
     ] = math.inf,
     rise: Annotated[
-        float, "Warmth of the tread over the room; pauses keep it.", Mark(metavar="K")
+        float,
+        "Largest temperature rise of the tread above the room; pauses keep it below.",
+        Mark(metavar="K"),
     ] = math.inf,
     out: Annotated[
         Path | None, "Folder for protocol.toml and the plan.toml of `toolkit simulate`.", INTO_FOLDER

@@ -38,6 +38,7 @@ from toolkit.machine import TypeB
 from toolkit.recording.csvfile import Line, pointed, read_lines
 from toolkit.reduction.model import Condition
 from toolkit.reduction.selection import of_one_condition
+from toolkit.spelling import nearest
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
 from toolkit.tires.plausibility import demand_possible
@@ -171,10 +172,10 @@ def _column(cell: str, path: Path) -> tuple[str, float]:
     name, stated_unit = split_header(cell, _is_name)
     bare = name.removeprefix("U_")
     if not _is_name(name):
-        near = difflib.get_close_matches(bare, ["FZ", *_NAMES], n=1, cutoff=0.5)
+        near = nearest(bare, ["FZ", *_NAMES])
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
-            f"{near[0]} [unit]" if near else ", ".join(["FZ", *_NAMES]),
+            f"{near} [unit]" if near else ", ".join(["FZ", *_NAMES]),
         )  # fmt: skip
     if stated_unit is None:
         _refuse(

@@ -84,7 +84,7 @@ reads back equal.
 
 from toolkit.declared.declaration import table_of
 from toolkit.declared.describe import json_schema, reference, starter
-from toolkit.declared.faults import Fault, Source, nearest, refuse
+from toolkit.declared.faults import Fault, Source, refuse
 from toolkit.declared.marks import (
     Above,
     AtLeast,
@@ -104,6 +104,7 @@ from toolkit.declared.marks import (
     UnitName,
 )
 from toolkit.declared.text import answer, attempt, build, json_value, plain, read, read_text, toml_text
+from toolkit.spelling import nearest
 
 __all__ = [
     "Above",

@@ -7,18 +7,16 @@ only text that tomllib has read: the scan follows the grammar of TOML 1.0 and ch
 from __future__ import annotations
 
 import datetime as dt
-import difflib
 import json
 import re
 import tomllib
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from toolkit.declared.marks import Format, Path, Quantity
 from toolkit.errors import ConfigError
 
-LIKE = 0.5  # of `difflib`: what is less alike was not meant
 _LONGEST = 160
 _SPACE = re.compile(r"[ \t]*")
 _BLANK = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
@@ -121,23 +119,6 @@ def _inline(value: Any) -> str:
     if isinstance(value, int) and abs(value) >= 10**_LONGEST:
         return "a whole number of more digits than can be read"  # nor can Python print every one
     return value.isoformat() if isinstance(value, dt.date | dt.time) else str(value)
-
-
-def nearest(name: str, candidates: Sequence[str], present: Container[str] = ()) -> str | None:
-    """Return the known name that was meant, None where none is alike.
-
-    Case does not count: ``dot`` is DOT. Of two that are as near, that which is not there yet was meant.
-
-    >>> nearest("dat", ["date", "data"], present=["date"])
-    'data'
-    """
-
-    def likeness(candidate: str) -> tuple[float, bool, str]:
-        ratio = difflib.SequenceMatcher(None, name.lower(), candidate.lower()).ratio()
-        return ratio, candidate not in present, candidate
-
-    near = max(candidates, key=likeness, default=None)
-    return None if near is None or likeness(near)[0] < LIKE else near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

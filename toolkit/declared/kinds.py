@@ -14,9 +14,10 @@ from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
 from toolkit.days import parse_day
-from toolkit.declared.faults import Fault, display, nearest
+from toolkit.declared.faults import Fault, display
 from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Path, Text
 from toolkit.files import is_number, number_expected
+from toolkit.spelling import nearest
 
 
 class _Refused(enum.Enum):

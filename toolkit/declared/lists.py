@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from toolkit.declared.faults import display, nearest
+from toolkit.declared.faults import display
 from toolkit.declared.kinds import REFUSED, Kind, Place
 from toolkit.declared.marks import Distinct, Names, Quantity, Size
 from toolkit.declared.quantities import QuantityKind
 from toolkit.declared.tables import TableKind
+from toolkit.spelling import nearest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

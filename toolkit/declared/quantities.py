@@ -6,11 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from toolkit.declared.faults import display, nearest
+from toolkit.declared.faults import display
 from toolkit.declared.kinds import REFUSED, Kind, NumberKind, Place
 from toolkit.declared.marks import Quantity, Unit, UnitName
 from toolkit.errors import UnitError
 from toolkit.files import is_number
+from toolkit.spelling import nearest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from toolkit.declared.faults import nearest
 from toolkit.declared.kinds import REFUSED, ChoiceKind, Kind, Place
 from toolkit.declared.marks import Format, Quantity
 from toolkit.declared.quantities import QuantityKind
 from toolkit.files import is_number
+from toolkit.spelling import nearest
 
 MISSING: Any = object()
 

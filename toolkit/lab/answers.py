@@ -129,6 +129,15 @@ def findings_text(findings: Sequence[Finding]) -> str:
     return "findings (toolkit explain RULE tells more):\n" + "\n".join(finding_lines(findings))
 
 
+def counted(count: int, noun: str) -> str:
+    """Return how many of something there are.
+
+    >>> counted(1, "figure"), counted(2, "figure")
+    ('1 figure', '2 figures')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def one_line(text: object) -> str:
     r"""Return a text with every control character escaped: the name of a file may hold any of them.
 

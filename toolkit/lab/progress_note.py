@@ -5,17 +5,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from toolkit.errors import OutputError
 from toolkit.files import write_atomic
 from toolkit.inputs import RESULT_FILE, read_regular
 
 VARIABLE = "TOOLKIT_PROGRESS"
+LEVEL = "level"
+"""Name of the file beside the note that holds the gravest level of the command's findings."""
 _SECONDS = 0.5  # between two notes: a note is written to the disk
 
 
@@ -47,6 +52,15 @@ def note_of(title: str, total: int | None) -> ProgressNote | None:
     """Return the note of a stage; None where nobody asked for one."""
     path = os.environ.get(VARIABLE)
     return None if not path else ProgressNote(path=Path(path), title=title, total=total)
+
+
+def note_level(levels: Iterable[str]) -> None:
+    """Note the gravest level of a command's findings where somebody asked for notes."""
+    path = os.environ.get(VARIABLE)
+    gravest = next((level for level in ("error", "warning") if level in set(levels)), None)
+    if path and gravest is not None:
+        with contextlib.suppress(OSError, OutputError):
+            write_atomic(Path(path).with_name(LEVEL), gravest)
 
 
 def read_note(path: Path) -> dict[str, Any] | None:

@@ -125,6 +125,7 @@ def explained(name: str | None) -> tuple[dict[str, Any], str]:
     from toolkit.characteristics.catalogue import characteristics
     from toolkit.effects.catalogue import effects
     from toolkit.errors import ConfigError
+    from toolkit.spelling import LIKE
 
     rules, effects_by_name = rules_catalogue(), effects()
     declared = {characteristic.name: characteristic for characteristic in characteristics()}
@@ -151,7 +152,7 @@ def explained(name: str | None) -> tuple[dict[str, Any], str]:
             texts.append(_characteristic_text(declared[name]))
         return keys, "\n\n".join(texts)
     if name not in rules:
-        near = difflib.get_close_matches(name, [*rules, *effects_by_name, *declared], n=3, cutoff=0.4)
+        near = difflib.get_close_matches(name, [*rules, *effects_by_name, *declared], n=3, cutoff=LIKE)
         raise ConfigError(
             f"unknown rule {name!r}",
             got=name,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from dataclasses import dataclass
 
 from toolkit.characteristics.catalogue import by_name
 from toolkit.errors import ConfigError, UnitError
+from toolkit.spelling import nearest
 from toolkit.units import unit
 
 PEAK = "peak"
@@ -77,8 +77,8 @@ def parse_demand(text: str) -> Demand:
     name, written = match["name"], match["unit"]
     known = (PEAK, *by_name())
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else ""
+        near = nearest(name, known)
+        hint = f"did you mean {near!r}?" if near else ""
         raise _wrong(f"no characteristic is named {name!r}", text, ", ".join(known), hint)
     declared = by_name()["FY" if name == PEAK else name]
     angle = None if match["angle"] is None else math.radians(_number(match["angle"]))

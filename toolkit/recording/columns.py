@@ -6,7 +6,6 @@ brackets has that unit, which must be of the machine's dimension. Any other colu
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,6 +15,7 @@ from toolkit.channels import CHANNELS, channel_of
 from toolkit.errors import ColumnError, UnitError
 from toolkit.machine import Machine
 from toolkit.machine.definition import Column, Role
+from toolkit.spelling import nearest
 from toolkit.units import split_header, unit
 
 _EXTRA_ROLES: dict[str, Role] = {"t": "time", "TIRE_ANGLE": "angle", "DRUM_ANGLE": "angle"}
@@ -169,8 +169,8 @@ def _no_unit(header: str, name: str, column: Column | None, machine: Machine, wh
             rule="unknown-unit",
         )
     headers = [column.header for column in machine.columns]
-    near = difflib.get_close_matches(_plain(name), [_plain(header) for header in headers], n=1, cutoff=0.6)
-    match = next((header for header in headers if near and _plain(header) == near[0]), None)
+    near = nearest(_plain(name), [_plain(header) for header in headers])
+    match = next((header for header in headers if near and _plain(header) == near), None)
     raise ColumnError(
         f"column {header!r} is not known and has no unit",
         where=where,

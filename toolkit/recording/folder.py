@@ -5,7 +5,6 @@ Stated are the test, its tire and tare, and what its report says by ISO/IEC 1702
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,7 +26,6 @@ from toolkit.declared import (
     Text,
     Unit,
     build,
-    nearest,
     read_text,
     refuse,
 )
@@ -39,6 +37,7 @@ from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.publication import settle
 from toolkit.recording.marks import is_own_output
 from toolkit.recording.model import TestInfo
+from toolkit.spelling import nearest
 from toolkit.units import from_si, si_scale, unit
 
 # A series or a DOT code may be written as a number.
@@ -380,15 +379,15 @@ def _named_file(
     by_name = [path for path in files if path.name == name]
     if len(by_name) == 1:
         return by_name[0]
-    near = difflib.get_close_matches(name, names, n=1)
+    near = nearest(name, names)
     _, line = source.place(key)
     raise ConfigError(
         f"{TEST_FILE} names a file that is {'not there' if not by_name else 'there more than once'}",
         where=f"{source.where}, [{key[0]}]",
         line=None if line is None else source.excerpt(line),
         got=name,
-        expected=near[0] if near else ", ".join(list(names)[:12]) or "a recording of the folder",
-        next_step=f"did you mean {near[0]!r}?" if near else "correct the name, with its sub-folder",
+        expected=near if near else ", ".join(list(names)[:12]) or "a recording of the folder",
+        next_step=f"did you mean {near!r}?" if near else "correct the name, with its sub-folder",
         rule="no-file",
     )
 

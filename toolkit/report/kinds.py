@@ -10,7 +10,10 @@ from toolkit.report.content import ReportContent, Value
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN
 from toolkit.report.vocabulary import Entry, Vocabulary
-from toolkit.report.word.check import LintFinding, check_template
+from toolkit.report.word.check import LintFinding, check_template, vocabulary_of
+from toolkit.report.word.package import open_package
+from toolkit.report.word.scan import scan
+from toolkit.report.word.xml import stories
 
 if TYPE_CHECKING:
     from toolkit.report.document import Document
@@ -90,6 +93,18 @@ class Vocabularies(Mapping[str, "Vocabulary"]):
 
 
 VOCABULARIES = Vocabularies()
+
+
+def kind_of(template: Template) -> str:
+    """Return the name of the kind of documents that a template was made for, as its tags tell.
+
+    Raises
+    ------
+    TemplateError
+        it is no Word file that can be read
+    """
+    vocabulary = vocabulary_of(scan(stories(open_package(template))), VOCABULARIES)
+    return next(name for name, known in VOCABULARIES.items() if known is vocabulary)
 
 
 def check(template: Template, style: Style, *, fonts: bool = True) -> tuple[LintFinding, ...]:

@@ -15,7 +15,6 @@ value where it cannot be off.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Sequence
@@ -33,6 +32,7 @@ from toolkit.simulation.places import (
     sources_of,
     unit_of,
 )
+from toolkit.spelling import nearest
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -114,10 +114,10 @@ def _signals(
         return source, (channel,)
     if not channels and parts:
         expected = f"the effect's name alone{', or .' + ', .'.join(effect.names) if effect.names else ''}"
-        near = difflib.get_close_matches(parts[0], effect.names, n=1, cutoff=0.5)
+        near = nearest(parts[0], effect.names)
         raise _wrong(
             f"effect {effect.name!r} acts on the whole machine", where, parts[0], expected,
-            f"did you mean {near[0]!r}?" if near else "correct the part after the dot",
+            f"did you mean {near!r}?" if near else "correct the part after the dot",
         )  # fmt: skip
     if len(parts) > 1:
         raise _wrong(
@@ -131,10 +131,10 @@ def _one_of(part: str, choices: Sequence[str], effect: Effect, where: str) -> st
     if part in choices:
         return part
     names = [*choices, *effect.names]
-    near = difflib.get_close_matches(part, names, n=1, cutoff=0.5)
+    near = nearest(part, names)
     raise _wrong(
         f"effect {effect.name!r} knows no part {part!r}", where, part, ", ".join(names),
-        f"did you mean {near[0]!r}?" if near else "correct the part after the dot",
+        f"did you mean {near!r}?" if near else "correct the part after the dot",
     )  # fmt: skip
 
 
@@ -176,10 +176,10 @@ def _values(
         name, colon, text = item.rpartition(":")
         name = name.strip() if colon else (parameter or effect.parameters[0].name)
         if name not in declared:
-            near = difflib.get_close_matches(name, list(declared), n=1, cutoff=0.5)
+            near = nearest(name, list(declared))
             raise _wrong(
                 f"effect {effect.name!r} has no parameter {name!r}", where, name, ", ".join(declared),
-                f"did you mean {near[0]!r}?" if near else "use one of those expected",
+                f"did you mean {near!r}?" if near else "use one of those expected",
             )  # fmt: skip
         if name in values:
             raise _wrong(

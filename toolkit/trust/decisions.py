@@ -102,7 +102,7 @@ def violations(line: SignedLine, history: History) -> list[str]:
         try:
             publics.append(signer_of(row, line.message, version))
         except BadSignatureError as error:
-            reasons.append(f"a signature proves nothing: {error}")
+            reasons.append(f"a signature is not valid: {error}")
     return reasons or objections(
         version, action, time, publics, stated=stated(body, action), operators=line.operators
     )

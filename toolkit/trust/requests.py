@@ -102,7 +102,7 @@ class Request:
             return tuple(signer_of(row, self.message.encode(), version) for row in self.signatures)
         except BadSignatureError as error:
             raise bad_request(
-                "a signature proves nothing", self.path, error, "a signature of this request",
+                "a signature is not valid", self.path, error, "a signature of this request",
                 "let its owner sign the request again: toolkit sign REQUEST; nothing was changed",
             ) from error  # fmt: skip
 

@@ -265,7 +265,7 @@ def check_raw(key: PublicKey, signature: bytes, data: bytes) -> None:
         else:
             raise BadSignatureError(f"its algorithm {algorithm!r} is refused for a key of kind {key.kind}")
     except (InvalidSignature, ValueError) as error:
-        raise BadSignatureError("it is no signature of this content by this key") from error
+        raise BadSignatureError("the key did not sign this content") from error
 
 
 def _armour(blob: bytes) -> str:

@@ -17,7 +17,7 @@ from starlette.routing import Mount, Route
 from toolkit.errors import ToolkitError
 from toolkit.report.pages.kit import KIT
 from toolkit.workbench.bench import Bench
-from toolkit.workbench.page import is_part, page, refusal
+from toolkit.workbench.page import Instead, is_part, page, refusal
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -88,6 +88,8 @@ def _answering(handler: Page) -> Page:
             return handler(request)
         except ToolkitError as error:
             return refusal(request, error)
+        except Instead as other:
+            return other.answer
         except HTTPException:
             raise
         except Exception:  # noqa: BLE001  the last line of defence: a bug, told as one, and the server goes on

@@ -13,13 +13,14 @@ from starlette.exceptions import HTTPException
 from toolkit.calibration.registry.clock import today
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk.pending import agent_people, pending_request
+from toolkit.lab.desk.versions import Versions
 
 if TYPE_CHECKING:
     from starlette.requests import Request
 
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.desk.audited import Audited
-    from toolkit.lab.desk.holdings import Holdings, Kind
+    from toolkit.lab.desk.holdings import Holdings, Kind, Reported
     from toolkit.trust.people import Person
     from toolkit.workbench.guard import Keys
 
@@ -38,12 +39,13 @@ class Bench:
 
     def __init__(self, home: Path, registry: Registry, keys: Keys, *, person: Person | None = None) -> None:
         self.home, self.registry, self.keys, self.person = home, registry, keys, person
+        self.versions = Versions()
         self._answers: dict[tuple[object, ...], object] = {}
         self._asked: dict[tuple[str, str | None], threading.Lock] = {}
         self._holdings: Holdings | None = None
         self._audited: dict[Path, tuple[object, Audited]] = {}
         self._reading = threading.Lock()
-        self._reported: tuple[Holdings, frozenset[str]] | None = None
+        self._reported: tuple[Holdings, Reported] | None = None
 
     @property
     def is_own(self) -> bool:
@@ -68,8 +70,8 @@ class Bench:
         path = self.holdings().path(kind, holding_id)
         return path or self.holdings(again=True).path(kind, holding_id)
 
-    def reported(self) -> frozenset[str]:
-        """Return the hashes that the reports of the home rest on, read once for each look through it."""
+    def reported(self) -> Reported:
+        """Return what the reports of the home rest on, read once for each look through it."""
         from toolkit.lab.desk.holdings import reported_inputs
 
         holdings = self.holdings()

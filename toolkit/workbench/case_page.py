@@ -12,12 +12,16 @@ from urllib.parse import quote
 from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
+from toolkit.diagnosis.case.reader import CaseFile
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk import built_case
-from toolkit.lab.desk.holdings import holding_id
+from toolkit.lab.desk.holdings import CASE, holding_id
+from toolkit.lab.desk.statements import with_statement
+from toolkit.lab.desk.versions import Origin, StaleError, version_of
 from toolkit.workbench.bench import holding
 from toolkit.workbench.diagnosis_page import diagnoses_page
-from toolkit.workbench.page import page
+from toolkit.workbench.page import is_part, page
+from toolkit.workbench.stale import new_page, stale
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,17 +62,31 @@ def _case(request: Request, *, status: int = 200, refused: ToolkitError | None =
     bench, case_id, folder = _requested(request)
     return page(
         request, "case", status=status, case_id=case_id, built=built_case.open_case(folder),
-        place_of=bench.holdings().places["case"][case_id],
+        place_of=bench.holdings().places["case"][case_id], version=version_of(folder), page_id=new_page(),
         refused=None if refused is None else refused.as_dict(),
     )  # fmt: skip
 
 
 def state(request: Request) -> Response:
-    """Keep a statement as its field has it, and say nothing but that it is kept."""
-    _, _, folder = _requested(request)
+    """Keep a statement as its field has it; say nothing but that it is kept, and as which version."""
+    bench, case_id, folder = _requested(request)
     form = request.state.form
-    is_other = built_case.state_entry(folder, form.get("key", ""), form.get("value", ""))
-    return Response("", headers={"hx-refresh": "true"} if is_other else {"hx-trigger": "stated"})
+    key, typed = form.get("key", ""), form.get("value", "")
+    try:
+        with bench.versions.changing(folder, Origin.of(form)):
+            is_other = built_case.state_entry(folder, key, typed)
+    except StaleError as error:
+        kept = built_case.open_case(folder).text
+        return stale(
+            request, error, kept={CASE: kept}, typed={CASE: with_statement(kept, CaseFile, key, typed)},
+            look=f"case/{case_id}", again=f"case/{case_id}/state",
+            hidden={"key": key, "value": typed, "version": version_of(folder)},
+        )  # fmt: skip
+    if not is_part(request):
+        return _to(bench, case_id)
+    answer = page(request, "part_version", version=version_of(folder))
+    answer.headers["hx-refresh" if is_other else "hx-trigger"] = "true" if is_other else "stated"
+    return answer
 
 
 def change(request: Request) -> Response:
@@ -76,19 +94,27 @@ def change(request: Request) -> Response:
     bench, case_id, folder = _requested(request)
     form = request.state.form
     try:
-        match request.path_params["step"]:
-            case "add":
-                built_case.add_entry(folder, form.get("table", ""), form.get("name", ""))
-            case "drop":
-                built_case.drop_entry(folder, form.get("table", ""))
-            case "files":
-                uploads = request.state.files.get("files", ())
-                built_case.add_files(folder, [(upload.name, upload.data) for upload in uploads])
-            case _:
-                raise HTTPException(404)
+        with bench.versions.changing(folder, Origin.of(form)):
+            _change(request, folder)
+    except StaleError as error:
+        return stale(request, error, look=f"case/{case_id}")
     except ToolkitError as error:
         return _case(request, status=400, refused=error)
     return _to(bench, case_id, form.get("table", ""))
+
+
+def _change(request: Request, folder: Path) -> None:
+    form = request.state.form
+    match request.path_params["step"]:
+        case "add":
+            built_case.add_entry(folder, form.get("table", ""), form.get("name", ""))
+        case "drop":
+            built_case.drop_entry(folder, form.get("table", ""))
+        case "files":
+            uploads = request.state.files.get("files", ())
+            built_case.add_files(folder, [(upload.name, upload.data) for upload in uploads])
+        case _:
+            raise HTTPException(404)
 
 
 def trial(request: Request) -> Response:

@@ -38,6 +38,14 @@ if TYPE_CHECKING:
     """Method, path and handler of each address of a page."""
 
 
+class Instead(Exception):  # noqa: N818  no error: another answer than the page that was asked for
+    """What is answered in the place of a page that is no longer there."""
+
+    def __init__(self, answer: Response) -> None:
+        super().__init__("another answer")
+        self.answer = answer
+
+
 MESSAGES = Path(__file__).with_name("messages")
 TERMS = (
     "candidate", "approved", "withdrawn", "discarded", "entered", "enter", "approve", "withdraw", "discard",

@@ -44,7 +44,7 @@ def plan_list(request: Request) -> Response:
     return page(
         request, "part_plans", plans=holdings.places["plan"], instruments=bench.registry.instruments(),
         tests=holdings.places["test"], answers=holdings.places["diagnosis"],
-        templates=templates_of(bench.home), fixtures=fixtures_of(bench.home),
+        templates=templates_of(bench.home, "plan"), fixtures=fixtures_of(bench.home),
     )  # fmt: skip
 
 
@@ -81,7 +81,7 @@ def start(request: Request) -> Response:
         raise HTTPException(404)
     form = request.state.form
     subject = _subject(bench, kind, form)
-    template = templates_of(bench.home).get(form.get("template", ""))
+    template = templates_of(bench.home, "plan").get(form.get("template", ""))
     fixtures = fixtures_of(bench.home).get(form.get("fixtures", ""))
     words = plan_words(bench.home, kind, form, subject, template, fixtures)
     job = start_job(bench.home, kind="plan", title=" ".join(filter(None, (kind, subject))), words=words)

@@ -9,6 +9,8 @@ from starlette.exceptions import HTTPException
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.errors import ConfigError, ToolkitError
+from toolkit.files import sha256_bytes
+from toolkit.inputs import TEMPLATE_FILE, read_input
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.desk.jobs import start_job
 from toolkit.lab.desk.previews import (
@@ -22,9 +24,11 @@ from toolkit.lab.desk.previews import (
     templates_of,
 )
 from toolkit.lab.desk.uploads import hand_in_template
+from toolkit.lab.desk.versions import Origin, StaleError, version_of
 from toolkit.lab.home import TEMPLATES
 from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page
+from toolkit.workbench.stale import new_page, stale
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,7 +46,7 @@ def report(request: Request) -> Response:
     """Return the page: the templates to choose from, and a place for the preview."""
     bench, test_id, place_of = _requested(request)
     return page(
-        request, "report", test_id=test_id, place_of=place_of, choices=templates_of(bench.home),
+        request, "report", test_id=test_id, place_of=place_of, choices=templates_of(bench.home, "report"),
         people=bench.registry.people().history.now is not None,
     )  # fmt: skip
 
@@ -76,7 +80,7 @@ def start(request: Request) -> Response:
     """Start the job that makes the preview, or that issues the report."""
     bench, test_id, place_of = _requested(request)
     step, form = request.path_params["step"], request.state.form
-    template = templates_of(bench.home).get(form.get("template", ""))
+    template = templates_of(bench.home, "report").get(form.get("template", ""))
     if step not in STEPS or template is None:
         raise HTTPException(404)
     if step == "preview":
@@ -103,7 +107,8 @@ def templates(request: Request) -> Response:
 def _templates(request: Request, *, status: int = 200, refused: ToolkitError | None = None) -> Response:
     bench: Bench = request.app.state.bench
     return page(
-        request, "templates", status=status, choices=templates_of(bench.home),
+        request, "templates", status=status, choices=templates_of(bench.home), page_id=new_page(),
+        version=version_of(bench.home / TEMPLATES),
         refused=None if refused is None else refused.as_dict(),
     )  # fmt: skip
 
@@ -112,11 +117,27 @@ def take(request: Request) -> Response:
     """Take a template from the browser; what `template check` says of it stands on its page."""
     bench: Bench = request.app.state.bench
     uploads = [(upload.name, upload.data) for upload in request.state.files.get("files", ())]
+    folder, form = bench.home / TEMPLATES, request.state.form
+    is_replaced = form.get("replace") == "yes"
+    # What replaces nothing needs no version: another file of its name refuses it.
+    origin = Origin.of(form if is_replaced else {"version": version_of(folder)})
     try:
-        name = hand_in_template(bench.home, uploads, replace=request.state.form.get("replace") == "yes")
+        with bench.versions.changing(folder, origin):
+            name = hand_in_template(bench.home, uploads, replace=is_replaced)
+    except StaleError as error:
+        typed = {name: data for name, data in uploads if (folder / name).is_file()}
+        kept = {name: read_input(folder / name, TEMPLATE_FILE) for name in typed}
+        return stale(
+            request, error, look="templates", kept={name: _described(data) for name, data in kept.items()},
+            typed={name: _described(data) for name, data in typed.items()},
+        )  # fmt: skip
     except ToolkitError as error:
         return _templates(request, status=400, refused=error)
     return RedirectResponse(f"{bench.keys.place}/templates#{holding_id(f'{TEMPLATES}/{name}')}", 303)
+
+
+def _described(data: bytes) -> str:
+    return f"SHA-256 {sha256_bytes(data)}\n{len(data)} bytes"
 
 
 def check(request: Request) -> Response:

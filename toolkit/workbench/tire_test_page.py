@@ -12,7 +12,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from toolkit.lab.desk.chart import common_ranges
-from toolkit.lab.desk.holdings import rows_of_tests
+from toolkit.lab.desk.holdings import Reported, rows_of_tests
 from toolkit.lab.desk.seen_test import recordings_answer, results_answer, shown_conditions
 from toolkit.workbench.bench import holding
 from toolkit.workbench.page import page
@@ -144,7 +144,7 @@ def _side(request: Request, side: str) -> tuple[Bench, dict[str, Any], Path, str
     folder = bench.path_of("test", test_id)
     if folder is None:
         raise HTTPException(404)
-    (row,) = rows_of_tests(bench.holdings(), (test_id,), frozenset())
+    (row,) = rows_of_tests(bench.holdings(), (test_id,), Reported())
     record = _record(request, _records(bench, row["machine"]), f"{side}_record")
     return bench, row, folder, record
 

@@ -192,7 +192,7 @@ BAD_SETTINGS = [
     ({"cells": "{ D51 = { resolution = -1e-6 } }"}, ConfigError, "above zero"),
     ({"cells": "{ D51 = { u = 0 } }"}, ConfigError, "above zero"),
     ({"cells": '{ D51 = { excitation = { value = 10, unit = "mm" } } }'}, ConfigError, "voltage"),
-    ({"cells": '{ D59 = { serial = "1" } }'}, ConfigError, "did you mean 'D52'"),
+    ({"cells": '{ D59 = { serial = "1" } }'}, ConfigError, "D59"),
 ]  # fmt: skip
 
 

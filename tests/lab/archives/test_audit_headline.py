@@ -63,13 +63,13 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
         (
             [file("exact"), file("unknown", repair={"FY_max_abs_N": None, "MZ_max_abs_Nm": None})],
             "The file carries the values of the record in force; "
-            "1 file more holds no Fy and no Mz of its own",
+            "1 more file holds no Fy and no Mz of its own",
         ),
         ([file("unknown")], "1 file cannot be judged: no record in force is known or fits"),
         (
             [file("stale", None), file("unknown")],
             "1 file carries a wrong Fy, up to 10.0 N; cause: computed by m15-r1, which was not in force; "
-            "since when is unknown: no test date; 1 file more cannot be judged: "
+            "since when is unknown: no test date; 1 more file cannot be judged: "
             "no record in force is known or fits",
         ),
         (

@@ -91,7 +91,7 @@ def machine_polarity(
                 size_text = (
                     "no sign of it shows" if abs(sensitivity.value) <= limit else f"it is {sensitivity}"
                 )
-                message = f"the response has not the machine's sign: {size_text}, {statement}"
+                message = f"the response does not have the machine's sign: {size_text}, {statement}"
                 failed.append(GateResult(rule="polarity", where=where, message=message))
             else:
                 pairs.add((fit.load, cell.name))

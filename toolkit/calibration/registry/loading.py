@@ -59,7 +59,7 @@ def check_entered(record: CalibrationRecord, data: bytes, ledger: Ledger, path: 
         ``ledger``, ``hash``
     """
     if ledger.damage is not None:
-        raise _bad(path.stem, path, f"the ledger is damaged: {ledger.damage}", "an unbroken ledger", "ledger")
+        raise _bad(path.stem, path, ledger.damage, "a ledger without damage", "ledger")
     entered = ledger.entered().get(path.stem)
     if entered is None or record.id != path.stem or record.instrument != path.parent.name:
         raise _bad(path.stem, path, "no entry of this record in the ledger", "an 'entered' line", "ledger")

@@ -7,7 +7,6 @@ the session; where nothing else can be meant, another case is the same name.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import NamedTuple
 
 from toolkit.calibration.session.cells import Cells, is_empty
 from toolkit.errors import SessionError, ToolkitError
+from toolkit.spelling import nearest
 from toolkit.units import split_header, unit
 
 COMMENT = "comment"
@@ -177,8 +177,8 @@ def _check_names(names: list[str], header: Sequence[str], layout: Wanted, where:
         raise header_error(where, problem, present, ", ".join(layout.needed), "columns")
     for name in names:
         if name not in layout.names:
-            near = difflib.get_close_matches(name, layout.names, n=1, cutoff=0.4)
-            hint = f"did you mean {near[0]!r}? " if near else ""
+            near = nearest(name, layout.names)
+            hint = f"did you mean {near!r}? " if near else ""
             raise header_error(
                 where, f"unknown column {name!r}", name, ", ".join(layout.names), "columns",
                 hint + "name it in indications or loads of the session, or remove it; nothing was written",

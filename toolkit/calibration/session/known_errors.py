@@ -25,7 +25,6 @@ else its resolution over sqrt(12) (GUM F.2.2.1).
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -34,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.calibration.session.settings import wrong
+from toolkit.spelling import nearest
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -151,9 +151,9 @@ def _groups(reference: Reference, table: Table, where: object) -> tuple[NDArray[
         if by_name or entry in _LABELS:
             raise wrong(where, "reference.shared_group", entry, "a column of the data")
         columns = [*_LABELS, *table.names, *(name for name, _ in table.labels)]
-        near = difflib.get_close_matches(entry, columns, n=1, cutoff=0.6)
+        near = nearest(entry, columns)
         if near and undeclared_standard(reference, table) is not None:
-            expected = f"{near[0]!r}, or the name of the standard as [reference] standard has it"
+            expected = f"{near!r}, or the name of the standard as [reference] standard has it"
             raise wrong(where, "reference.shared_group", entry, expected)
         return np.zeros(table.rows, dtype=np.intp), error == "proportional"
     _, group = np.unique(labels, return_inverse=True)

@@ -116,7 +116,7 @@ class Reading:
 class ZeroTable:
     """The zero of the fit, and readings of it."""
 
-    fit: Annotated[Literal["included", "tared", "run"], Entry("what becomes of it")] = "included"
+    fit: Annotated[Literal["included", "tared", "run"], Entry("how the zero enters the fit")] = "included"
     readings: Annotated[tuple[Reading, ...], Entry("of the unloaded cells")] = ()
 
 
@@ -364,7 +364,7 @@ class SessionFile:
     cells: Annotated[tuple[tuple[str, CellEntries], ...], Keyed(), _INDICATIONS, Entry("by indication")] = ()
     zero: Annotated[
         Literal["included", "tared", "run"] | tuple[Reading, ...] | ZeroTable,
-        Entry("what becomes of the zero; or readings of it", example="included"),
+        Entry("how the zero enters the fit, or readings of it", example="included"),
     ] = "included"
     creep: Annotated[tuple[Creep, ...], Entry("readings under a constant load")] = ()
     polarity: Annotated[tuple[Polarity, ...], Entry("readings that tell a sign")] = ()

@@ -7,7 +7,6 @@ commas, semicolons or tabs part the cells, and columns that nobody names may hol
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 from collections.abc import Collection, Iterable, Mapping
@@ -25,6 +24,7 @@ from toolkit.recording.columns import rig
 from toolkit.recording.csvfile import SEPARATORS, decimal_sign, decode, first_line, separator_of
 from toolkit.recording.read import read_recording
 from toolkit.recording.sniff import sniff
+from toolkit.spelling import nearest
 from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
@@ -279,8 +279,8 @@ def _converted(
 def missing_column(where: Path, name: str, names: Iterable[str]) -> ColumnError:
     """Return the error of a column that a file has not, with the nearest one that it has."""
     listed = list(names)
-    near = difflib.get_close_matches(name, listed, n=1, cutoff=0.5)
-    step = f"did you mean {near[0]!r}?" if near else "correct the case or the file"
+    near = nearest(name, listed)
+    step = f"did you mean {near!r}?" if near else "correct the case or the file"
     return ColumnError(
         f"the recording has no column {name!r}", where=where, got=", ".join(listed) or "no columns",
         expected=f"a column {name!r} in the header row", next_step=step, rule="case-column",

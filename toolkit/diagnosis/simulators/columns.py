@@ -8,7 +8,6 @@ Where the columns have too few slip angles for that, nothing below the surface's
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -31,6 +30,7 @@ from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
 from toolkit.errors import ConfigError
+from toolkit.spelling import nearest
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -59,15 +59,13 @@ class ColumnsModel(AlongMotion):
             )
         extra = [name for name in column_of if name not in {output.name for output in case.outputs}]
         if extra:
-            near = difflib.get_close_matches(
-                extra[0], [output.name for output in case.outputs], n=1, cutoff=0.5
-            )
+            near = nearest(extra[0], [output.name for output in case.outputs])
             raise ConfigError(
                 "a simulated column stands for no output",
                 where=f"{case.path}: simulation.simulated",
                 got=", ".join(extra),
                 expected=", ".join(output.name for output in case.outputs),
-                next_step=f"did you mean {near[0]!r}?" if near else "declare the channel with role = output",
+                next_step=f"did you mean {near!r}?" if near else "declare the channel with role = output",
                 rule="case",
             )
         allowed = {f"{name}_{what}" for name in column_of for what in ("gain", "offset")}

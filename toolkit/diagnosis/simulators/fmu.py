@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.declared.faults import nearest
 from toolkit.diagnosis.simulators.python import PythonModel
 from toolkit.errors import ConfigError, FitError, UnitError
 from toolkit.inputs import FMU_FILE, read_regular
+from toolkit.spelling import nearest
 from toolkit.units import unit
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +30,7 @@ from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, TireForces, drive
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
+from toolkit.spelling import nearest
 from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import state
 from toolkit.tires.tir import FOREIGN, TirFile, read_tir, si_number
@@ -135,16 +135,14 @@ class MachineModel:
             if parameter.name in _MACHINE_NUMBERS:
                 _check_dimension(case, parameter.name, parameter.unit)
             elif parameter.name not in self._tire.names:
-                near = difflib.get_close_matches(
-                    parameter.name, sorted((*self._tire.names, *_MACHINE_NUMBERS)), n=1
-                )
+                near = nearest(parameter.name, sorted((*self._tire.names, *_MACHINE_NUMBERS)))
                 raise ConfigError(
                     f"the simulation has no parameter {parameter.name!r}",
                     where=f"{case.path}: simulation.parameters",
                     got=parameter.name,
                     expected="a coefficient or scale factor of the tire file, or a number of the machine: "
                     + ", ".join(_MACHINE_NUMBERS),
-                    next_step=f"did you mean {near[0]!r}?" if near else "correct the name",
+                    next_step=f"did you mean {near!r}?" if near else "correct the name",
                     rule="case",
                 )
         self._direct = {output.name for output in case.outputs}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import difflib
 import os
 import sys
 import types
@@ -18,6 +17,7 @@ import numpy as np
 from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.inputs import CODE_FILE, read_regular
+from toolkit.spelling import nearest
 
 
 def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
@@ -49,12 +49,12 @@ def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
         function = getattr(space, name, None)
         if not callable(function):
             functions = [key for key, var in vars(space).items() if callable(var) and not key.startswith("_")]
-            near = difflib.get_close_matches(name, functions, n=1, cutoff=0.5)
+            near = nearest(name, functions)
             raise ConfigError(
                 f"the simulator has no function {name!r}", where=path,
                 got=", ".join(functions) or "no functions",
                 expected=f"def {name}(..)",
-                next_step=f"did you mean {near[0]!r}?" if near else "name the function in the case",
+                next_step=f"did you mean {near!r}?" if near else "name the function in the case",
                 rule="simulator",
             )  # fmt: skip
         lines.append(cast("Callable[..., Any]", function))

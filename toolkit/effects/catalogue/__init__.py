@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -11,6 +10,7 @@ from typing import get_args
 from toolkit.effects.effect import Effect, Stage
 from toolkit.effects.law import is_law, law_effect
 from toolkit.errors import ConfigError
+from toolkit.spelling import nearest
 
 _ORDER = get_args(Stage)  # of the stages in a list: from the recording back to the road
 
@@ -40,9 +40,9 @@ def effect(name: str, *, where: str = "--effect") -> Effect:
     listed = effects()
     if name in listed:
         return listed[name]
-    near = difflib.get_close_matches(name, listed, n=1, cutoff=0.5)
+    near = nearest(name, listed)
     raise ConfigError(
         f"unknown effect {name!r}", where=where, got=name, expected=", ".join(listed),
-        next_step=f"did you mean {near[0]!r}?" if near else "use one of those expected",
+        next_step=f"did you mean {near!r}?" if near else "use one of those expected",
         rule="unknown-effect",
     )  # fmt: skip

@@ -51,23 +51,20 @@ class Headline:
             parts += [self._size(), f"cause: {self._cause()}", self._since()]
         if self.impossible:
             verb = "holds" if self.impossible == 1 else "hold"
-            further = " more" if self.wrong else ""
-            parts.append(f"{_files(self.impossible)}{further} {verb} an Fy or Mz that no tire has")
+            subject = _files(self.impossible, more=bool(self.wrong))
+            parts.append(f"{subject} {verb} an Fy or Mz that no tire has")
         with_values = readable - self.bare
         if with_values and not (self.wrong or self.unjudged or self.impossible):
             subject = "The file carries" if with_values == 1 else f"All {with_values} files carry"
             parts.append(f"{subject} the values of the record in force")
         if self.unjudged:
-            further = " more" if self.wrong else ""
-            parts.append(
-                f"{_files(self.unjudged)}{further} cannot be judged: no record in force is known or fits"
-            )
+            subject = _files(self.unjudged, more=bool(self.wrong))
+            parts.append(f"{subject} cannot be judged: no record in force is known or fits")
         if self.bare:
-            further = " more" if with_values else ""
             verb = (
                 "holds no Fy and no Mz of its own" if self.bare == 1 else "hold no Fy and no Mz of their own"
             )
-            parts.append(f"{_files(self.bare)}{further} {verb}")
+            parts.append(f"{_files(self.bare, more=with_values > 0)} {verb}")
         if self.unreadable:
             parts.append(f"{_files(self.unreadable)} cannot be read")
         return "; ".join(parts)
@@ -157,8 +154,9 @@ def _cause_of(file: Mapping[str, Any]) -> str:
     return "no record explains them"
 
 
-def _files(count: int) -> str:
-    return "1 file" if count == 1 else f"{count} files"
+def _files(count: int, *, more: bool = False) -> str:
+    further = " more" if more else ""
+    return f"1{further} file" if count == 1 else f"{count}{further} files"
 
 
 def _number(value: float) -> str:

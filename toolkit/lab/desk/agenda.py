@@ -129,8 +129,9 @@ class Work:
 def work_of(home: Path) -> Work:
     """Look through a home for tests that no report rests on, and audits that were interrupted.
 
-    A test has a report where some manifest of the home names its ``test.toml`` by its content: a test whose
-    statements changed since has none. An audit is unfinished while its results are newer than its answer.
+    A test has a report where some manifest of the home names its ``test.toml`` by its content, or, of a
+    report of a reduced test, all its recordings: a test whose statements or recordings changed since has
+    none. An audit is unfinished while its results are newer than its answer.
     """
     from toolkit.lab.desk.holdings import holdings_of, reported_inputs
 
@@ -140,7 +141,9 @@ def work_of(home: Path) -> Work:
     return Work(
         tests=len(tests),
         audits=len(holdings.places["audit"]),
-        without_report=tuple(place for place in tests if _sha256(home / place) not in reported),
+        without_report=tuple(
+            place for place in tests if not reported.rests_on(home / place, _sha256(home / place))
+        ),
         unfinished=unfinished_audits(holdings),
     )
 

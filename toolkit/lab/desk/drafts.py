@@ -1,7 +1,8 @@
 """Sessions that are being typed: each is a session's folder in the home, as `toolkit calibrate` reads it.
 
 ``HOME/drafts/<id>/`` holds SESSION.toml and the tables that it names. What is typed is written there whole,
-right or wrong, so that nothing is lost; of a session that was entered it is ``HOME/sessions/<record>/``.
+right or wrong, so that nothing is lost; of a session that was entered it is ``HOME/sessions/<record>/``, and
+``HOME/drafts/<id>.toml`` says so to whoever still has its page open.
 """
 
 from __future__ import annotations
@@ -11,16 +12,24 @@ import datetime as dt
 import os
 import re
 import shutil
+import tempfile
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.declared import toml_text
+from toolkit.calibration.registry.clock import begun
+from toolkit.calibration.session.session_file import SessionFile
+from toolkit.calibration.session.settings import INSTRUMENT, INSTRUMENT_FORM
+from toolkit.days import parse_day
+from toolkit.declared import attempt, toml_text
 from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError
+from toolkit.files import write_atomic
 from toolkit.inputs import DATA_FILE, SETTINGS_FILE, check_size, is_regular, read_input, read_regular
 from toolkit.lab.desk.uploads import FILE_NAME, claimed_folder
+from toolkit.lab.desk.versions import version_of
 from toolkit.publication import publication, settle
 
 if TYPE_CHECKING:
@@ -49,7 +58,8 @@ class Draft:
     """A session that is being typed.
 
     ``session`` is the text of SESSION.toml; ``grids`` the tables by their key, cells between tabs, None where
-    the file is no text; ``names`` those of the tables; ``files`` the names of what else lies there.
+    the file is no text; ``names`` those of the tables; ``files`` the names of what else lies there;
+    ``version`` is that of all of it.
     """
 
     id: str
@@ -57,6 +67,13 @@ class Draft:
     grids: Mapping[str, str | None]
     names: Mapping[str, str]
     files: tuple[str, ...]
+    version: str = ""
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """The texts that are typed, each under the name of its file."""
+        tables = {self.names[key]: text for key, text in self.grids.items() if text}
+        return {SESSION: self.session, **tables}
 
     @property
     def title(self) -> str:
@@ -118,7 +135,92 @@ def open_draft(home: Path, draft_id: str) -> Draft:
         grids={key: _grid(folder / name) for key, name in names.items()},
         names=names,
         files=tuple(name for name in files if name != SESSION),
+        version=version_of(folder),
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ended:
+    """What became of a draft: the record that it was entered as, None where it was removed; and when."""
+
+    record: str | None
+    time: str
+
+
+def ended_draft(home: Path, draft_id: str) -> Ended | None:
+    """Return what became of a draft that is no longer there; None where nobody wrote it down."""
+    if not _ID.match(draft_id):
+        return None
+    try:
+        table = tomllib.loads(read_regular(_note(home, draft_id), SETTINGS_FILE).decode())
+    except (OSError, ValueError):
+        return None
+    record = table.get("record")
+    return Ended(record=record if isinstance(record, str) else None, time=str(table.get("time", "")))
+
+
+def _note(home: Path, draft_id: str) -> Path:
+    return home / DRAFTS / f"{draft_id}.toml"
+
+
+def _write_down(home: Path, draft_id: str, record: str | None) -> None:
+    time = dt.datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    stated = {} if record is None else {"record": record}
+    write_atomic(_note(home, draft_id), toml_text({"schema": 1, **stated, "time": time}))
+
+
+@contextlib.contextmanager
+def copied_draft(home: Path, draft_id: str) -> Iterator[Path]:
+    """Yield the session file of a copy of a draft: who only tries it writes nothing of it."""
+    source = home / DRAFTS / draft_id
+    with tempfile.TemporaryDirectory() as place:
+        copy = Path(place).resolve() / draft_id
+        copy.mkdir()
+        for path in source.iterdir():
+            if is_regular(path) and not path.name.startswith("."):
+                shutil.copy2(path, copy / path.name)
+        yield copy / SESSION
+
+
+def as_of_draft(error: ToolkitError, copy: Path, home: Path, draft_id: str) -> None:
+    """Let an error of a copy of a draft name the places of the draft itself."""
+    for each in (error, *(error.further if isinstance(error, SessionError) else ())):
+        each.where = each.where and each.where.replace(str(copy.parent), str(home / DRAFTS / draft_id))
+
+
+def statement_faults(session: str, today: dt.date) -> dict[str, str]:
+    """Return what stands in an entry and cannot be used, by the entry's name: what the session's reader says.
+
+    Empty where the text is no TOML: then no entry is to blame.
+    """
+    table = _parsed(session)
+    if not table:
+        return {}
+    stated = {key: entry for key, entry in table.items() if key != "schema"}
+    _, faults = attempt(SessionFile, stated)
+    told = {".".join(map(str, fault.key)): fault.expected for fault in faults if fault.kind == "wrong"}
+    instrument, day = table.get("instrument"), table.get("date")
+    if isinstance(instrument, str) and not INSTRUMENT.match(instrument):
+        told.setdefault("instrument", INSTRUMENT_FORM)
+    with contextlib.suppress(ValueError):
+        if day is not None and not begun(parse_day(str(day))):
+            told.setdefault("date", f"a day up to {today.isoformat()}")
+    return told
+
+
+def check_statements(session: str, today: dt.date) -> None:
+    """Refuse what a new session was to begin with, where its reader would refuse it later.
+
+    Raises
+    ------
+    ConfigError
+        ``session``; the first entry that cannot be used is named
+    """
+    for name, expected in statement_faults(session, today).items():
+        raise ConfigError(
+            f"{name} cannot be used", where=name, got=_parsed(session).get(name), expected=expected,
+            next_step="correct it; nothing was written", rule="session",
+        )  # fmt: skip
 
 
 def begin_draft(home: Path, session: str, tables: Mapping[str, bytes]) -> str:
@@ -135,7 +237,7 @@ def begin_draft(home: Path, session: str, tables: Mapping[str, bytes]) -> str:
     try:
         _write(home / DRAFTS / draft_id, files)
     except ToolkitError:
-        drop_draft(home, draft_id)
+        _remove(home, draft_id)
         raise
     return draft_id
 
@@ -211,13 +313,19 @@ def add_files(home: Path, draft_id: str, files: Sequence[tuple[str, bytes]]) -> 
 
 
 def drop_draft(home: Path, draft_id: str) -> None:
-    """Remove a draft.
+    """Remove a draft, and write down that it was.
 
     Raises
     ------
     OutputError
         it cannot be removed whole
     """
+    _remove(home, draft_id)
+    with contextlib.suppress(OSError, OutputError):
+        _write_down(home, draft_id, None)
+
+
+def _remove(home: Path, draft_id: str) -> None:
     try:
         shutil.rmtree(home / DRAFTS / draft_id)
     except OSError as error:
@@ -230,10 +338,13 @@ def drop_draft(home: Path, draft_id: str) -> None:
 def keep_session(home: Path, draft_id: str, record_id: str) -> None:
     """Move a draft that was entered to the sessions of the home; where that record has one, it stays."""
     target = home / SESSIONS / record_id
-    with contextlib.suppress(OSError):  # the registry has the session's files: this copy is for people
+    with contextlib.suppress(
+        OSError, OutputError
+    ):  # the registry has the session's files: this copy is for people
         target.parent.mkdir(exist_ok=True)
         if not target.exists():
             (home / DRAFTS / draft_id).rename(target)
+            _write_down(home, draft_id, record_id)
 
 
 def new_session(

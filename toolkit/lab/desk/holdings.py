@@ -9,6 +9,7 @@ import hashlib
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
@@ -101,18 +102,69 @@ def archives_of(home: Path) -> dict[str, str]:
     }
 
 
-def reported_inputs(holdings: Holdings) -> frozenset[str]:
-    """Return the hashes of what the delivered reports of a home rest on."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reported:
+    """What the delivered reports of a home rest on.
+
+    ``statements`` are the hashes of every input; ``reduced`` the inputs of each report that was made of a
+    reduced test, whose file records its recordings but not the ``test.toml`` that they lay beside.
+    """
+
+    statements: frozenset[str] = frozenset()
+    reduced: tuple[frozenset[str], ...] = ()
+
+    def rests_on(self, folder: Path, statements: str | None) -> bool:
+        """Tell whether a report rests on a test: on its ``test.toml``, or on all its recordings.
+
+        ``statements`` is the hash of the ``test.toml`` in the folder; None where it cannot be read.
+        """
+        if statements is None:
+            return False
+        if statements in self.statements:
+            return True
+        if not self.reduced:
+            return False
+        hashes = _recordings_of(folder)
+        return bool(hashes) and any(hashes <= inputs for inputs in self.reduced)
+
+
+def _recordings_of(folder: Path) -> frozenset[str]:
+    """Return the hashes of a test's recordings; empty where it cannot be read."""
+    from toolkit.errors import ToolkitError
+    from toolkit.recording.folder import read_test_folder
+
+    try:
+        files = read_test_folder(folder).files
+        states = ((path, path.stat()) for path in files)
+        return frozenset(_hash_of(path, state.st_mtime_ns, state.st_size) for path, state in states)
+    except (ToolkitError, OSError):
+        return frozenset()
+
+
+@lru_cache(maxsize=65536)
+def _hash_of(path: Path, _changed: int, _size: int) -> str:
+    from toolkit.files import sha256_file
+
+    return sha256_file(path)
+
+
+def reported_inputs(holdings: Holdings) -> Reported:
+    """Return what the delivered reports of a home rest on."""
+    from toolkit.recording.folder import TEST_FILE
     from toolkit.report.deliver import MANIFEST
 
-    return frozenset(
-        sha256 for place in holdings.manifests for sha256 in _inputs(holdings.home / place / MANIFEST)
+    manifests = [_inputs(holdings.home / place / MANIFEST) for place in holdings.manifests]
+    return Reported(
+        statements=frozenset(sha256 for inputs in manifests for _, sha256 in inputs),
+        reduced=tuple(
+            frozenset(sha256 for _, sha256 in inputs)
+            for inputs in manifests
+            if inputs and all(name != TEST_FILE for name, _ in inputs)
+        ),
     )
 
 
-def rows_of_tests(
-    holdings: Holdings, ids: Iterable[str], reported: frozenset[str]
-) -> Iterator[dict[str, Any]]:
+def rows_of_tests(holdings: Holdings, ids: Iterable[str], reported: Reported) -> Iterator[dict[str, Any]]:
     """Yield what the ``test.toml`` of each test says, and its state.
 
     ``state`` is ``reported``, ``no report`` or ``refused``; then ``reason`` says why it cannot be read.
@@ -139,7 +191,7 @@ def rows_of_tests(
             "date": stated.date,
             "machine": _name_of_machine(stated.machine, toml.parent),
             "tire": stated.tire.size if stated.tire is not None else None,
-            "state": "reported" if sha256_bytes(data) in reported else "no report",
+            "state": "reported" if reported.rests_on(toml.parent, sha256_bytes(data)) else "no report",
         }
 
 
@@ -171,14 +223,14 @@ def _marks() -> Mapping[Kind, frozenset[str]]:
     }
 
 
-def _inputs(path: Path) -> set[str]:
-    """Return the hashes of what a manifest's report rests on; empty where it is none."""
+def _inputs(path: Path) -> set[tuple[str, str]]:
+    """Return names and hashes of what a manifest's report rests on; empty where it is none."""
     import json
 
     from toolkit.inputs import RESULT_FILE, read_regular
 
     try:
         manifest = json.loads(read_regular(path, RESULT_FILE))
-        return {str(entry["sha256"]) for entry in manifest["inputs"]}
+        return {(str(entry["name"]), str(entry["sha256"])) for entry in manifest["inputs"]}
     except (OSError, ValueError, TypeError, KeyError):
         return set()

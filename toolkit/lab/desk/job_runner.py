@@ -44,7 +44,7 @@ def run_job(place: Path, lock: int) -> int:
             break
         time.sleep(_LOOK)
     code = command.wait()
-    write_job(place, ended(job, code, cancelled=asked))
+    write_job(place, ended(place, job, code, cancelled=asked))
     return code
 
 

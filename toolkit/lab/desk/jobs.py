@@ -24,8 +24,15 @@ from typing import IO, Annotated, Any, ClassVar, Literal
 from toolkit.declared import Entry, Format, Text, read_text, toml_text
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import write_atomic
-from toolkit.inputs import SETTINGS_FILE, open_regular, open_regular_to_append, read_input
-from toolkit.lab.progress_note import read_note
+from toolkit.inputs import (
+    RESULT_FILE,
+    SETTINGS_FILE,
+    open_regular,
+    open_regular_to_append,
+    read_input,
+    read_regular,
+)
+from toolkit.lab.progress_note import LEVEL, read_note
 from toolkit.system import lock_folder
 
 FOLDER, FILE, LOG, PROGRESS, CANCEL, LOCK = "jobs", "job.toml", "log", "progress", "cancel", "lock"
@@ -33,6 +40,7 @@ ID = re.compile(r"\d{8}T\d{6}-[0-9a-f]{8}")
 _LOG_SHOWN = 20_000  # bytes of a log's end
 _PROBES, _PAUSE = 5, 0.05  # somebody else who only looks holds the lock for microseconds
 
+Level = Literal["warning", "error"]
 Kind = Literal["audit", "repair", "preview", "report", "diagnosis", "plan"]
 State = Literal["running", "interrupted", "cancelled", "clean", "findings", "refused", "failed"]
 
@@ -50,6 +58,7 @@ class Job:
     ended: Annotated[str | None, Text(strip=True), Entry("UTC; nothing while it runs")] = None
     exit_code: Annotated[int | None, Entry("of the command")] = None
     cancelled: Annotated[bool, Entry("whether somebody asked for its end")] = False
+    level: Annotated[Level | None, Entry("of the gravest finding of the command")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,9 +166,16 @@ def write_job(place: Path, job: Job) -> None:
     write_atomic(place / FILE, toml_text(job))
 
 
-def ended(job: Job, exit_code: int, *, cancelled: bool) -> Job:
-    """Return a job that is over."""
-    return replace(job, ended=_time(datetime.now(tz=UTC)), exit_code=exit_code, cancelled=cancelled)
+def ended(place: Path, job: Job, exit_code: int, *, cancelled: bool) -> Job:
+    """Return a job that is over, with the gravest level that its command noted in its folder."""
+    try:
+        noted = read_regular(place / LEVEL, RESULT_FILE)
+    except OSError:
+        noted = b""
+    level: Level | None = "error" if noted == b"error" else "warning" if noted == b"warning" else None
+    return replace(
+        job, ended=_time(datetime.now(tz=UTC)), exit_code=exit_code, cancelled=cancelled, level=level
+    )
 
 
 def _state(job: Job, *, held: bool) -> State:

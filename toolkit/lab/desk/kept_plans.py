@@ -31,7 +31,7 @@ _WRITTEN = (
     "plan.toml", "next.csv", "predictions.csv", "operator.txt", "plan.txt", "plan.json",
 )  # fmt: skip
 _PICTURE = re.compile(r"next_\w{1,60}\.png")
-# Fields of a form by the option that each stands for; what may be said several times is parted by commas.
+# Fields of a form by the option that each stands for; what may be said several times is separated by commas.
 _OPTIONS: Mapping[PlanKind, Mapping[str, str]] = {
     "session": {"minutes": "--minutes", "loads": "--loads", "criterion": "--criterion"},
     "test": {

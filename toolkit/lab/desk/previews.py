@@ -10,9 +10,11 @@ import json
 import os
 import threading
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes, write_atomic
 from toolkit.inputs import PDF_FILE, RESULT_FILE, read_regular
 from toolkit.lab.desk.holdings import holding_id
@@ -42,8 +44,11 @@ class Preview:
         return tuple(map(str, self.manifest.get("missing", ())))
 
 
-def templates_of(home: Path) -> dict[str, str]:
-    """Return the Word templates of a home by id; links are left out."""
+def templates_of(home: Path, kind: str | None = None) -> dict[str, str]:
+    """Return the Word templates of a home by id, all or those of one kind of documents; links are left out.
+
+    One that cannot be read is of no kind.
+    """
     try:
         entries = sorted(os.scandir(home / TEMPLATES), key=lambda entry: entry.name)
     except OSError:
@@ -51,8 +56,29 @@ def templates_of(home: Path) -> dict[str, str]:
     return {
         holding_id(f"{TEMPLATES}/{entry.name}"): entry.name
         for entry in entries
-        if entry.is_file(follow_symlinks=False) and entry.name.lower().endswith(WORD)
+        if entry.is_file(follow_symlinks=False)
+        and entry.name.lower().endswith(WORD)
+        and (
+            kind is None
+            or kind == _kind_of(Path(entry.path), (state := entry.stat()).st_mtime_ns, state.st_size)
+        )
     }
+
+
+def _kind_now(template: Path) -> str:
+    state = template.stat()
+    return _kind_of(template, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=256)
+def _kind_of(template: Path, _changed: int, _size: int) -> str:
+    from toolkit.report.kinds import kind_of
+    from toolkit.report.word.package import read_template
+
+    try:
+        return kind_of(read_template(template))
+    except ToolkitError:
+        return ""
 
 
 def preview_words(place: str, template: str, test_id: str) -> tuple[str, ...]:

@@ -32,14 +32,16 @@ FILE_NAME = re.compile(r"[^\W_.][\w ().+-]{0,99}\Z")
 
 
 def claimed_folder(parent: Path, word: str) -> str:
-    """Make a folder ``word-N`` whose number nobody else has, and return its name.
+    """Make a folder ``word-N`` whose number nobody else has or had, and return its name.
+
+    Of one that is gone a note ``word-N.toml`` may lie there.
 
     Raises
     ------
     OutputError
         it cannot be made
     """
-    pattern = re.compile(rf"{re.escape(word)}-([1-9][0-9]{{0,8}})\Z")
+    pattern = re.compile(rf"{re.escape(word)}-([1-9][0-9]{{0,8}})(?:\.toml)?\Z")
     try:
         parent.mkdir(exist_ok=True)
         number = max(

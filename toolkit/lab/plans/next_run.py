@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanNextAnswer(NextRunPlan):
-    """The run that parts a class, and what was written of it."""
+    """The run that tells a class apart, and what was written of it."""
 
     out: Annotated[Path | None, Entry("folder of the plan's files; null where none was named")]
     files: Annotated[tuple[str, ...], Entry("in that folder")] = ()

@@ -10,7 +10,7 @@ from toolkit.declared.answers import entry_of
 from toolkit.errors import SessionError, ToolkitError
 from toolkit.estimate import round_uncertainty
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import finding_lines, refuse_unwritable, table
+from toolkit.lab.answers import counted, finding_lines, refuse_unwritable, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -133,7 +133,7 @@ def fit_report(fit: SessionFit, record: CalibrationRecord, *, full: bool, figure
             blocks += [balance_text(balance)] if full else []
     if figures is not None:
         payload["figures"] = _write(reports, record.id, figures)
-        blocks.append(f"{len(payload['figures'])} figures in {figures}")
+        blocks.append(f"{counted(len(payload['figures']), 'figure')} in {figures}")
     return FitReport(
         loads={report.load: report_dict(report, rows=full) for report in reports},
         payload=payload,

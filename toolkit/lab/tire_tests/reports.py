@@ -16,6 +16,7 @@ from toolkit.lab.answers import (
     PrintedEntry,
     Timed,
     Timing,
+    counted,
     delivered_keys,
     draft_keys,
     file_name,
@@ -344,8 +345,8 @@ def report_text(report: MadeReport) -> str:
             for path in (delivered.pdf, delivered.docx, delivered.manifest, *delivered.extras)
             if path is not None
         ),
-        f"{delivered.pages} pages, {len(delivered.filled.figures)} figures, "
-        f"{len(delivered.filled.manifest)} values verified{marks}",
+        f"{counted(delivered.pages, 'page')}, {counted(len(delivered.filled.figures), 'figure')}, "
+        f"{counted(len(delivered.filled.manifest), 'value')} verified{marks}",
         f"calibration {use.id} ({use.sha256[:12]}...)",
         f"signature: {delivered.signature}",
         f"content {delivered.content_sha256[:12]}...",

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.lab.answers import counted
 from toolkit.lab.faces import Face, Facts, as_path
 
 if TYPE_CHECKING:
@@ -263,10 +264,10 @@ class Report(Face):
     def _facts(self) -> Facts:
         return {
             "report": self.pdf,
-            "pages": f"{self.result.pages} pages",
-            "values": f"{len(self.result.filled.manifest)} values verified",
-            "figures": f"{len(self.result.filled.figures)} figures",
-            "warnings": f"{len(self.result.warnings)} warnings" if self.result.warnings else None,
+            "pages": counted(self.result.pages, "page"),
+            "values": f"{counted(len(self.result.filled.manifest), 'value')} verified",
+            "figures": counted(len(self.result.filled.figures), "figure"),
+            "warnings": counted(len(self.result.warnings), "warning") if self.result.warnings else None,
         }
 
 

@@ -48,6 +48,7 @@ from toolkit.report.word.xml import (
     q,
     stories,
 )
+from toolkit.spelling import nearest
 
 
 def check_template(
@@ -231,10 +232,8 @@ def _swallowed(site: Site) -> Iterator[LintFinding]:
 
 
 def _near(path: str, words: Vocabulary) -> str:
-    import difflib
-
-    near = difflib.get_close_matches(path, [entry.path for entry in words.entries], n=1, cutoff=0.5)
-    return f"did you mean tk:{near[0]}?" if near else "see 'toolkit template tags'"
+    near = nearest(path, [entry.path for entry in words.entries])
+    return f"did you mean tk:{near}?" if near else "see 'toolkit template tags'"
 
 
 def _in_heading(site: Site) -> bool:

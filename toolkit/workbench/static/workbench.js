@@ -10,3 +10,5 @@ document.addEventListener("drop", (event) => {
   event.preventDefault();
   form.querySelector("input[type=file]").files = event.dataTransfer.files;
 });
+// A field without a place to go to is kept as it changes: Enter in it sends nothing more.
+document.addEventListener("submit", (event) => { if (!event.target.hasAttribute("action")) event.preventDefault(); });
