@@ -37,8 +37,8 @@ _SHA = re.compile(r"[0-9a-fA-F]{64}")
 class PastReport:
     """A report and what it says of its origin; ``words`` are those in which a test's name may stand.
 
-    ``id`` is that of its manifest; ``tests``, ``files``, ``not_clean``, ``disputed`` and ``in_force``, the records in force
-    on the days of its tests, are filled when it is linked.
+    ``id`` is that of its manifest; ``tests``, ``files``, ``not_clean``, ``disputed`` and ``in_force``, the
+    records in force on the days of its tests, are filled when it is linked.
     """
 
     report: str

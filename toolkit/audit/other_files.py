@@ -1,8 +1,8 @@
 """The other files of a test as witnesses of which side of a disagreement is wrong (`toolkit.audit.sides`).
 
 What a file leaves open, its test may know. Its force over load lies on the surface that all others make
-(`toolkit.reduction.strays`) by its recorded values or by its cells, and not by both; and where most files of a
-test disagree in the same way, one of them that is decided by itself decides for all: a wrong equation
+(`toolkit.reduction.strays`) by its recorded values or by its cells, and not by both; and where most files
+of a test disagree in the same way, one of them that is decided by itself decides for all: a wrong equation
 computes every file of a day, a changed file stands alone. Where no file decides, the slopes of the whole
 test do.
 """

@@ -24,8 +24,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, overload
 
-from toolkit.audit.one_file import FileAudit, OwnOutput
 from toolkit.audit.model import Sides
+from toolkit.audit.one_file import FileAudit, OwnOutput
 from toolkit.audit.serial import SHAPE, from_plain, to_plain
 from toolkit.audit.sides import grade_of
 from toolkit.errors import OutputError

@@ -248,12 +248,13 @@ def _schema(pa: Any, *, reports: bool) -> Any:
                 "coefficients": pa.map_(text, pa.struct(coefficient))}  # fmt: skip
     estimate = {"first_row": integer, "last_row": integer, "equations": pa.map_(text, pa.struct(equation)),
                 "nearest": pa.struct({"record": text, **change})}  # fmt: skip
+    sides = pa.struct(dict.fromkeys(("side", "reason", "grade"), text))
     columns = {
         "path": text, "sha256": text, "size": integer, "instrument": text, "date": pa.date32(), "test": text,
         "rotation": text, "to_SAE": pa.map_(text, pa.int8()), "own_protocol": truth, "rows": integer,
         "grade": text, "record": text, "variant": text, "issued": truth, "candidates": pa.list_(text),
-        "segments": pa.list_(pa.struct(segment)), "in_force": text, "repair": pa.struct(change), "sides": pa.struct(dict.fromkeys(("side", "reason", "grade"), text)),
-        "conditions": pa.list_(pa.struct(condition)), "estimate": pa.struct(estimate),
+        "segments": pa.list_(pa.struct(segment)), "in_force": text, "repair": pa.struct(change),
+        "sides": sides, "conditions": pa.list_(pa.struct(condition)), "estimate": pa.struct(estimate),
         "skipped": pa.list_(pa.struct({"id": text, "reason": text})), "reason": text, "test_toml": text,
         "units": pa.map_(text, text), "values_sha256": text, "modified": pa.date32(),
         "notes": pa.list_(pa.struct({"rule": text, "message": text})),

@@ -15,6 +15,7 @@ What both sides pass, or both fail, is open, and stays so.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -67,7 +68,8 @@ def judge(
     impossible : whether the recorded and the recomputed ones show what no tire can do
     """
     segments = identification.segments
-    odd = [segment for segment in segments if segment.grade in _ODD]
+    # The record of another day may be what turned cells look like: m15-r1 is m15-r2 with E5 turned.
+    odd = [s for s in segments if s.grade in _ODD or s.grade == "stale"]
     if not odd or computed is None or (len(odd) == len(segments) and _unexplained(odd)):
         return identification
     votes: list[tuple[Which, str]] = []
@@ -83,6 +85,8 @@ def judge(
     reason = "; ".join(dict.fromkeys(text for _, text in votes))
     if len(sides) == 1:
         return decided(identification, Sides(side=sides.pop(), reason=reason, grade=identification.grade))
+    if not votes and identification.grade == "stale":
+        return identification  # a record that was once in force needs no other explanation
     reason = f"the evidence speaks for both: {reason}" if votes else "both are possible for a tire"
     return decided(identification, Sides(side="open", reason=reason, grade=identification.grade))
 
@@ -100,7 +104,7 @@ def grade_of(sides: Sides) -> Grade:
 
 
 def disputed(line: Mapping[str, Any]) -> bool:
-    """Tell from a file's plain answer whether its cells are wrong, or may be: then nothing is computed of them.
+    """Tell from a file's plain answer whether its cells are wrong, or may be: nothing is computed of such.
 
     >>> disputed({"sides": None}), disputed({"sides": {"side": "cells"}})
     (False, True)
@@ -134,10 +138,10 @@ def _by_continuity(
     edges = [segment.last_row for segment in segments[:-1]]
     votes: dict[Which, list[int]] = {"forces": [], "cells": []}
     cells = columns.x.T
-    for before, after in zip(segments, segments[1:], strict=False):
+    for before, after in itertools.pairwise(segments):
         edge = before.last_row
         block = next((b for b in blocks if b.start < edge < b.stop), None)
-        if block is None or not {before.grade, after.grade} & {*_ODD}:
+        if block is None:
             continue
         wide = (
             min(_WINDOW, before.last_row - before.first_row + 1, edge - block.start),

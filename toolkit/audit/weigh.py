@@ -35,13 +35,14 @@ def weighed(
 ) -> Identification:
     """Return an identification that says which side of a disagreement is wrong (`toolkit.audit.sides`).
 
-    ``new`` are FY and MZ by the record in force, which stand for what no record explains.
+    ``new`` are FY and MZ by the record in force, which stand for what no record explains, and beside those of
+    a record that was not in force.
     """
     by_id = {record.id: record for record in records}
     explained = [by_id[s.record] for s in identification.segments if s.record in by_id]
     plain = by_id.get(identification.record or "") or (explained[0] if explained else None)
     computed = new
-    if plain is not None and cannot_correct(plain, columns) is None:
+    if identification.grade != "stale" and plain is not None and cannot_correct(plain, columns) is None:
         computed = recompute(columns, plain)
     recorded = {load: recording[load].si for load in columns.loads}
     return judge(

@@ -149,7 +149,8 @@ def table(
     """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``.
 
     With a ``width`` [characters] the longest texts lose their middle until a line fits; numbers stay whole,
-    and texts that differ still do: a line is longer where it must be. Columns that are ``whole`` lose nothing.
+    and texts that differ still do: a line is longer where it must be. Columns that are ``whole`` lose
+    nothing.
     """
     if not rows:
         return ""
