@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
 from toolkit.audit.sides import disputed
+from toolkit.audit.structure import odd_counts
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import summary
 from toolkit.characteristics.groups import CHANNELS
@@ -71,6 +72,7 @@ class TestSums:
     worst_FY_N: float = 0.0
     worst_MZ_Nm: float = 0.0
     points: dict[tuple[Rotation, float, float], Point] = field(default_factory=dict)
+    blocks: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
 
     def add(self, line: Mapping[str, Any]) -> None:
         """Take a file's plain answer."""
@@ -80,6 +82,8 @@ class TestSums:
         if line["repair"] is not None and by_cells:
             self.worst_FY_N = max(self.worst_FY_N, line["repair"]["FY_max_abs_N"] or 0.0)
             self.worst_MZ_Nm = max(self.worst_MZ_Nm, line["repair"]["MZ_max_abs_Nm"] or 0.0)
+        if not any(note["rule"] == "foreign-row" for note in line["notes"]):
+            self.blocks[line["path"]] = [(b["first_row"], b["last_row"]) for b in line["conditions"]]
         sign = line["to_SAE"]
         for block in line["conditions"]:
             if any(block[key] is None for key in _NEEDED):
@@ -313,6 +317,7 @@ class Across:
     def _closed(self, name: str) -> Iterator[Finding]:
         test = self._open.pop(name)
         yield from test.missing()
+        yield from odd_counts(test.blocks)
         for rotation, sign in test.slope_signs():
             self._slopes.setdefault((test.instrument, rotation), []).append((name, sign))
         self.tests.add(test.summary())
@@ -348,6 +353,7 @@ class Across:
 def noted(note: Mapping[str, str], path: str) -> Finding:
     """Return what a file's rows show, from its plain answer: it informs, but for what cannot be."""
     level: Level = "error" if note["rule"] in (*RULES, "discontinuity") else "note"
+    level = "warning" if note["rule"] == "foreign-row" else level
     return Finding(rule=note["rule"], where=path, message=note["message"], level=level)
 
 

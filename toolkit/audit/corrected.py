@@ -34,7 +34,7 @@ from toolkit.recording.folder import TEST_FILE, nearest_test_toml
 from toolkit.recording.formats import WRITERS
 from toolkit.recording.formats.vectors import Written
 from toolkit.recording.labview import write_labview
-from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
+from toolkit.recording.marks import COPY, GENERATOR, OWN_OUTPUT
 from toolkit.recording.read import read_recording
 from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
@@ -246,7 +246,7 @@ def _write(
         columns_in_file = {column.symbol: column.values.tolist() for column in _replaced(recording, new)}
         place.write_bytes(with_numbers(data, columns_in_file, recording.machine, where=recording.path))
         return
-    title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
+    title = f"{COPY} {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
     title += f"; {use.mark}" if use.mark else ""
     if recording.format in WRITERS:
         place.write_bytes(WRITERS[recording.format](_copied_columns(recording, new), title))

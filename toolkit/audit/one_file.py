@@ -7,7 +7,7 @@ import functools
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -20,6 +20,7 @@ from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.inspection import Choices
 from toolkit.audit.model import INDEX, Grade, Identification, columns_of
 from toolkit.audit.quality import impossible, inclinations
+from toolkit.audit.structure import structure_findings
 from toolkit.audit.weigh import steps, weighed
 from toolkit.calibration.registry.clock import in_future
 from toolkit.calibration.registry.registry import Registry
@@ -32,7 +33,7 @@ from toolkit.machine import load_machine
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.hidden import hidden_findings
-from toolkit.recording.marks import machine_in, own_output
+from toolkit.recording.marks import is_corrected_copy, machine_in, own_output
 from toolkit.recording.read import read_recording
 from toolkit.reduction.health import quality, tare_finding, tare_under_load
 from toolkit.reduction.hub import with_load
@@ -279,7 +280,10 @@ class Auditor:
                 *quality(recording, name),
                 *_tare(loaded, context, name),
                 *steps(loaded, columns, blocks, name),
-                *self._copied(path, recording.sha256, name),
+                *structure_findings(
+                    [asdict(change) for change in changed], context.machine.protocol.load_tolerance, name
+                ),
+                *self._copied(path, data or b"", recording.sha256, name),
                 *hidden_findings(recording.hidden, name),
             ),
         )
@@ -300,15 +304,14 @@ class Auditor:
             )
             return Context(machine=machine, machine_source=source, date=None, test_toml=None), trouble
 
-    def _copied(self, path: Path, sha256: str, name: str) -> tuple[Finding, ...]:
-        for folder in path.parents:
-            if sha256 in self._copies(folder):
-                message = (
-                    "a corrected copy: its Fy and Mz were computed from the cells beside them, so that they "
-                    "agree proves nothing of the cells"
-                )
-                return (Finding(rule="corrected-copy", where=name, message=message, level="note"),)
-        return ()
+    def _copied(self, path: Path, data: bytes, sha256: str, name: str) -> tuple[Finding, ...]:
+        if not is_corrected_copy(data) and not any(sha256 in self._copies(up) for up in path.parents):
+            return ()
+        message = (
+            "a corrected copy: its Fy and Mz were computed from the cells beside them, so that they agree "
+            "proves nothing of the cells"
+        )
+        return (Finding(rule="corrected-copy", where=name, message=message, level="note"),)
 
     def _folder_of(self, toml: Path) -> str:
         try:

@@ -72,6 +72,7 @@ class Headline:
     first: str | None
     last: str | None
     not_judged: int
+    disputed: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,6 +108,7 @@ class Audited:
             ),
             first=months[0] if months else None,
             last=months[-1] if months else None,
+            disputed=sum(file.is_disputed for file in self.files),
             not_judged=sum(file.grade in _NOT_JUDGED for file in self.files),
         )
 
