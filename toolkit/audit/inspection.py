@@ -201,7 +201,7 @@ def inspect_file(
             fits = corrector is not None and _uncorrected(context, columns, choice, corrector) is None
             new = recompute(columns, corrector) if corrector is not None and fits else None
             identification = weighed(
-                identification, loaded_recording, columns, blocks_of_rows, choice.records, new
+                identification, loaded_recording, columns, blocks_of_rows, choice.records, new, corrector
             )
             stepping = steps(loaded_recording, columns, blocks_of_rows, path.name)
         why = _uncorrected(context, columns, choice, corrector)

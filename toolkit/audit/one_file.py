@@ -247,7 +247,7 @@ class Auditor:
             screen=screen,
             new=new,
         )
-        identification = weighed(identification, loaded, columns, blocks, choice.records, new)
+        identification = weighed(identification, loaded, columns, blocks, choice.records, new, in_force)
         table: Mapping[str, Any] = {} if context.test_toml is None else self._toml(context.test_toml)
         rotation = self._rotation(path, context, table)
         reversal = table.get("reversal")

@@ -119,9 +119,9 @@ def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
         alike = [line for line in left if _kind(line) == kind]
         if not alike or 2 * count < len(lines) or count < 2:
             continue
-        verdict = _by_company(kind, count, lines) or _by_slopes(lines)
-        if verdict is not None:
-            side, reason = verdict
+        told = _by_company(kind, count, lines) or _by_slopes(lines)
+        if told is not None:
+            side, reason = told
             judged |= {
                 line["path"]: Sides(side=side, reason=reason, grade=line["sides"]["grade"]) for line in alike
             }

@@ -16,7 +16,7 @@ What both sides pass, or both fail, is open, and stays so.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +56,7 @@ def judge(
     recorded: Mapping[str, Array],
     computed: Mapping[str, Array] | None,
     impossible: tuple[bool, bool],
+    by_columns: Callable[[Segment], bool] = lambda _: True,
 ) -> Identification:
     """Return an identification that says which side is wrong where the rows disagree.
 
@@ -66,12 +67,18 @@ def judge(
     conditions : FZ [N] and, where it is there, SA [rad]
     recorded, computed : FY [N] and MZ [N·m] of the file, and of its cells by the record that explains it
     impossible : whether the recorded and the recomputed ones show what no tire can do
+    by_columns : whether a changed column of cells could be what explains the rows of a segment
     """
     segments = identification.segments
     # The record of another day may be what turned cells look like: m15-r1 is m15-r2 with E5 turned.
     odd = [s for s in segments if s.grade in _ODD or s.grade == "stale"]
     if not odd or computed is None or (len(odd) == len(segments) and _unexplained(odd)):
         return identification
+    if not any(map(by_columns, odd)):
+        if identification.grade == "stale":
+            return identification
+        reason = "a changed cell column would show in the same way in Fy and Mz"
+        return decided(identification, Sides(side="forces", reason=reason, grade=identification.grade))
     votes: list[tuple[Which, str]] = []
     if impossible == (True, False):
         votes.append(("forces", "the recorded values are impossible for a tire, those by the cells are not"))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from toolkit.audit.candidates import cannot_correct
+from toolkit.audit.candidates import by_columns, cannot_correct, turned_against
 from toolkit.audit.identify import recompute
 from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.sides import judge, sudden_step
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from toolkit.audit.model import Columns, Identification
+    from toolkit.audit.model import Columns, Identification, Segment
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.recording.model import Recording
     from toolkit.reduction.blocks import Block
@@ -32,6 +32,7 @@ def weighed(
     blocks: Sequence[Block],
     records: Sequence[CalibrationRecord],
     new: Mapping[str, Array] | None,
+    in_force: CalibrationRecord | None,
 ) -> Identification:
     """Return an identification that says which side of a disagreement is wrong (`toolkit.audit.sides`).
 
@@ -44,6 +45,17 @@ def weighed(
     computed = new
     if identification.grade != "stale" and plain is not None and cannot_correct(plain, columns) is None:
         computed = recompute(columns, plain)
+
+    def could(segment: Segment) -> bool:
+        if segment.grade == "stale":
+            mine = by_id.get(segment.record or "")
+            if mine is None or in_force is None:
+                return False
+            change = turned_against(mine, in_force, columns.loads)
+        else:
+            change = segment.variant
+        return segment.grade == "unknown" or (change is not None and by_columns(change, columns.loads))
+
     recorded = {load: recording[load].si for load in columns.loads}
     return judge(
         identification,
@@ -56,6 +68,7 @@ def weighed(
             _impossible(recording, blocks, recorded),
             computed is not None and _impossible(recording, blocks, computed),
         ),
+        by_columns=could,
     )
 
 
@@ -94,13 +107,11 @@ def step_findings(
 def _impossible(recording: Recording, blocks: Sequence[Block], values: Mapping[str, Array]) -> bool:
     rows = [f"{block.start}" for block in blocks]
     SA = recording["SA"].si if recording.has("SA") else None
-    means = [
-        (
-            block.mean_FZ,
-            None if SA is None else float(np.mean(SA[block.rows])),
-            *(float(np.mean(values[load][block.rows])) if load in values else None for load in ("FY", "MZ")),
-        )
-        for block in blocks
-    ]
+
+    def mean(series: Array | None, block: Block) -> float | None:
+        return None if series is None else float(np.mean(series[block.rows]))
+
+    FY, MZ = values.get("FY"), values.get("MZ")
+    means = [(b.mean_FZ, mean(SA, b), mean(FY, b), mean(MZ, b)) for b in blocks]
     IA = inclinations(recording, [(block.start, block.stop) for block in blocks])
     return bool(impossible("", rows, means, values="", IA=IA))

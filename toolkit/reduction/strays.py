@@ -208,9 +208,11 @@ class _Surface:
     def tells(self, groups: Sequence[NDArray[np.intp]], *, without: int) -> bool:
         """Tell whether enough slip angles and conditions stay to foretell some groups by the others."""
         angles = self._angles(np.concatenate(groups)) - without
+        if angles < _FEWEST_ANGLES:
+            return False
         spare = sum(sorted(len(group) for group in groups)[: len(groups) - without]) - _SPARE
         columns = self._design(np.concatenate(groups), _SLOPES[0]).shape[1]
-        return angles >= _FEWEST_ANGLES and spare >= columns
+        return spare >= columns
 
     def slope(self, y: Array, groups: Sequence[NDArray[np.intp]]) -> float:
         """Return the k [1/rad] by which the groups foretell one another best."""
