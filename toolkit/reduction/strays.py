@@ -212,7 +212,7 @@ class _Surface:
             return False
         spare = sum(sorted(len(group) for group in groups)[: len(groups) - without]) - _SPARE
         columns = self._design(np.concatenate(groups), _SLOPES[0]).shape[1]
-        return spare >= columns
+        return bool(spare >= columns)
 
     def slope(self, y: Array, groups: Sequence[NDArray[np.intp]]) -> float:
         """Return the k [1/rad] by which the groups foretell one another best."""
