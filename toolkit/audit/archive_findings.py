@@ -21,7 +21,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from toolkit.audit.model import CLEAN
+from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
+from toolkit.audit.sides import disputed
+from toolkit.audit.structure import odd_counts
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import summary
 from toolkit.characteristics.groups import CHANNELS
@@ -70,20 +72,25 @@ class TestSums:
     worst_FY_N: float = 0.0
     worst_MZ_Nm: float = 0.0
     points: dict[tuple[Rotation, float, float], Point] = field(default_factory=dict)
+    blocks: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
 
     def add(self, line: Mapping[str, Any]) -> None:
         """Take a file's plain answer."""
         self.files += 1
-        self.dirty += line["grade"] not in CLEAN
-        if line["repair"] is not None:
+        by_cells = not disputed(line)
+        self.dirty += line["grade"] not in CLEAN and by_cells
+        if line["repair"] is not None and by_cells:
             self.worst_FY_N = max(self.worst_FY_N, line["repair"]["FY_max_abs_N"] or 0.0)
             self.worst_MZ_Nm = max(self.worst_MZ_Nm, line["repair"]["MZ_max_abs_Nm"] or 0.0)
+        if not any(note["rule"] == "foreign-row" for note in line["notes"]):
+            self.blocks[line["path"]] = [(b["first_row"], b["last_row"]) for b in line["conditions"]]
         sign = line["to_SAE"]
         for block in line["conditions"]:
             if any(block[key] is None for key in _NEEDED):
                 continue
             FY, MZ = sign["FY"] * block["FY_N"], sign["MZ"] * block["MZ_Nm"]
-            dFY, dMZ = sign["FY"] * block["FY_change_N"], sign["MZ"] * block["MZ_change_Nm"]
+            dFY = sign["FY"] * block["FY_change_N"] if by_cells else 0.0
+            dMZ = sign["MZ"] * block["MZ_change_Nm"] if by_cells else 0.0
             SA = sign["SA"] * math.radians(block["SA_deg"])
             key = (line["rotation"], block["step_FZ_N"], round(block["step_SA_deg"], 6))
             self.points.setdefault(key, (SA, FY, MZ, FY + dFY, MZ + dMZ))
@@ -278,7 +285,7 @@ class Across:
         for name in [name for name in self._open if name != "." and not path.startswith(name + "/")]:
             yield from self._closed(name)
         key = line["test"]
-        if key is not None and line["date"] is not None and line["grade"] != "unreadable":
+        if key is not None and line["date"] is not None and line["grade"] not in NOT_IDENTIFIED:
             if key not in self._open:
                 self._open[key] = TestSums(
                     test=key,
@@ -310,6 +317,7 @@ class Across:
     def _closed(self, name: str) -> Iterator[Finding]:
         test = self._open.pop(name)
         yield from test.missing()
+        yield from odd_counts(test.blocks)
         for rotation, sign in test.slope_signs():
             self._slopes.setdefault((test.instrument, rotation), []).append((name, sign))
         self.tests.add(test.summary())
@@ -343,8 +351,9 @@ class Across:
 
 
 def noted(note: Mapping[str, str], path: str) -> Finding:
-    """Return what a file's rows show, from its plain answer: it informs, but for what no tire can do."""
-    level: Level = "error" if note["rule"] in RULES else "note"
+    """Return what a file's rows show, from its plain answer: it informs, but for what cannot be."""
+    level: Level = "error" if note["rule"] in (*RULES, "discontinuity") else "note"
+    level = "warning" if note["rule"] == "foreign-row" else level
     return Finding(rule=note["rule"], where=path, message=note["message"], level=level)
 
 

@@ -249,6 +249,24 @@ def describe(
     return "; ".join(parts) or None
 
 
+def by_columns(variant: str, loads: tuple[str, ...]) -> bool:
+    """Tell whether a variant is also what a turned or an exchanged cell column would look like.
+
+    Such a column shows in every load; a constant is no column.
+
+    >>> by_columns("E5 negative in FY, MZ", ("FY", "MZ")), by_columns("D51<->D52", ("FY", "MZ"))
+    (True, True)
+    >>> by_columns("E5 negative in FY", ("FY", "MZ")), by_columns(f"{CONSTANT} positive in FY", ("FY",))
+    (False, False)
+    """
+    turned: dict[str, set[str]] = {}
+    for part in variant.split("; "):
+        name, sign, named = part.rpartition(" in ")
+        if sign:
+            turned.setdefault(name.rpartition(" ")[0], set()).update(named.split(", "))
+    return CONSTANT not in turned and all(named == {*loads} for named in turned.values())
+
+
 def turned_against(record: CalibrationRecord, rival: CalibrationRecord, loads: tuple[str, ...]) -> str | None:
     """Return which signs a record has otherwise than another of the same magnitudes; None where it has not.
 

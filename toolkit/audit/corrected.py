@@ -17,9 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.audit.context import context_of
+from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import recompute
-from toolkit.audit.model import CLEAN, columns_of
+from toolkit.audit.model import CLEAN, INDEX, Sides, columns_of
+from toolkit.audit.other_files import off_the_curve, test_of
+from toolkit.audit.sides import disputed, statement
+from toolkit.audit.weigh import step_findings
 from toolkit.calibration.registry.registry import instrument_of
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import OutputError, ToolkitError
@@ -31,8 +34,10 @@ from toolkit.recording.folder import TEST_FILE, nearest_test_toml
 from toolkit.recording.formats import WRITERS
 from toolkit.recording.formats.vectors import Written
 from toolkit.recording.labview import write_labview
-from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
+from toolkit.recording.marks import COPY, GENERATOR, OWN_OUTPUT
 from toolkit.recording.read import read_recording
+from toolkit.reduction.hub import with_load
+from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.staging import PASSING
 from toolkit.units import from_si, si_scale
 
@@ -40,12 +45,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.audit.archive import ArchiveAudit
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.standing import Standing
     from toolkit.recording.model import Recording
 
-INDEX = "corrected.json"
+_DISPUTED = "cells-disagree"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,6 +126,7 @@ def write_copies(
     """
     check_target(audit.archive, target)
     standings: dict[tuple[str, str], Standing] = {}
+    strays = _strays(audit)
     copies: list[Copy] = []
     with publication(target) as stage:
         for plain in audit.files.plain():
@@ -137,7 +144,8 @@ def write_copies(
                     known_at=audit.known_at,
                     named=key[0],
                 )
-            copies.append(_copy(audit.archive, plain, standings[key], stage, draft=draft))
+            why = _refusal(plain, strays)
+            copies.append(_copy(audit.archive, plain, standings[key], stage, draft=draft, refusal=why))
             step(plain["path"])
         manifest = {
             "generator": GENERATOR,
@@ -151,7 +159,47 @@ def write_copies(
     return tuple(copies)
 
 
-def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, stage: Path, *, draft: bool) -> Copy:
+def _strays(audit: ArchiveAudit) -> dict[str, str]:
+    """Return the files that would lie off the curve of their test if they were corrected: path to message."""
+    places: dict[str, list[int]] = {}
+    tests: set[str] = set()
+    for place, line in enumerate(audit.files.plain()):
+        places.setdefault(test_of(line), []).append(place)
+        if line["repair"] is not None and line["grade"] not in CLEAN:
+            tests.add(test_of(line))
+    found: dict[str, str] = {}
+    for test in sorted(tests):
+        found |= off_the_curve([audit.files.line(place) for place in places[test]])
+    return found
+
+
+def _refusal(plain: Mapping[str, Any], strays: Mapping[str, str]) -> str | None:
+    """Return why a file must not be corrected by its cells, None where nothing speaks against it."""
+    if disputed(plain):
+        return f"{_DISPUTED}: {statement(Sides(**plain['sides']), plain['variant'])}"
+    stray = strays.get(plain["path"])
+    return None if stray is None else f"stray-file: corrected, {stray}"
+
+
+def _check_steps(
+    recording: Recording, new: Mapping[str, NDArray[np.float64]], context: Context, record: CalibrationRecord
+) -> str | None:
+    """Return why corrected values contradict themselves: they step where the recorded ones go on."""
+    loaded = with_load(recording, machine=context.machine, record=record)
+    blocks = () if context.is_tare else split_blocks(loaded, context.machine)[0]
+    after = step_findings(loaded, new, blocks, recording.name, level="error")
+    return f"discontinuity: corrected, {after[0].message}" if after else None
+
+
+def _copy(
+    archive: Path,
+    plain: Mapping[str, Any],
+    standing: Standing,
+    stage: Path,
+    *,
+    draft: bool,
+    refusal: str | None,
+) -> Copy:
     record = standing.record
     path, place = archive / plain["path"], stage / plain["path"]
     failed: str | None = None
@@ -162,11 +210,13 @@ def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, stage: Pa
         context = context_of(path)
         data = read_input(path, RECORDING_FILE)
         recording = read_recording(path, context.machine, data=data)
+        new = recompute(columns_of(recording), record)
         if recording.sha256 != plain["sha256"]:
             failed = "the file changed since it was audited"
         else:
-            columns = columns_of(recording)
-            _write(place, recording, data, recompute(columns, record), use)
+            failed = refusal or _check_steps(recording, new, context, record)
+        if failed is None:
+            _write(place, recording, data, new, use)
             sha256 = sha256_file(place)
             _keep_test(path, archive, stage)
     except OutputError:
@@ -196,7 +246,7 @@ def _write(
         columns_in_file = {column.symbol: column.values.tolist() for column in _replaced(recording, new)}
         place.write_bytes(with_numbers(data, columns_in_file, recording.machine, where=recording.path))
         return
-    title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
+    title = f"{COPY} {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
     title += f"; {use.mark}" if use.mark else ""
     if recording.format in WRITERS:
         place.write_bytes(WRITERS[recording.format](_copied_columns(recording, new), title))

@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING
 
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
-from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, columns_of
+from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, Which, columns_of
 from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.screen import Screen, Signature, layout, screen_of
+from toolkit.audit.sides import statement
+from toolkit.audit.weigh import steps, weighed
 from toolkit.calibration.registry.clock import in_future
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
@@ -102,6 +104,12 @@ class Inspection:
     unverified: bool = False
 
 
+_NOT_BY_THESE_CELLS: dict[Which, str] = {
+    "cells": "the cells were changed; Fy and Mz as the file has them are right",
+    "open": "the cells disagree with Fy and Mz, and nothing says which side is wrong",
+}
+
+
 def choose(
     registry: Registry,
     instrument: str,
@@ -183,12 +191,23 @@ def inspect_file(
     if not context.is_tare:
         split_blocks(loaded_recording, context.machine)  # refuses a file that holds no load at all
     identification, corrected, why = None, None, None
+    stepping: tuple[Finding, ...] = ()
     if choice is not None:
         if columns.loads:
             identification = identify_columns(
                 columns, choice.records, on=context.date, in_force=choice.in_force, void=choice.void
             )
+            blocks_of_rows = () if context.is_tare else split_blocks(loaded_recording, context.machine)[0]
+            fits = corrector is not None and _uncorrected(context, columns, choice, corrector) is None
+            new = recompute(columns, corrector) if corrector is not None and fits else None
+            identification = weighed(
+                identification, loaded_recording, columns, blocks_of_rows, choice.records, new, corrector
+            )
+            stepping = steps(loaded_recording, columns, blocks_of_rows, path.name)
         why = _uncorrected(context, columns, choice, corrector)
+        if identification is not None and identification.sides is not None and why is None:
+            side = identification.sides.side
+            why = None if side == "forces" else _NOT_BY_THESE_CELLS[side]
         corrected = recompute(columns, corrector) if corrector is not None and why is None else None
     first, *blocks = _blocks(loaded_recording, corrected)
     loaded = [block for block in blocks if not block.tare] or blocks
@@ -207,6 +226,7 @@ def inspect_file(
         findings=(
             *_impossible(path, recording, blocks, corrector),
             *_findings(path, identification, choice),
+            *stepping,
             *_of_context(path, context, why),
             *_of_channels(loaded_recording, path, context, corrector),
             *hidden_findings(recording.hidden, path.name),
@@ -360,6 +380,8 @@ def _findings(
             else ""
         )
         text = f"Fy and Mz were computed {TELLS[identification.grade]}{who}"
+        if identification.sides is not None and identification.sides.side != "forces":
+            text = statement(identification.sides, identification.variant)
         findings.append(Finding(rule=f"identified-{identification.grade}", where=where, message=text))
     return tuple(findings)
 

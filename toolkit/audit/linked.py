@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.audit.model import CLEAN
+from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
+from toolkit.audit.sides import disputed
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.files import check_keys, parse_json, real_path
 from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
@@ -36,8 +37,8 @@ _SHA = re.compile(r"[0-9a-fA-F]{64}")
 class PastReport:
     """A report and what it says of its origin; ``words`` are those in which a test's name may stand.
 
-    ``id`` is that of its manifest; ``tests``, ``files``, ``not_clean`` and ``in_force``, the records in force
-    on the days of its tests, are filled when it is linked.
+    ``id`` is that of its manifest; ``tests``, ``files``, ``not_clean``, ``disputed`` and ``in_force``, the
+    records in force on the days of its tests, are filled when it is linked.
     """
 
     report: str
@@ -51,6 +52,7 @@ class PastReport:
     tests: set[str] = field(default_factory=set)
     files: int = 0
     not_clean: int = 0
+    disputed: int = 0
     in_force: set[str] = field(default_factory=set)
 
     def as_dict(self) -> dict[str, Any]:
@@ -63,6 +65,7 @@ class PastReport:
             "tests": sorted(self.tests),
             "files": self.files,
             "not_clean": self.not_clean,
+            "disputed": self.disputed,
             "in_force": sorted(self.in_force),
             "to_amend": self.to_amend,
         }
@@ -111,14 +114,14 @@ def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
     for report in reports:
         for sha256 in report.hashes:
             by_hash.setdefault(sha256, []).append(report)
-    tests: dict[str, tuple[int, int]] = {}
+    tests: dict[str, tuple[int, int, int]] = {}
     in_force: dict[str, set[str]] = {}
     for plain in audit.files.plain():
         test = plain["test"]
-        dirty = plain["grade"] not in CLEAN
+        dirty = plain["grade"] not in CLEAN and not disputed(plain)
         if test is not None:
-            n, bad = tests.get(test, (0, 0))
-            tests[test] = (n + 1, bad + dirty)
+            n, bad, open_files = tests.get(test, (0, 0, 0))
+            tests[test] = (n + 1, bad + dirty, open_files + disputed(plain))
             in_force.setdefault(test, set()).update({plain["in_force"]} - {None})
         for same_report in by_hash.get(plain["sha256"] or "", ()):
             same_report.linked_by.add("sha256" if same_report.id is None else "manifest")
@@ -127,6 +130,7 @@ def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
             else:
                 same_report.files += 1
                 same_report.not_clean += dirty
+                same_report.disputed += disputed(plain)
     names: dict[str, list[str]] = {}
     for test in tests:
         names.setdefault(_words(_last(test, audit.archive)), []).append(test)
@@ -137,6 +141,7 @@ def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
         for test in report.tests:
             report.files += tests[test][0]
             report.not_clean += tests[test][1]
+            report.disputed += tests[test][2]
             report.in_force |= in_force[test]
     with_report = {test for report in reports for test in report.tests}
     return Linked(reports=reports, unknown=tuple(sorted(set(tests) - with_report)))
@@ -147,7 +152,9 @@ def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tup
     if all(report.path is None for report in reports):
         return reports
     archive = real_path(audit.archive)
-    recordings = {archive / plain["path"] for plain in audit.files.plain() if plain["grade"] != "unreadable"}
+    recordings = {
+        archive / plain["path"] for plain in audit.files.plain() if plain["grade"] not in NOT_IDENTIFIED
+    }
     return tuple(report for report in reports if report.path is None or report.path not in recordings)
 
 

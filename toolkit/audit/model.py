@@ -18,9 +18,13 @@ if TYPE_CHECKING:
 
 
 LOADS = ("FY", "MZ")
+INDEX = "corrected.json"
+"""The index of a folder of corrected copies."""
 Grade = Literal[
+    "no_recording",
     "unreadable",
     "unknown",
+    "altered_cells",
     "ambiguous",
     "column_swap",
     "sign_variant",
@@ -35,10 +39,15 @@ GRADES: tuple[Grade, ...] = get_args(Grade)
 CLEAN: tuple[Grade, ...] = ("rounding", "exact")
 """The grades of a file whose FY and MZ are those of the record in force."""
 
+NOT_IDENTIFIED: tuple[Grade, ...] = ("no_recording", "unreadable")
+"""The grades of a file that holds nothing to identify."""
+
 TELLS: dict[Grade, str] = {
+    "no_recording": "is no recording",
     "unreadable": "cannot be read",
+    "altered_cells": "from other cells than those in the file: a cell column was changed",
     "unknown": "by no record of the registry, nor by a sign or column variant of one",
-    "ambiguous": "by one of several records or variants that this file cannot tell apart",
+    "ambiguous": "in one of several ways that this file cannot tell apart",
     "column_swap": "with load-cell columns exchanged",
     "sign_variant": "with a wrong sign",
     "stale": "by a record that was not the one in force",
@@ -138,6 +147,18 @@ class Skipped:
     reason: str
 
 
+Which = Literal["forces", "cells", "open"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sides:
+    """Which side of a disagreement is wrong, why, and the grade of the file if it is Fy and Mz."""
+
+    side: Which
+    reason: str
+    grade: Grade
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identification:
     """Which calibration computed a file.
@@ -145,7 +166,8 @@ class Identification:
     ``record`` and ``variant`` are those of the segment that decides the grade (None where there is none;
     ``variant`` None for a plain record). ``issued`` tells whether the record's issued digits fit, or only
     its full coefficients. ``in_force`` is the id of the record in force on the test's date, None without a
-    date or a record; then ``repair`` is None too.
+    date or a record; then ``repair`` is None too. ``sides`` says where rows disagree whether Fy and Mz or the
+    cells are wrong (`toolkit.audit.sides`); None where nothing disagrees.
     """
 
     grade: Grade
@@ -157,6 +179,7 @@ class Identification:
     in_force: str | None
     repair: Repair | None
     skipped: tuple[Skipped, ...] = ()
+    sides: Sides | None = None
 
 
 def worst(grades: tuple[Grade, ...]) -> Grade:

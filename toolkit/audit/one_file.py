@@ -7,7 +7,7 @@ import functools
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -18,20 +18,22 @@ from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.inspection import Choices
-from toolkit.audit.model import Grade, Identification, columns_of
+from toolkit.audit.model import INDEX, Grade, Identification, columns_of
 from toolkit.audit.quality import impossible, inclinations
+from toolkit.audit.structure import structure_findings
+from toolkit.audit.weigh import steps, weighed
 from toolkit.calibration.registry.clock import in_future
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.errors import ToolkitError
-from toolkit.files import read_toml, sha256_bytes, sha256_file
+from toolkit.files import parse_json, read_toml, sha256_bytes, sha256_file
 from toolkit.findings import Finding
 from toolkit.inputs import RECORDING_FILE, limit_of, read_regular
 from toolkit.machine import load_machine
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.hidden import hidden_findings
-from toolkit.recording.marks import machine_in, own_output
+from toolkit.recording.marks import is_corrected_copy, machine_in, own_output
 from toolkit.recording.read import read_recording
 from toolkit.reduction.health import quality, tare_finding, tare_under_load
 from toolkit.reduction.hub import with_load
@@ -150,7 +152,34 @@ class FileAudit:
     @property
     def grade(self) -> Grade:
         """The file's grade."""
-        return "unreadable" if self.identification is None else self.identification.grade
+        if self.identification is not None:
+            return self.identification.grade
+        return "no_recording" if (self.reason or "").startswith(f"{NO_RECORDING}:") else "unreadable"
+
+
+NO_RECORDING = "no-recording"
+_LOCKS = ("~$", ".~lock.", "._")
+_BESIDE = (".ds_store", "thumbs.db", "desktop.ini")
+_PROSE = (".txt", ".md", ".log", ".doc", ".docx", ".odt", ".rtf", ".pdf", ".ini", ".html", ".htm", ".msg",
+          ".eml", ".png", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".bmp", ".ppt", ".pptx")  # fmt: skip
+_NO_TABLE = ("unreadable", "missing-column", "unknown-column", "unknown-unit", "no-data", "not-a-workbook",
+             "ambiguous-text", "encoding")  # fmt: skip
+
+
+def beside_recordings(name: str, rule: str | None) -> bool:
+    """Tell whether a file that is refused by a rule is none that anybody would take for a recording.
+
+    Lock files of office programs, and notes, letters and pictures that hold no table of the machine.
+
+    >>> beside_recordings("test/~$FM_run_1.xlsx", "not-a-workbook")
+    True
+    >>> beside_recordings("test/notes.txt", "missing-column"), beside_recordings("a.xlsx", "no-data")
+    (True, False)
+    """
+    plain = name.rpartition("/")[2].casefold()
+    if plain.startswith(_LOCKS) or plain in _BESIDE:
+        return True
+    return plain.endswith(_PROSE) and (rule or "unreadable") in _NO_TABLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,6 +199,7 @@ class Auditor:
         self._toml = functools.lru_cache(maxsize=64)(read_toml)
         nearest = functools.lru_cache(maxsize=64)(nearest_test_toml)
         self._test = functools.lru_cache(maxsize=64)(self._folder_of)
+        self._copies = functools.lru_cache(maxsize=256)(_copies_of)
         self._find = lambda path: nearest(path.parent)  # what is no folder holds no test.toml
 
     def __call__(self, name: str) -> FileAudit | OwnOutput:
@@ -199,6 +229,8 @@ class Auditor:
             reason = f"{error.rule or 'unreadable'}: {error.what}" + (
                 f", got {error.got}" if error.got else ""
             )
+            if beside_recordings(name, error.rule):
+                reason, trouble = f"{NO_RECORDING}: {error.what}", None
             return unreadable(name, reason, sha256=sha256, size=size, context=trouble)
         columns = columns_of(recording)
         instrument = context.machine.name
@@ -215,6 +247,7 @@ class Auditor:
             screen=screen,
             new=new,
         )
+        identification = weighed(identification, loaded, columns, blocks, choice.records, new, in_force)
         table: Mapping[str, Any] = {} if context.test_toml is None else self._toml(context.test_toml)
         rotation = self._rotation(path, context, table)
         reversal = table.get("reversal")
@@ -246,6 +279,11 @@ class Auditor:
                 *_impossible(name, recording, changed, in_force.id if in_force is not None else None),
                 *quality(recording, name),
                 *_tare(loaded, context, name),
+                *steps(loaded, columns, blocks, name),
+                *structure_findings(
+                    [asdict(change) for change in changed], context.machine.protocol.load_tolerance, name
+                ),
+                *self._copied(path, data or b"", recording.sha256, name),
                 *hidden_findings(recording.hidden, name),
             ),
         )
@@ -266,6 +304,15 @@ class Auditor:
             )
             return Context(machine=machine, machine_source=source, date=None, test_toml=None), trouble
 
+    def _copied(self, path: Path, data: bytes, sha256: str, name: str) -> tuple[Finding, ...]:
+        if not is_corrected_copy(data) and not any(sha256 in self._copies(up) for up in path.parents):
+            return ()
+        message = (
+            "a corrected copy: its Fy and Mz were computed from the cells beside them, so that they agree "
+            "proves nothing of the cells"
+        )
+        return (Finding(rule="corrected-copy", where=name, message=message, level="note"),)
+
     def _folder_of(self, toml: Path) -> str:
         try:
             return toml.parent.relative_to(self._root).as_posix()
@@ -281,6 +328,15 @@ class Auditor:
             inside = absolute.relative_to(context.test_toml.parent).as_posix()
             rotation_entry = exceptions.get(inside, exceptions.get(path.name, rotation_entry))
         return cast("Rotation", rotation_entry) if rotation_entry in ROTATIONS else "forward"
+
+
+def _copies_of(folder: Path) -> frozenset[str]:
+    # The hashes that the index of corrected copies in a folder names (`toolkit.audit.corrected`).
+    try:
+        index = parse_json(read_regular(folder / INDEX, RECORDING_FILE))
+        return frozenset(str(entry["sha256"]) for entry in index["files"] if entry["sha256"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return frozenset()
 
 
 def _tare(recording: Recording, context: Context, name: str) -> tuple[Finding, ...]:

@@ -17,15 +17,17 @@ import tempfile
 import tomllib
 import weakref
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, overload
 
+from toolkit.audit.model import Sides
 from toolkit.audit.one_file import FileAudit, OwnOutput
 from toolkit.audit.serial import SHAPE, from_plain, to_plain
+from toolkit.audit.sides import grade_of
 from toolkit.errors import OutputError
 from toolkit.files import sha256_bytes, sha256_file
 from toolkit.inputs import SETTINGS_FILE, open_regular_to_append, raised_to, read_regular
@@ -64,7 +66,16 @@ class Files(Sequence[FileAudit]):
 
     def __init__(self, file: IO[bytes], places: Sequence[int]) -> None:
         self._file, self._places = file, places
+        self._sides: dict[str, Sides] = {}
         weakref.finalize(self, file.close)
+
+    def decide(self, sides: Mapping[str, Sides]) -> None:
+        """Take what the other files of a test say of files that their own rows leave open, by path."""
+        self._sides.update(sides)
+
+    def line(self, index: int) -> dict[str, Any]:
+        """Return one result under the keys of the answer."""
+        return self._plain(self._places[index])
 
     def __len__(self) -> int:
         return len(self._places)
@@ -97,10 +108,15 @@ class Files(Sequence[FileAudit]):
 
     def raw(self) -> Iterator[bytes]:
         """Yield what `plain` yields as JSON in ASCII."""
+        if self._sides:
+            return (json.dumps(line).encode() for line in self.plain())
         return (self._raw(place) for place in self._places)
 
     def _plain(self, place: int) -> dict[str, Any]:
         line: dict[str, Any] = json.loads(self._raw(place))
+        sides = self._sides.get(line["path"])
+        if sides is not None:
+            line |= {"grade": grade_of(sides), "sides": asdict(sides)}
         return line
 
     def _raw(self, place: int) -> bytes:

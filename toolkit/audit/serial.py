@@ -12,7 +12,7 @@ from typing import Any
 
 from toolkit.audit.archive_findings import noted
 from toolkit.audit.estimate import Coefficient, Equation, Estimate, Nearest
-from toolkit.audit.model import Identification, Repair, Segment, Skipped
+from toolkit.audit.model import NOT_IDENTIFIED, Identification, Repair, Segment, Sides, Skipped
 from toolkit.audit.one_file import Change, FileAudit
 from toolkit.errors import OutputError
 from toolkit.publication import publication
@@ -20,7 +20,7 @@ from toolkit.recording.extras import needed
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, refuse_original
 
 _CHANGE = tuple(field.name for field in fields(Change))
-SHAPE = 5
+SHAPE = 6
 """Of what is written here; results of another one are not used again."""
 SUFFIX = ".parquet"
 _BATCH = 1024  # rows that are held at once
@@ -49,6 +49,9 @@ def to_plain(file_audit: FileAudit) -> dict[str, Any]:
         "segments": []
         if identification is None
         else [asdict(part) | {"candidates": list(part.candidates)} for part in identification.segments],
+        "sides": None
+        if identification is None or identification.sides is None
+        else asdict(identification.sides),
         "in_force": None if identification is None else identification.in_force,
         "repair": None if repair is None else asdict(repair),
         "conditions": [_change(change) for change in file_audit.changes],
@@ -79,7 +82,7 @@ def from_plain(plain: Mapping[str, Any]) -> FileAudit:
         instrument=plain["instrument"],
         date=_date(plain["date"]),
         rows=plain["rows"],
-        identification=None if plain["grade"] == "unreadable" else _identification(plain),
+        identification=None if plain["grade"] in NOT_IDENTIFIED else _identification(plain),
         reason=plain["reason"],
         context=plain["test_toml"],
         test=plain["test"],
@@ -163,6 +166,7 @@ def _identification(plain: Mapping[str, Any]) -> Identification:
         in_force=plain["in_force"],
         repair=None if repair is None else Repair(**repair),
         skipped=tuple(Skipped(**skipped) for skipped in plain["skipped"]),
+        sides=None if plain["sides"] is None else Sides(**plain["sides"]),
     )
 
 
@@ -244,12 +248,13 @@ def _schema(pa: Any, *, reports: bool) -> Any:
                 "coefficients": pa.map_(text, pa.struct(coefficient))}  # fmt: skip
     estimate = {"first_row": integer, "last_row": integer, "equations": pa.map_(text, pa.struct(equation)),
                 "nearest": pa.struct({"record": text, **change})}  # fmt: skip
+    sides = pa.struct(dict.fromkeys(("side", "reason", "grade"), text))
     columns = {
         "path": text, "sha256": text, "size": integer, "instrument": text, "date": pa.date32(), "test": text,
         "rotation": text, "to_SAE": pa.map_(text, pa.int8()), "own_protocol": truth, "rows": integer,
         "grade": text, "record": text, "variant": text, "issued": truth, "candidates": pa.list_(text),
         "segments": pa.list_(pa.struct(segment)), "in_force": text, "repair": pa.struct(change),
-        "conditions": pa.list_(pa.struct(condition)), "estimate": pa.struct(estimate),
+        "sides": sides, "conditions": pa.list_(pa.struct(condition)), "estimate": pa.struct(estimate),
         "skipped": pa.list_(pa.struct({"id": text, "reason": text})), "reason": text, "test_toml": text,
         "units": pa.map_(text, text), "values_sha256": text, "modified": pa.date32(),
         "notes": pa.list_(pa.struct({"rule": text, "message": text})),

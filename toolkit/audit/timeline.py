@@ -13,6 +13,7 @@ from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
 from toolkit.audit.inspection import Choices
 from toolkit.audit.model import CLEAN, columns_of
+from toolkit.audit.sides import disputed
 from toolkit.errors import ToolkitError
 from toolkit.recording.read import read_recording
 
@@ -120,6 +121,7 @@ def worst_files(audit: ArchiveAudit, count: int) -> list[dict[str, Any]]:
         if plain["repair"] is not None
         and plain["repair"]["FY_max_abs_N"] is not None
         and plain["grade"] not in CLEAN
+        and not disputed(plain)
     )
     return [plain for _, _, plain in heapq.nlargest(count, bad)]
 

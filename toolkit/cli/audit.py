@@ -48,8 +48,10 @@ def command(
 ) -> int:
     """Tell for every file of an archive which calibration computed its Fy and Mz.
 
-    Each file has a grade (exact, rounding, stale, sign_variant, column_swap, ambiguous, unknown, undated,
-    unreadable) and a repair: the largest change of FY and MZ by the record in force on the test's date.
+    Each file has a grade (exact, rounding, stale, sign_variant, column_swap, altered_cells, ambiguous,
+    unknown, undated, unreadable, no_recording) and a repair: the largest change of FY and MZ by the record
+    in force on the test's date. Where Fy and Mz disagree with the cells, both sides are judged: changed
+    cells are altered_cells, what nothing decides is ambiguous, and neither is ever repaired.
     With --out the folder also gets audit.html, a page that opens without a network, and audit.jsonl.
 
     Example: toolkit audit archive --workers 2 --out audit-2026 --json

@@ -148,19 +148,25 @@ def one_line(text: object) -> str:
 
 
 def table(
-    header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "", width: int | None = None
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    align: str = "",
+    width: int | None = None,
+    whole: Sequence[int] = (),
 ) -> str:
     """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``.
 
     With a ``width`` [characters] the longest texts lose their middle until a line fits; numbers stay whole,
-    and texts that differ still do: a line is longer where it must be.
+    and texts that differ still do: a line is longer where it must be. Columns that are ``whole`` lose
+    nothing.
     """
     if not rows:
         return ""
     align = align or "<" + ">" * (len(header) - 1)
     rows = [[one_line(cell) for cell in row] for row in rows]
     if width is not None:
-        rows = _shortened(header, [list(row) for row in rows], align, width)
+        rows = _shortened(header, [list(row) for row in rows], align, width, whole)
     widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
     lines = [
         "  ".join(
@@ -172,13 +178,13 @@ def table(
 
 
 def _shortened(
-    header: Sequence[str], rows: Sequence[Sequence[str]], align: str, width: int
+    header: Sequence[str], rows: Sequence[Sequence[str]], align: str, width: int, whole: Sequence[int]
 ) -> list[Sequence[str]]:
     columns = list(zip(*rows, strict=True))
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
     least = [
-        max(len(title), _told_apart(set(column))) if side == "<" else size
-        for title, column, side, size in zip(header, columns, align, widths, strict=True)
+        max(len(title), _told_apart(set(column))) if side == "<" and place not in whole else size
+        for place, (title, column, side, size) in enumerate(zip(header, columns, align, widths, strict=True))
     ]
     while sum(widths) + 2 * (len(widths) - 1) > width:
         room = [

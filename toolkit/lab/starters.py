@@ -193,7 +193,7 @@ def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
     def is_name(text: str, whole: str = "") -> bool:
         return text != whole and bool(re.match(r"\s*[^\W\d]", text))
 
-    cells = read_cells(read_input(recording, RECORDING_FILE), is_name, where=recording)
+    cells = read_cells(read_input(recording, RECORDING_FILE), is_name, where=recording, grouped=True)
     if not any(map(is_name, cells.header)):
         raise RecordingError(
             "the file has no header", where=recording, got=f"a first row {', '.join(cells.header[:3])}, ...",

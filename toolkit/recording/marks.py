@@ -170,6 +170,15 @@ def own_output(data: bytes) -> bool:
     return OWN_OUTPUT.encode() in data[:_HEAD]
 
 
+COPY = "corrected copy of"
+"""With these words the title of a corrected copy begins (`toolkit.audit.corrected`)."""
+
+
+def is_corrected_copy(data: bytes) -> bool:
+    """Tell by its title whether a workbook is a recording whose Fy and Mz the toolkit computed."""
+    return f">{COPY} ".encode() in _core(data)
+
+
 def _content(path: Path) -> bytes:
     try:
         return read_regular(path, RECORDING_FILE)
@@ -178,12 +187,16 @@ def _content(path: Path) -> bytes:
 
 
 def _core_keywords(data: bytes) -> tuple[str, ...]:
+    return keywords_of(_core(data))
+
+
+def _core(data: bytes) -> bytes:
     from toolkit.errors import UnreadableError
 
     if sniff(data).id != "zip":
-        return ()
+        return b""
     try:
         parts = read_members(data, where=None, only=("docProps/core.xml",))
     except UnreadableError:
-        return ()
-    return keywords_of(parts.get("docProps/core.xml", b""))
+        return b""
+    return parts.get("docProps/core.xml", b"")

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _NUMBERS = frozenset((float, int))
 _EMPTY = ("", None)
+_HEADER_ROWS = 50  # rows at the top in which a header is looked for
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +50,8 @@ class Table:
     def hidden_data(self) -> tuple[int, ...]:
         """The hidden rows below the header that hold anything."""
         above = len(self.rows)
-        first = next((i for i, row in enumerate(self.rows) if not _blank(row)), above)
+        at = header_row(self.rows)
+        first = above if at is None else at
         below = above + (0 if self.numbers is None else len(self.numbers))
         return tuple(
             row
@@ -58,8 +60,34 @@ class Table:
         )
 
 
+def header_row(rows: Sequence[Sequence[Any]]) -> int | None:
+    """Return the index of the header row of a sheet; None where nothing is filled.
+
+    It is the first row that is not empty. A row of groups or a title above it, as LabVIEW and people write
+    them, fills fewer cells: of the rows of text that stand at the top, the first with the most texts counts.
+
+    >>> header_row([["", ""], ["Cells", ""], ["D51 [lbf]", "FZ [N]"], [1.0, 2.0]])
+    2
+    >>> header_row([["D51", "FZ"], ["lbf", "N"], [1.0, 2.0]]), header_row([["", None]])
+    (0, None)
+    """
+    best: int | None = None
+    most = 0
+    for index, row in enumerate(rows[:_HEADER_ROWS]):
+        if _blank(row):
+            continue
+        texts = sum(isinstance(cell, str) and bool(cell.strip()) for cell in row)
+        if best is not None and texts < sum(cell not in _EMPTY for cell in row):
+            break  # the first number: the header is above it
+        if best is None or texts > most:
+            best, most = index, texts
+    if best is None:
+        return next((index for index, row in enumerate(rows) if not _blank(row)), None)
+    return best
+
+
 def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
-    """Return the table's columns: the first row that is not empty is the header, the rest are numbers.
+    """Return the table's columns: its header row (`header_row`), and numbers below it.
 
     Raises
     ------
@@ -71,22 +99,22 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     UnreadableError
         rule ``no-data``: there is no header or no row of data
     """
-    first = next((i for i, row in enumerate(table.rows) if not _blank(row)), None)
+    first = header_row(table.rows)
     if table.numbers is not None and (first != len(table.rows) - 1 or _nameless(table.rows[-1])):
         table = table.in_rows()  # a row of numbers above them, or a column to be told with its first cell
     if first is None:
         _no_data(table, "an empty sheet")
-    header_row = table.rows[first]
-    if all(not isinstance(cell, str) for cell in header_row if cell not in _EMPTY):
+    head = table.rows[first]
+    if all(not isinstance(cell, str) for cell in head if cell not in _EMPTY):
         raise ColumnError(
             "the recording has no header row",
             where=f"{table.where}, row {first + 1}",
-            got=", ".join(str(cell) for cell in header_row)[:200],
+            got=", ".join(str(cell) for cell in head)[:200],
             expected=", ".join(repr(column.header) for column in machine.columns),
             next_step="add the header row",
             rule="missing-column",
         )
-    headers = [cell if isinstance(cell, str) else "" if cell is None else str(cell) for cell in header_row]
+    headers = [cell if isinstance(cell, str) else "" if cell is None else str(cell) for cell in head]
     assigned = assign_columns(headers, machine, where=f"{table.where}, row {first + 1}")
     last = len(table.rows)
     while last > first + 1 and _blank(table.rows[last - 1]):

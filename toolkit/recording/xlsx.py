@@ -16,7 +16,7 @@ from toolkit.recording.archive import stored_archive
 from toolkit.recording.cells import error_cells
 from toolkit.recording.hidden import hidden_rows
 from toolkit.recording.safe_open import Gated
-from toolkit.recording.table import Table
+from toolkit.recording.table import Table, header_row
 
 _MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 _ID = "{http://schemas.openxmlformats.org/officeDocument/2006/relationships}id"
@@ -29,8 +29,9 @@ _STRICT_ID = "{http://purl.oclc.org/ooxml/officeDocument/relationships}id"
 def read_sheet(gated: Gated, is_header: Callable[[str], bool], *, grids: bool = True) -> tuple[str, Table]:
     """Return the name and the cells of the one visible worksheet that holds the data.
 
-    Hidden worksheets are never read. With several visible ones, it is the one whose first row has a
-    header that is ``known``. ``grids=False`` has python-calamine read every cell, with the same result.
+    Hidden worksheets are never read. With several visible ones, it is the one whose header row has a header
+    that is ``known``, and numbers below it.
+    ``grids=False`` has python-calamine read every cell, with the same result.
 
     Raises
     ------
@@ -57,7 +58,9 @@ def read_sheet(gated: Gated, is_header: Callable[[str], bool], *, grids: bool = 
             next_step="repeat the recording; hidden worksheets are not read",
             rule="no-data",
         )
-    fitting = [sheet for sheet in filled if any(map(is_header, _first(sheet[1].rows)))] or filled[:1]
+    with_header = [sheet for sheet in filled if any(map(is_header, _headers(sheet[1].rows)))]
+    # A sheet of titles and remarks may have what reads as a header; a recording has numbers below it.
+    fitting = [sheet for sheet in with_header if _has_numbers(sheet[1])] or with_header[:1] or filled[:1]
     if len(fitting) > 1:
         raise RecordingError(
             "more than one worksheet looks like a recording",
@@ -149,14 +152,15 @@ def _refuse(gated: Gated, name: str, errors: tuple[tuple[str, str], ...], error:
     ) from (error if isinstance(error, Exception) else None)
 
 
-def _first(rows: Sequence[Sequence[Any]]) -> list[str]:
-    for row in rows:
-        texts = [cell for cell in row if isinstance(cell, str) and cell.strip()]
-        if texts:
-            return texts
-        if any(cell not in ("", None) for cell in row):
-            break
-    return []
+def _headers(rows: Sequence[Sequence[Any]]) -> list[str]:
+    at = header_row(rows)
+    return [] if at is None else [cell for cell in rows[at] if isinstance(cell, str) and cell.strip()]
+
+
+def _has_numbers(table: Table) -> bool:
+    at = header_row(table.rows)
+    below = [] if at is None else table.rows[at + 1 :]
+    return table.numbers is not None or any(type(cell) in (int, float) for row in below for cell in row)
 
 
 def _errors_by_sheet(members: Mapping[str, bytes]) -> dict[str, tuple[tuple[str, str], ...]]:

@@ -9,16 +9,39 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from toolkit.reduction.model import Condition
+    from toolkit.channels import Rotation
 
 # Rests at no step of the protocol are at two slip angles where they are further apart than half a degree.
 _GAP_RAD = float(np.radians(0.5))
+
+
+class OnCurve(Protocol):
+    """A load block as a point of its test's curves: what `toolkit.reduction.model.Condition` says of it."""
+
+    @property
+    def file(self) -> str: ...  # noqa: D102
+    @property
+    def rotation(self) -> Rotation: ...  # noqa: D102
+    @property
+    def first_row(self) -> int: ...  # noqa: D102
+    @property
+    def step_SA(self) -> float | None: ...  # noqa: D102
+    @property
+    def step_FZ(self) -> float | None: ...  # noqa: D102
+    @property
+    def SA(self) -> float: ...  # noqa: D102
+    @property
+    def FZ(self) -> float: ...  # noqa: D102
+    @property
+    def FY(self) -> float: ...  # noqa: D102
+    @property
+    def MZ(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +52,7 @@ class Slope:
     u: float
 
 
-def at_one_angle(conditions: Sequence[Condition]) -> tuple[tuple[int, ...], ...]:
+def at_one_angle(conditions: Sequence[OnCurve]) -> tuple[tuple[int, ...], ...]:
     """Return the groups of conditions whose loads are neighbours: indices, one group a file and slip angle.
 
     A file of one slip angle is one group. A continuous recording has several: its rests are told apart by

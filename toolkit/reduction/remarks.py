@@ -191,9 +191,10 @@ def acquired_findings(files: Sequence[OpenedFile], record: CalibrationRecord) ->
         Finding(
             rule="acquired-differs",
             where=_first_names(list(dict.fromkeys(d.file for d in wrong))),
-            message=f"FY and MZ in the file were not computed by {record.id}: they differ by up to "
-            f"{in_both(largest['FY'], 'N', '.1f')} and {in_both(largest['MZ'], 'N*m', '.2f')}; the values "
-            "here are recomputed from the cells (toolkit inspect tells which calibration wrote them)",
+            message=f"FY and MZ in the file are not what {record.id} gives of its cells: they differ by "
+            f"up to {in_both(largest['FY'], 'N', '.1f')} and {in_both(largest['MZ'], 'N*m', '.2f')}; the "
+            "values here are recomputed from the cells, and wrong where a cell was changed (inspect tells "
+            "which side is wrong)",
         )
     ]
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.findings import Finding
-from toolkit.reduction.common_load import at_one_angle
+from toolkit.reduction.common_load import OnCurve, at_one_angle
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_UNITS = {"FY": "N", "MZ": "N*m"}
 _FAR = 10.0  # times what the other files leave; healthy tests stay under 5. And
 _LARGE = {"FY": 0.06, "MZ": 0.15}  # of the largest force or moment over load
 _ORDER, _LOAD_ORDER = 5, 2
@@ -54,20 +55,30 @@ def stray_findings(conditions: Sequence[Condition]) -> list[Finding]:
     """Return the files whose force or moment lies far off what all the other files of the test say."""
     used = [c for c in conditions if c.used and c.step_FZ is not None and c.FZ > 0]
     findings: dict[str, Finding] = {}
-    for channel, unit in (("FY", "N"), ("MZ", "N*m")):
-        for stray in _strays(used, channel):
-            condition = used[stray.worst]
-            angle = float(from_si(condition.SA, "deg"))
-            message = (
-                f"{channel} lies off the curve that the other files make: {getattr(condition, channel):.4g} "
-                f"{unit} at {angle:+.2f} deg and {condition.FZ:.0f} N where they give {stray.expected:.4g} "
-                f"{unit}; that is {stray.times:.0f} times what they leave of each other"
-            )
-            findings.setdefault(
-                condition.file,
-                Finding(rule="stray-file", where=condition.file, message=message, level="error"),
-            )
+    for channel in _UNITS:
+        for file, message in off_curve(used, channel).items():
+            finding = Finding(rule="stray-file", where=file, message=message, level="error")
+            findings.setdefault(file, finding)
     return list(findings.values())
+
+
+def off_curve(points: Sequence[OnCurve], channel: str) -> dict[str, str]:
+    """Return the files whose ``FY`` or ``MZ`` lies far off what all the others say, each with the message.
+
+    ``points`` are load blocks at a nominal load, with a positive FZ.
+    """
+    messages: dict[str, str] = {}
+    unit = _UNITS[channel]
+    for stray in _strays(points, channel):
+        point = points[stray.worst]
+        angle = float(from_si(point.SA, "deg"))
+        message = (
+            f"{channel} lies off the curve that the other files make: {getattr(point, channel):.4g} "
+            f"{unit} at {angle:+.2f} deg and {point.FZ:.0f} N where they give {stray.expected:.4g} "
+            f"{unit}; that is {stray.times:.0f} times what they leave of each other"
+        )
+        messages.setdefault(point.file, message)
+    return messages
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +102,7 @@ class _Miss:
     freed: float
 
 
-def _strays(used: Sequence[Condition], channel: str) -> list[_Stray]:
+def _strays(used: Sequence[OnCurve], channel: str) -> list[_Stray]:
     groups = [np.array(group) for group in at_one_angle(used)] if used else []
     if not groups:
         return []
@@ -171,7 +182,7 @@ class _Surface:
     turn: Array
 
     @staticmethod
-    def of(used: Sequence[Condition]) -> _Surface:
+    def of(used: Sequence[OnCurve]) -> _Surface:
         z = np.log([c.FZ for c in used])
         turn = np.array([-1.0 if c.rotation == "reverse" else 1.0 for c in used])
         return _Surface(
@@ -197,9 +208,11 @@ class _Surface:
     def tells(self, groups: Sequence[NDArray[np.intp]], *, without: int) -> bool:
         """Tell whether enough slip angles and conditions stay to foretell some groups by the others."""
         angles = self._angles(np.concatenate(groups)) - without
+        if angles < _FEWEST_ANGLES:
+            return False
         spare = sum(sorted(len(group) for group in groups)[: len(groups) - without]) - _SPARE
         columns = self._design(np.concatenate(groups), _SLOPES[0]).shape[1]
-        return angles >= _FEWEST_ANGLES and spare >= columns
+        return bool(spare >= columns)
 
     def slope(self, y: Array, groups: Sequence[NDArray[np.intp]]) -> float:
         """Return the k [1/rad] by which the groups foretell one another best."""

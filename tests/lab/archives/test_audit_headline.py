@@ -33,7 +33,8 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
     assert found.as_dict() == {
         "sentence": found.sentence, "files": 4, "wrong": 2, "FY_max_abs_N": 18885.7, "MZ_max_abs_Nm": 0.0,
         "causes": [{"cause": "E5 negative", "files": 2}], "from": "2014-03", "to": "2019-06", "unjudged": 0,
-        "unreadable": 0, "impossible": 0,
+        "unreadable": 0, "impossible": 0, "altered_cells": 0, "undecided": 0, "small": 0, "stepping": 0,
+        "corrected_copies": 0, "no_recording": 0,
     }  # fmt: skip
 
 

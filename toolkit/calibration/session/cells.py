@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.errors import RecordingError, SessionError
+from toolkit.recording.table import header_row
 
 FILES = "an .xlsx workbook, or a CSV file with commas, semicolons or tabs between the cells"
 
@@ -51,8 +52,10 @@ class Cells:
         return f"{self.where}, row {row} (cell {reference(line, column + 1)}), column {self.name(column)}"
 
 
-def read_cells(data: bytes, known: Callable[[str], bool], *, where: object) -> Cells:
+def read_cells(data: bytes, known: Callable[[str], bool], *, where: object, grouped: bool = False) -> Cells:
     """Read the cells of a data file; ``known`` tells whether a text is a header of the session.
+
+    ``grouped``: a workbook may have a row of groups or a title above its header, as a recording may.
 
     Raises
     ------
@@ -68,7 +71,9 @@ def read_cells(data: bytes, known: Callable[[str], bool], *, where: object) -> C
         gated = gate(Path(str(where)), data)
         if gated.kind not in ("xlsx", "text"):
             raise _foreign(where, f"a file of the kind {gated.kind}", "not-a-workbook")
-        return _sheet(gated, known) if gated.kind == "xlsx" else _text(gated.data, known, where)
+        return (
+            _sheet(gated, known, grouped=grouped) if gated.kind == "xlsx" else _text(gated.data, known, where)
+        )
     except RecordingError as error:
         if error.rule == "not-a-workbook":
             raise _foreign(where, error.got, error.rule) from error
@@ -113,7 +118,7 @@ def _text(data: bytes, known: Callable[[str], bool], where: object) -> Cells:
     return _cells(split_rows(text, separator, where=path), where=str(where), separator=separator)
 
 
-def _sheet(gated: Any, known: Callable[[str], bool]) -> Cells:
+def _sheet(gated: Any, known: Callable[[str], bool], *, grouped: bool) -> Cells:
     from toolkit.recording.xlsx import read_sheet
 
     _, table = read_sheet(gated, known)
@@ -124,15 +129,18 @@ def _sheet(gated: Any, known: Callable[[str], bool]) -> Cells:
             "cell", "correct the cell, or remove the whole row with a reason in the laboratory's notes",
         )  # fmt: skip
     merged = any(b"<mergeCell " in xml for xml in gated.members.values())
-    cells = _cells(table.in_rows().rows, where=table.where, separator="", merged=merged)
+    cells = _cells(table.in_rows().rows, where=table.where, separator="", merged=merged, grouped=grouped)
     return replace(cells, hidden=table.hidden_data)
 
 
-def _cells(rows: Sequence[Sequence[Any]], *, where: str, separator: str, merged: bool = False) -> Cells:
+def _cells(
+    rows: Sequence[Sequence[Any]], *, where: str, separator: str, merged: bool = False, grouped: bool = False
+) -> Cells:
     filled = [(line, row) for line, row in enumerate(rows, start=1) if not all(map(is_empty, row))]
     if not filled:
         raise _error("the file is empty", where, "no header", "a header with units, then rows", "no-data")
-    head, body = filled[0][1], filled[1:]
+    place = (header_row([row for _, row in filled]) or 0) if grouped else 0
+    head, body = filled[place][1], filled[place + 1 :]
     header = [" ".join(str("" if cell is None else cell).split()) for cell in head]
     for number, (line, row) in enumerate(body, start=1):
         if len(row) != len(header):

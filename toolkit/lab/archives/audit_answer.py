@@ -14,7 +14,13 @@ from toolkit.calibration.registry.standing import approved_after
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import ErrorEntry, one_line, table
 from toolkit.lab.archives.audit_headline import headline
-from toolkit.lab.tire_tests.inspection_answer import RefusedRecord, Repair, Segment, SkippedRecord
+from toolkit.lab.tire_tests.inspection_answer import (
+    DisagreeingSides,
+    RefusedRecord,
+    Repair,
+    Segment,
+    SkippedRecord,
+)
 
 if TYPE_CHECKING:
     import datetime as dt
@@ -49,6 +55,14 @@ Headline = TypedDict(
         "without_values": NotRequired[Annotated[int, "files that hold no Fy and no Mz of their own"]],
         "unreadable": int,
         "impossible": Annotated[int, "files besides the wrong ones with an Fy or Mz that no tire has"],
+        "altered_cells": Annotated[int, "files with right forces beside changed cells"],
+        "undecided": Annotated[int, "files of which nothing says whether forces or cells are wrong"],
+        "small": Annotated[
+            int, "files by another record that the one in force changes by less than is printed"
+        ],
+        "stepping": Annotated[int, "files with a force or cell that steps where nothing moved"],
+        "corrected_copies": Annotated[int, "files that a repair wrote: their agreement proves nothing"],
+        "no_recording": Annotated[int, "notes, lock files and the like"],
     },
 )
 Headline.__doc__ = "What an archive holds, in a sentence and in numbers."
@@ -95,6 +109,7 @@ class ArchivedFile(TypedDict):
     issued: Annotated[bool | None, "whether the coefficients were those of the certificate"]
     candidates: Annotated[list[str], "of an ambiguous file"]
     segments: list[Segment]
+    sides: Annotated[DisagreeingSides | None, "where rows disagree with their cells: which side is wrong"]
     in_force: Annotated[str | None, "the record in force on the date of the test"]
     repair: Repair | None
     conditions: list[ArchivedCondition]
@@ -153,6 +168,7 @@ class RestingReport(TypedDict):
     tests: list[str]
     files: int
     not_clean: int
+    disputed: Annotated[int, "files whose cells were changed, or may have been"]
     in_force: Annotated[list[str], "records in force on the days of its tests"]
     to_amend: bool
 
@@ -271,7 +287,7 @@ class AuditAnswer(TypedDict):
     timing: AuditTiming
 
 
-_SHOWN, _SETTINGS = 40, 10
+_SHOWN, _SETTINGS, _PATH = 40, 10, 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -346,12 +362,13 @@ def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
 
     audit = answer.made
     rows = list(_rows(audit))
-    bad = len(audit.files) - audit.grades["exact"] - audit.grades["rounding"]
+    bad = len(audit.files) - sum(audit.grades[grade] for grade in (*CLEAN, "no_recording"))
     lines = [*textwrap.wrap(headline(audit).sentence + ".", width), ""]
     lines += _table(rows, width) if rows else []
     if bad > len(rows):
         lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
     counted = ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count)
+    lines += _no_recordings(audit, width)
     lines += ["", f"{len(audit.files)} files: {counted or 'none'}; known at {audit.known_at.isoformat()}"]
     for name, day in answer.approved_later.items():
         lines += textwrap.wrap(f"{name}: {approved_after(day, audit.known_at)}", width)
@@ -380,11 +397,28 @@ def _table(rows: list[list[str]], width: int) -> list[str]:
     ]
     columns = [at for at, alone in enumerate(constant) if not alone]
     cells = [[row[at] for at in columns] for row in rows]
+    # A name that is cut can be neither read nor searched for; only the longest paths and reasons are.
+    longest = max(len(row[0]) for row in rows)
+    whole = {"grade", "computed by", "in force", *(["file"] if longest <= _PATH else [])}
     lines = [
-        table([header[at] for at in columns], cells, align="".join(align[at] for at in columns), width=width)
+        table(
+            [header[at] for at in columns],
+            cells,
+            align="".join(align[at] for at in columns),
+            width=width,
+            whole=[place for place, at in enumerate(columns) if header[at] in whole],
+        )
     ]
     common = [f"{header[at]} {rows[0][at]}" for at, alone in enumerate(constant) if alone and rows[0][at]]
     return [*lines, *textwrap.wrap(f"all of them: {', '.join(common)}", width)] if common else lines
+
+
+def _no_recordings(audit: ArchiveAudit, width: int) -> list[str]:
+    names = [file["path"] for file in audit.files.plain() if file["grade"] == "no_recording"]
+    if not names:
+        return []
+    text = one_line(", ".join(names[:_SETTINGS])) + (", ..." if len(names) > _SETTINGS else "")
+    return ["", *textwrap.wrap(f"no recordings: {text}", width, break_long_words=False)]
 
 
 def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
@@ -393,6 +427,8 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
         for report in answer.linked.reports:
             why = f"to be amended, {report.not_clean} of {report.files} files are not right"
             why = why if report.to_amend else "stands"
+            if report.disputed:
+                why += f"; in {report.disputed} of {report.files} files the cells are changed, or may be"
             tests = ", ".join(sorted(report.tests))
             yield one_line(
                 f"report {report.report} ({tests}): {why}"
@@ -437,7 +473,7 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
 def _rows(audit: ArchiveAudit) -> Iterator[list[str]]:
     listed = 0
     for file in audit.files.plain():
-        if file["grade"] in CLEAN:
+        if file["grade"] in (*CLEAN, "no_recording"):
             continue
         if listed == _SHOWN:
             return

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
+from toolkit.audit.sides import disputed
 from toolkit.reduction.physics import RULES
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
 
+SMALL_FY_N, SMALL_MZ_Nm = 0.1, 0.01
+"""The resolution to which changes are printed: what is smaller is no wrong value to anybody."""
 _CAUSES = 3  # named in the sentence; the answer holds all
 _PLACE = "\N{NARROW NO-BREAK SPACE}"
 
@@ -25,7 +28,11 @@ class Headline:
     the reasons with their files, the most frequent first; ``first`` and ``last`` the months of their tests.
     ``unjudged`` files are not right either, but no record says what they should hold. ``impossible`` files
     are not among the wrong ones and hold an Fy or Mz that no tire has. ``bare`` files hold neither of
-    their own: nothing in them is right or wrong.
+    their own: nothing in them is right or wrong. ``small`` files are those of another record than that in
+    force that differ from it by less than `SMALL_FY_N` and `SMALL_MZ_Nm`; no wrong ones. ``altered`` files
+    hold right forces beside changed cells, of ``disputed`` ones nobody can say which side is wrong.
+    ``stepping`` files are by the record in force and hold a force or a cell that steps for no reason;
+    ``copies`` are corrected copies among the right ones.
     """
 
     files: int
@@ -39,11 +46,17 @@ class Headline:
     unreadable: int
     impossible: int = 0
     bare: int = 0
+    small: int = 0
+    altered: int = 0
+    disputed: int = 0
+    no_recording: int = 0
+    stepping: int = 0
+    copies: int = 0
 
     @property
     def sentence(self) -> str:
         """The headline as one sentence."""
-        readable = self.files - self.unreadable
+        readable = self.files - self.unreadable - self.no_recording
         if readable == 0:
             return "No file could be read as a recording"
         parts = []
@@ -53,10 +66,34 @@ class Headline:
             verb = "holds" if self.impossible == 1 else "hold"
             subject = _files(self.impossible, more=bool(self.wrong))
             parts.append(f"{subject} {verb} an Fy or Mz that no tire has")
+        if self.altered:
+            verb = "holds right forces beside" if self.altered == 1 else "hold right forces beside"
+            parts.append(f"{_files(self.altered)} {verb} changed cells, and must not be repaired")
+        if self.disputed:
+            verb = "disagrees with its cells" if self.disputed == 1 else "disagree with their cells"
+            parts.append(f"{_files(self.disputed)} {verb}, and nothing says which side is wrong")
+        if self.small:
+            verb = "was" if self.small == 1 else "were"
+            parts.append(
+                f"{_files(self.small)} {verb} computed by a record that was not in force, which changes "
+                f"less than {SMALL_FY_N:g} N and {SMALL_MZ_Nm:g} N·m"
+            )
+        if self.stepping:
+            verb = "holds" if self.stepping == 1 else "hold"
+            parts.append(
+                f"{_files(self.stepping)} {verb} a force or cell that steps while the machine stands still"
+            )
         with_values = readable - self.bare
-        if with_values and not (self.wrong or self.unjudged or self.impossible):
+        doubts = self.wrong + self.unjudged + self.impossible + self.altered + self.disputed
+        if with_values and not (doubts + self.small + self.stepping):
             subject = "The file carries" if with_values == 1 else f"All {with_values} files carry"
             parts.append(f"{subject} the values of the record in force")
+        if self.copies:
+            verb = "is a corrected copy" if self.copies == 1 else "are corrected copies"
+            parts.append(
+                f"{_files(self.copies)} {verb}, computed from the cells beside them: that they agree "
+                "proves nothing of the cells"
+            )
         if self.unjudged:
             subject = _files(self.unjudged, more=bool(self.wrong))
             parts.append(f"{subject} cannot be judged: no record in force is known or fits")
@@ -67,6 +104,9 @@ class Headline:
             parts.append(f"{_files(self.bare, more=with_values > 0)} {verb}")
         if self.unreadable:
             parts.append(f"{_files(self.unreadable)} cannot be read")
+        if self.no_recording:
+            verb = "is no recording" if self.no_recording == 1 else "are no recordings"
+            parts.append(f"{_files(self.no_recording)} {verb}")
         return "; ".join(parts)
 
     def _size(self) -> str:
@@ -102,6 +142,12 @@ class Headline:
             "unjudged": self.unjudged,
             "unreadable": self.unreadable,
             "impossible": self.impossible,
+            "altered_cells": self.altered,
+            "undecided": self.disputed,
+            "small": self.small,
+            "stepping": self.stepping,
+            "corrected_copies": self.copies,
+            "no_recording": self.no_recording,
             **({"without_values": self.bare} if self.bare else {}),
         }
 
@@ -114,6 +160,7 @@ def headline(audit: ArchiveAudit) -> Headline:
 def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     """Return the headline of the files of an audit, as its answer lists them."""
     count = wrong = unjudged = unreadable = impossible = bare = 0
+    small = altered = open_files = no_recording = stepping = copies = 0
     FY = MZ = 0.0
     causes: Counter[str] = Counter()
     months: set[str] = set()
@@ -121,15 +168,25 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
         count += 1
         repair = file["repair"]
         unchanged = repair is None or file["grade"] in CLEAN
-        impossible += unchanged and any(note["rule"] in RULES for note in file.get("notes", ()))
-        if file["grade"] == "unreadable":
+        notes = {note["rule"] for note in file.get("notes", ())}
+        impossible += unchanged and bool(notes & {*RULES})
+        if file["grade"] == "no_recording":
+            no_recording += 1
+        elif file["grade"] == "unreadable":
             unreadable += 1
         elif file["grade"] in CLEAN:
-            continue
+            stepping += "discontinuity" in notes
+            copies += "corrected-copy" in notes
+        elif file["grade"] == "altered_cells":
+            altered += 1
+        elif disputed(file):
+            open_files += 1
         elif repair is None:
             unjudged += 1
         elif repair["FY_max_abs_N"] is None and repair["MZ_max_abs_Nm"] is None:
             bare += 1
+        elif file["grade"] == "stale" and _is_small(repair):
+            small += 1
         else:
             wrong += 1
             FY = max(FY, repair["FY_max_abs_N"] or 0.0)
@@ -140,8 +197,14 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     return Headline(
         files=count, wrong=wrong, FY_N=FY, MZ_Nm=MZ, causes=tuple(causes.most_common()),
         first=min(months, default=None), last=max(months, default=None), unjudged=unjudged,
-        unreadable=unreadable, impossible=impossible, bare=bare,
+        unreadable=unreadable, impossible=impossible, bare=bare, small=small, altered=altered,
+        disputed=open_files, no_recording=no_recording, stepping=stepping, copies=copies,
     )  # fmt: skip
+
+
+def _is_small(repair: Mapping[str, Any]) -> bool:
+    FY, MZ = repair["FY_max_abs_N"] or 0.0, repair["MZ_max_abs_Nm"] or 0.0
+    return max(FY / SMALL_FY_N, MZ / SMALL_MZ_Nm) < 1.0
 
 
 def _cause_of(file: Mapping[str, Any]) -> str:

@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.audit.model import CLEAN, GRADES
+from toolkit.audit.sides import disputed
 from toolkit.days import parse_day
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.inputs import RESULT_FILE, open_regular, unreadable
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 Order = Literal["path", "change", "date"]
 ORDERS: tuple[Order, ...] = ("path", "change", "date")
 _BLOCKS = b', "conditions": '
-_NOT_JUDGED = frozenset(("unreadable", "undated"))
+_NOT_JUDGED = frozenset(("no_recording", "unreadable", "undated"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,11 +48,12 @@ class AuditedFile:
     FY_N: float | None
     MZ_Nm: float | None
     place: int
+    is_disputed: bool = False
 
     @property
     def is_wrong(self) -> bool:
         """Whether the record in force makes other numbers of its cells."""
-        return self.grade not in CLEAN and bool(self.FY_N or self.MZ_Nm)
+        return self.grade not in CLEAN and not self.is_disputed and bool(self.FY_N or self.MZ_Nm)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +72,7 @@ class Headline:
     first: str | None
     last: str | None
     not_judged: int
+    disputed: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,6 +108,7 @@ class Audited:
             ),
             first=months[0] if months else None,
             last=months[-1] if months else None,
+            disputed=sum(file.is_disputed for file in self.files),
             not_judged=sum(file.grade in _NOT_JUDGED for file in self.files),
         )
 
@@ -225,6 +229,7 @@ def _file(plain: Mapping[str, Any], place: int) -> AuditedFile:
         path=plain["path"], instrument=plain["instrument"], date=plain["date"], grade=plain["grade"],
         record=plain["record"], variant=plain["variant"], in_force=plain["in_force"],
         FY_N=repair["FY_max_abs_N"], MZ_Nm=repair["MZ_max_abs_Nm"], place=place,
+        is_disputed=disputed(plain),
     )  # fmt: skip
 
 

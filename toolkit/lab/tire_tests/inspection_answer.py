@@ -71,6 +71,14 @@ class Repair(TypedDict):
     MZ_max_abs_Nm: float | None
 
 
+class DisagreeingSides(TypedDict):
+    """Which side is wrong where Fy and Mz disagree with the cells beside them."""
+
+    side: Annotated[str, "forces, cells or open"]
+    reason: str
+    grade: Annotated[str, "of the file if Fy and Mz are the wrong side"]
+
+
 class SkippedRecord(TypedDict):
     """A record that could not be a candidate."""
 
@@ -98,6 +106,7 @@ class Identified(TypedDict):
     against_corrected_by: Annotated[str | None, "signs that differ from the record in force, in words"]
     void_always: bool | None
     segments: list[Segment]
+    sides: Annotated[DisagreeingSides | None, "where rows disagree with their cells: which side is wrong"]
     in_force: Annotated[str | None, "the record in force on the date of the test"]
     repair: Repair | None
     skipped: list[SkippedRecord]
@@ -230,6 +239,7 @@ def _calibration(inspection: Inspection) -> Identified | None:
     return entry_of(
         Identified, identified,
         issued_digits=identified.issued,
+        sides=None if identified.sides is None else entry_of(DisagreeingSides, identified.sides),
         withdrawn=None if withdrawn is None else withdrawn.reason,
         against_corrected_by=wrong_signs(inspection),
         void_always=None if withdrawn is None else withdrawn.void_always,
@@ -290,6 +300,7 @@ def _calibration_lines(inspection: Inspection) -> list[str]:
 
     from toolkit.audit.inspection import withdrawal, wrong_signs
     from toolkit.audit.model import TELLS
+    from toolkit.audit.sides import WOULD_DECIDE
 
     identified = inspection.identification
     if identified is None:
@@ -304,11 +315,17 @@ def _calibration_lines(inspection: Inspection) -> list[str]:
         record = " or ".join(identified.candidates)
     withdrawn, signs = withdrawal(inspection), wrong_signs(inspection)
     how = TELLS[identified.grade]
+    side = None if identified.sides is None else identified.sides.side
     if identified.grade == "stale" and withdrawn is not None:
         how = "by a withdrawn calibration"
     if signs is not None:
         how += f": {signs} against {inspection.corrected_by}"
-    lines = [f"  Fy and Mz  computed {how}", f"    record   {record}", f"    grade    {identified.grade}"]
+    computed = f"computed {how}"
+    if identified.sides is not None and side == "cells":
+        computed = "right; the cells beside them are not: a cell column was changed"
+    elif identified.sides is not None and side == "open":
+        computed = "disagree with the cells beside them, and nothing here says which side is wrong"
+    lines = [f"  Fy and Mz  {computed}", f"    record   {record}", f"    grade    {identified.grade}"]
     if withdrawn is not None:
         void = "void on every day" if withdrawn.void_always else f"void from {withdrawn.void_from}"
         lines += textwrap.wrap(
@@ -323,6 +340,9 @@ def _calibration_lines(inspection: Inspection) -> list[str]:
             f"{', ' + s.variant if s.variant else ''} ({s.grade})"
             for s in identified.segments
         ]
+    if identified.sides is not None:
+        text = identified.sides.reason + (f"; {WOULD_DECIDE}" if side == "open" else "")
+        lines += textwrap.wrap(text, 106, initial_indent="    why      ", subsequent_indent="             ")
     if inspection.corrected_by is not None:
         first = inspection.first_row
         when = "in force on the test's date" if identified.in_force else "in force today"

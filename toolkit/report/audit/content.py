@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from toolkit.audit.model import TELLS
+from toolkit.audit.model import NOT_IDENTIFIED, TELLS
+from toolkit.audit.sides import disputed
 from toolkit.files import sha256_bytes
 from toolkit.report.content import Curve, Plot, ReportContent
 from toolkit.report.document import Document, Rows
@@ -39,6 +40,7 @@ class Summary:
     right: int
     wrong: int
     repaired: int
+    disputed: int
     FY: float
     MZ: float
     years: Mapping[int, list[int]]
@@ -58,11 +60,14 @@ class Summary:
 
 def _summary(view: AuditView) -> Summary:
     FY = MZ = 0.0
-    right = wrong = repaired = 0
+    right = wrong = repaired = unsettled = 0
     years: dict[int, list[int]] = {}
     for file in view.made.files.plain():
         clean = file["grade"] in _RIGHT
         right += clean
+        if file["grade"] == "no_recording" or disputed(file):
+            unsettled += disputed(file)
+            continue
         wrong += not clean and file["grade"] != "unreadable"
         if file["date"] is not None and file["grade"] != "unreadable":
             years.setdefault(int(file["date"][:4]), [0, 0])[not clean] += 1
@@ -74,7 +79,7 @@ def _summary(view: AuditView) -> Summary:
         view=view,
         name=view.made.archive.absolute().name,
         heads=", ".join(f"{instrument} {head}" for instrument, head in view.made.heads),
-        right=right, wrong=wrong, repaired=repaired, FY=FY, MZ=MZ, years=years,
+        right=right, wrong=wrong, repaired=repaired, disputed=unsettled, FY=FY, MZ=MZ, years=years,
     )  # fmt: skip
 
 
@@ -119,6 +124,11 @@ def _conclusion(summary: Summary, _style: Style) -> str:
             f"By that record Fy changes by up to {summary.FY:.1f} N and Mz by up to {summary.MZ:.2f} N·m."
             if summary.repaired
             else "By how much cannot be told: for none of them a record in force on its day is known."
+        )
+    if summary.disputed:
+        many = "files disagree with their cells" if summary.disputed > 1 else "file disagrees with its cells"
+        text += (
+            f" {summary.disputed} {many}, which were changed, or may have been: nothing is computed there."
         )
     if summary.unreadable:
         many = (
@@ -217,7 +227,7 @@ def grades(summary: Summary, _style: Style) -> Rows:
     files = max(len(summary.view.made.files), 1)
     for grade, count in cast("Mapping[Grade, int]", summary.view.made.grades).items():
         if count:
-            meaning = TELLS[grade] if grade == "unreadable" else f"computed {TELLS[grade]}"
+            meaning = TELLS[grade] if grade in NOT_IDENTIFIED else f"computed {TELLS[grade]}"
             yield grade, str(count), f"{100 * count / files:.1f}", meaning
 
 

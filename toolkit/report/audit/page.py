@@ -136,7 +136,7 @@ class _RuleFindings:
 def _file_rows(view: AuditView) -> Iterator[tuple[object, ...]]:
     every_file = len(view.made.files) <= MOST_ROWS
     for line in view.made.files.plain():
-        if not every_file and line["grade"] in ("exact", "rounding"):
+        if not every_file and line["grade"] in ("exact", "rounding", "no_recording"):
             continue
         repair = line["repair"] or {}
         yield (

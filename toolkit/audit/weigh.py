@@ -1,0 +1,117 @@
+"""A recording's own evidence about both sides of a disagreement, and what its rows show of continuity."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from toolkit.audit.candidates import by_columns, cannot_correct, turned_against
+from toolkit.audit.identify import recompute
+from toolkit.audit.quality import impossible, inclinations
+from toolkit.audit.sides import judge, sudden_step
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from toolkit.audit.model import Columns, Identification, Segment
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.recording.model import Recording
+    from toolkit.reduction.blocks import Block
+
+    Array = NDArray[np.float64]
+
+
+def weighed(
+    identification: Identification,
+    recording: Recording,
+    columns: Columns,
+    blocks: Sequence[Block],
+    records: Sequence[CalibrationRecord],
+    new: Mapping[str, Array] | None,
+    in_force: CalibrationRecord | None,
+) -> Identification:
+    """Return an identification that says which side of a disagreement is wrong (`toolkit.audit.sides`).
+
+    ``new`` are FY and MZ by the record in force, which stand for what no record explains, and beside those of
+    a record that was not in force.
+    """
+    by_id = {record.id: record for record in records}
+    explained = [by_id[s.record] for s in identification.segments if s.record in by_id]
+    plain = by_id.get(identification.record or "") or (explained[0] if explained else None)
+    computed = new
+    if identification.grade != "stale" and plain is not None and cannot_correct(plain, columns) is None:
+        computed = recompute(columns, plain)
+
+    def could(segment: Segment) -> bool:
+        if segment.grade == "stale":
+            mine = by_id.get(segment.record or "")
+            if mine is None or in_force is None:
+                return False
+            change = turned_against(mine, in_force, columns.loads)
+        else:
+            change = segment.variant
+        return segment.grade == "unknown" or (change is not None and by_columns(change, columns.loads))
+
+    recorded = {load: recording[load].si for load in columns.loads}
+    return judge(
+        identification,
+        columns,
+        blocks,
+        conditions=conditions_of(recording),
+        recorded=recorded,
+        computed=computed,
+        impossible=(
+            _impossible(recording, blocks, recorded),
+            computed is not None and _impossible(recording, blocks, computed),
+        ),
+        by_columns=could,
+    )
+
+
+def conditions_of(recording: Recording) -> dict[str, Array]:
+    """Return the load and, where it is there, the slip angle of each row."""
+    return {name: recording[name].si for name in ("FZ", "SA") if recording.has(name)}
+
+
+def steps(recording: Recording, columns: Columns, blocks: Sequence[Block], where: str) -> tuple[Finding, ...]:
+    """Return the forces or cells of a file that step where load and slip angle stand still."""
+    values: dict[str, Array] = {load: recording[load].si for load in columns.loads}
+    values |= {name: columns.x[:, place] for place, name in enumerate(columns.names)}
+    return step_findings(recording, values, blocks, where, level="error")
+
+
+def step_findings(
+    recording: Recording,
+    values: Mapping[str, Array],
+    blocks: Sequence[Block],
+    where: str,
+    *,
+    level: Literal["error", "warning", "note"],
+) -> tuple[Finding, ...]:
+    """Return the value that steps most where load and slip angle stand still, as a finding; empty: none."""
+    step = sudden_step(values, conditions_of(recording), blocks)
+    if step is None:
+        return ()
+    name, row, before, after = step
+    message = (
+        f"{name} steps from {before:.5g} to {after:.5g} at row {row}, where load and slip angle stand still: "
+        "it was changed from there on, or a cell failed"
+    )
+    return (Finding(rule="discontinuity", where=where, message=message, level=level),)
+
+
+def _impossible(recording: Recording, blocks: Sequence[Block], values: Mapping[str, Array]) -> bool:
+    rows = [f"{block.start}" for block in blocks]
+    SA = recording["SA"].si if recording.has("SA") else None
+
+    def mean(series: Array | None, block: Block) -> float | None:
+        return None if series is None else float(np.mean(series[block.rows]))
+
+    FY, MZ = values.get("FY"), values.get("MZ")
+    means = [(b.mean_FZ, mean(SA, b), mean(FY, b), mean(MZ, b)) for b in blocks]
+    IA = inclinations(recording, [(block.start, block.stop) for block in blocks])
+    return bool(impossible("", rows, means, values="", IA=IA))
