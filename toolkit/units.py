@@ -114,6 +114,15 @@ _SCALE = re.compile(
 _SPACED_SCALE = re.compile(r"\bdeg(?:ree)?s?\s+[CF]\b", re.I)
 
 
+INTERVAL_SCALES = frozenset({"temperature"})
+"""Dimensions whose scales have a zero by convention: differences mean something, and ratios of values do not.
+
+A thermometer shows its own differences in degC as in K, and 20 degC is not twice 10 degC (Stevens, Science
+103, 1946). A length, an angle or a pressure counts as a ratio scale: whoever sets the zero of a position does
+so where its spring, its stop or its gauge is at rest, and that zero is the same in every unit.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """A unit as read at the edge: SI value = ``factor`` x value + ``offset``, in ``si``."""
@@ -123,6 +132,15 @@ class Unit:
     offset: float
     si: str
     dimension: str
+
+    @property
+    def is_interval(self) -> bool:
+        """Tell whether its zero is one of convention; a stated difference has none.
+
+        >>> unit("degC").is_interval, unit("K").is_interval, unit("N").is_interval
+        (True, True, False)
+        """
+        return self.dimension in INTERVAL_SCALES and not self.text.startswith("delta_")
 
 
 @cache

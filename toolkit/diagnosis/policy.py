@@ -250,6 +250,18 @@ class _Step:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Bends:
+    """When laws of a sensor only bend an output onto a recording."""
+
+    undone: float = _set(
+        0.5, "of the smaller one's change", "that is left of both: what takes half of another back is no law"
+    )
+    rows: float = _set(
+        0.5, "of the rows", "in which two take each other back: on most of the range they are one curve"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Pairs:
     """Which two effects are tried at once, where no single one passes."""
 
@@ -463,11 +475,12 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER, AVERAGES = _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
+BENDS = _Bends()
 DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, PAIRS, UNSEEN,
-    FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, BENDS, PAIRS,
+    UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
 
 

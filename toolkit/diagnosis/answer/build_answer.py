@@ -28,11 +28,12 @@ from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
-from toolkit.diagnosis.simulators.parameter_units import unit_of
-from toolkit.effects.applied import AppliedEffect
+from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
+from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.law.learn import Laws
 
 
@@ -111,7 +112,7 @@ def _effect(search: Search, step: Step) -> FoundEffect:
         key=active.key,
         stage=active.effect.stage,
         statement=active.effect.statement + ("" if runs is None else f" In {_listed(runs)} alone."),
-        equation=active.effect.equation,
+        equation=active.effect.equation + _counted_from(problem, active),
         reference=active.effect.reference,
         parameters=(*_parameters(search, active, runs), *_named(active, runs)),
         equivalent_to=equivalent,
@@ -119,6 +120,17 @@ def _effect(search: Search, step: Step) -> FoundEffect:
         held_out_log_score_gain=step.held_out_gain,
         p_value=step.p_value,
     )
+
+
+def _counted_from(problem: Problem, active: AppliedEffect) -> str:
+    """Return from where an effect counts values whose scale has a zero by convention alone."""
+    ends = {active.channel: ORIGIN, active.source: SOURCE_ORIGIN}
+    told = [
+        f"{name} from {active.values[key]:.6g} {channel_unit(problem.case, problem.model, name)}"
+        for name, key in ends.items()
+        if key in active.values
+    ]
+    return f"; counted: {', '.join(told)}" if told else ""
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -13,6 +13,7 @@ from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, m
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
+from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.effects.applied import AppliedEffect, EffectKey
@@ -154,8 +155,7 @@ def best_step(
         gain = scores.total - held_base.total
         if gain < STEP.least_gain or trial.score - base.log_posterior < STEP.least_gain:
             continue
-        # One that a later effect drives to its bound is no better than one that starts there.
-        if any(at_bound(each) for each in made.active) or not matters(problem, held_base, scores, least):
+        if only_bends(problem, made) or not matters(problem, held_base, scores, least):
             continue
         if not beyond_form(problem, refitted, held_base, scores, form):
             continue
@@ -301,15 +301,3 @@ def _shared(effect: AppliedEffect, share: float) -> AppliedEffect:
 def _shapes(effect: AppliedEffect) -> int:
     """Return how many parameters only shape an effect: they make it no less able to imitate another."""
     return sum(parameter.off is None and not parameter.ends_count for parameter in effect.searched)
-
-
-def at_bound(effect: AppliedEffect) -> bool:
-    """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
-    for parameter in effect.searched:
-        if parameter.ends_count:
-            continue
-        value = effect.values[parameter.name]
-        for bound in parameter.bounds:
-            if math.isfinite(bound) and bound != 0 and abs(value - bound) < STEP.bound * abs(bound):
-                return True
-    return False

@@ -29,13 +29,13 @@ from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.diagnosis.search.unseen_runs import shown_on_unseen_runs
+from toolkit.effects.applied import ORIGIN, AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.search.candidates import CandidateEffect
-    from toolkit.effects.applied import AppliedEffect
 
 # What of a found effect matters for its size alone: the zero beneath it, the noise that went through it.
 
@@ -304,7 +304,9 @@ def _stepped(
         if lattice is None:
             continue
         width = candidate.active.effect.names[0]
-        active = replace(candidate.active, values={width: lattice.step, f"_half_{width}": lattice.half_width})
+        counted = {key: value for key, value in candidate.starts[0].values.items() if key == ORIGIN}
+        sizes = {width: lattice.step, f"_half_{width}": lattice.half_width}
+        active = replace(candidate.active, values=sizes | counted)
         gain = lattice.log_score_gain
         step = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
@@ -313,7 +315,10 @@ def _stepped(
         with_steps = replace_effects(problem, base, (*base.active, active))
         held_out = HeldOut(
             scores=held_base.scores,
-            simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], lattice.step)},
+            simulated={
+                **held_base.simulated,
+                name: _rounded(held_base.simulated[name], lattice.step, counted.get(ORIGIN, 0.0)),
+            },
             fits=held_base.fits,
         )
         if matters(problem, held_base, held_out, STEP.first):
@@ -322,8 +327,8 @@ def _stepped(
     return base, held_base, steps
 
 
-def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    return np.asarray(step * np.round(values / step))
+def _rounded(values: NDArray[np.float64], step: float, origin: float) -> NDArray[np.float64]:
+    return np.asarray(step * np.round((values - origin) / step) + origin)
 
 
 def _pruned(
