@@ -250,6 +250,23 @@ class _Step:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Units:
+    """When a channel may have been recorded in another unit than the stated one."""
+
+    gross: float = _set(
+        0.5, "of an output's spread", "as declared: units differ by a third and more, no calibration does"
+    )
+    left: float = _set(
+        0.2, "of the mean square", "by the right unit, with parameters that a refit has still to find"
+    )
+    most: int = _set(4, "units", "the best of them: a wrong input and a wrong output often do the same")
+    vague: float = _set(
+        1.25, "times its lower end", "an interval that is wider holds the ratio of some units or others"
+    )
+    told: float = _set(0.02, "of a ratio", "by which a law's own factor may miss it and be told as a unit")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Bends:
     """When laws of a sensor only bend an output onto a recording."""
 
@@ -475,12 +492,12 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER, AVERAGES = _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
-BENDS = _Bends()
+BENDS, UNITS = _Bends(), _Units()
 DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, BENDS, PAIRS,
-    UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, UNITS, BENDS,
+    PAIRS, UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
 
 

@@ -30,9 +30,9 @@ PatternHook = Callable[["NDArray[np.float64]", Sequence[Values]], "NDArray[np.fl
 # (shown (n,), parameters, setting) -> what the channel would show without the effect
 InverseHook = Callable[["NDArray[np.float64]", Values, "Setting"], "NDArray[np.float64]"]
 
-Where = Literal["output", "cell", "program_cell", "program_load"]
-"""Kinds of channels: an output; a load cell from which outputs are computed; cells and loads of an
-acquisition program of which only the arithmetic is judged."""
+Where = Literal["output", "input", "cell", "program_cell", "program_load"]
+"""Kinds of channels: an output; an input of a simulation; a load cell from which outputs are computed; cells
+and loads of an acquisition program of which only the arithmetic is judged."""
 Second = Literal["with", "from", "record"]
 """What an effect takes beside its channel: the channel it is exchanged ``with``, the one that shows in it
 (``from``), or the calibration ``record`` that replaces the named one."""

@@ -130,11 +130,14 @@ def candidates(
 ) -> tuple[CandidateEffect, ...]:
     """Return every candidate of a case, scaled by how the case is seen at each place."""
     listed = []
+    inputs = {driver.name for driver in problem.case.drivers}
     for effect in (*effects().values(), INPUT_NOISE):
         if effect.in_time and not problem.case.has_time:
             continue
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
+            if channel in inputs and effect.channel is not None:
+                continue  # asked where the declared simulation is grossly wrong: `wrong_units`
             case = view(problem, channel, source)
             confined = effect.in_case(case)
             starts = _starts(case, confined)

@@ -159,7 +159,7 @@ def best_step(
             continue
         if not beyond_form(problem, refitted, held_base, scores, form):
             continue
-        if made.active[-1].effect.needs_signal and not _shows(problem, scores, made.active[-1]):
+        if made.active[-1].effect.needs_signal and not shows_signal(problem, scores, made.active[-1]):
             continue
         standing.append((trial, scores))
         if not _leaves_more_than_noise(problem, made):
@@ -199,15 +199,21 @@ def _leaves_more_than_noise(problem: Problem, made: Fit) -> bool:
     return any(each.process_sd > each.sensor_sd for each in parts)
 
 
-def _shows(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> bool:
+def shows_signal(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> bool:
     """Tell whether an output has the simulated signal in it, and is not only made small by a factor."""
-    name = str(effect.channel)
-    if name not in problem.names:
-        return True
-    rows = problem.kept[name]
-    simulated = held_out.simulated[name][rows]
-    residual = problem.observed[name][rows] - simulated
-    return float(np.mean(residual**2)) < STEP.signal**2 * float(np.mean(simulated**2))
+    names = [str(effect.channel)]
+    if effect.channel in {driver.name for driver in problem.case.drivers}:
+        names = list(problem.names)  # of an input's unit some output tells
+    view = CaseView(problem, effect.channel)
+
+    def has_signal(name: str) -> bool:
+        rows = problem.kept[name]
+        simulated = held_out.simulated[name][rows]
+        residual = problem.observed[name][rows] - simulated
+        simulated = simulated - (view.origin(name) or 0.0)
+        return float(np.mean(residual**2)) < STEP.signal**2 * float(np.mean(simulated**2))
+
+    return any(has_signal(name) if name in problem.names else True for name in names)
 
 
 def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Rival, ...]:

@@ -29,6 +29,7 @@ from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.diagnosis.search.unseen_runs import shown_on_unseen_runs
+from toolkit.diagnosis.search.wrong_units import is_listed, unit_step, wrong_units
 from toolkit.effects.applied import ORIGIN, AppliedEffect
 from toolkit.errors import FitError
 
@@ -158,7 +159,10 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     if problem.rates and refitted.plain:
         refitted = fit(problem, start=refitted.p)
     folds = folds_of(problem, refitted)
+    wrong = wrong_units(problem, (nominal, refitted))
     listed = candidates(problem)
+    if wrong and not is_listed(wrong[0], listed):
+        listed = (*wrong, *listed)
     skipped: list[str] = []
     steps: list[Step] = []
     base = refitted
@@ -197,6 +201,14 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 before = structure
             if turn == STEP.most_effects:
                 break
+            seen = {trial.candidate.key for trial in view.significant}
+            if turn == 0 and not any(candidate.key in seen for candidate in wrong):
+                budget.check(f"step {turn + 1}: wrong units")
+                outcome = unit_step(problem, folds, base, held_base, wrong)
+                if outcome is not None:
+                    base, held_base, step = outcome
+                    steps.append(step)
+                    continue
             if led is not None and led.outcome is not None:
                 base, held_base, more = beside_rivals(
                     problem, folds, base, held_base, led, led.outcome, view,
@@ -398,7 +410,7 @@ def _told_from_none(
     for applied in base.active:
         own, at = at, at + len(applied.searched)
         sizes = [(i, each) for i, each in enumerate(applied.searched) if each.off is not None]
-        if len(sizes) != 1 or len(steps) < 2:
+        if len(sizes) != 1:
             continue
         (i, size) = sizes[0]
         sd = math.sqrt(max(float(base.covariance[own + i, own + i]), 0.0))
@@ -416,6 +428,8 @@ def _told_from_none(
             scale = np.ones(len(base.covariance))
             scale[own + i] = abs(applied.values[size.name] - (size.off or 0.0)) / math.sqrt(2 * lost) / sd
             base = replace(base, covariance=base.covariance * np.outer(scale, scale))
+            continue
+        if len(steps) < 2:
             continue
         try:
             scores = hold_out(problem, folds, bare.active, bare)
