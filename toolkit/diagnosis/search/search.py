@@ -316,9 +316,9 @@ def _stepped(
         if lattice is None:
             continue
         width = candidate.active.effect.names[0]
-        counted = {key: value for key, value in candidate.starts[0].values.items() if key == ORIGIN}
+        origin = {key: value for key, value in candidate.starts[0].values.items() if key == ORIGIN}
         sizes = {width: lattice.step, f"_half_{width}": lattice.half_width}
-        active = replace(candidate.active, values=sizes | counted)
+        active = replace(candidate.active, values=sizes | origin)
         gain = lattice.log_score_gain
         step = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
@@ -329,7 +329,7 @@ def _stepped(
             scores=held_base.scores,
             simulated={
                 **held_base.simulated,
-                name: _rounded(held_base.simulated[name], lattice.step, counted.get(ORIGIN, 0.0)),
+                name: _rounded(held_base.simulated[name], lattice.step, origin.get(ORIGIN, 0.0)),
             },
             fits=held_base.fits,
         )
