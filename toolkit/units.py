@@ -120,9 +120,8 @@ _SPACED_SCALE = re.compile(r"\bdeg(?:ree)?s?\s+[CF]\b", re.I)
 INTERVAL_SCALES = frozenset({"temperature"})
 """Dimensions whose scales have a zero by convention: differences mean something, and ratios of values do not.
 
-A thermometer shows its own differences in degC as in K, and 20 degC is not twice 10 degC (Stevens, Science
-103, 1946). A length, an angle or a pressure counts as a ratio scale: whoever sets the zero of a position does
-so where its spring, its stop or its gauge is at rest, and that zero is the same in every unit.
+20 degC is not twice 10 degC (Stevens, Science 103, 1946). Positions and pressures count as ratio scales:
+their zero is set where a spring or a gauge is at rest, and is the same in every unit.
 """
 
 
@@ -375,13 +374,10 @@ _TENS = range(1, 7)
 def unit_ratios(text: str) -> dict[str, float]:
     """Return by what a number is too large where another unit of its dimension was meant, or a power of ten.
 
-    In the order of likelihood: units first. Both ways: the recording may be in the other unit, or the
-    simulation may expect it.
+    Units first, both ways: the recording may be in the other unit, or the simulation may expect it.
 
     >>> {name: round(ratio, 6) for name, ratio in unit_ratios("bar").items() if "kPa" in name}
     {'kPa read as bar': 100.0, 'bar read as kPa': 0.01}
-    >>> unit_ratios("N")["1/1000 of the value"]
-    0.001
     """
     stated = unit(text)
     ratios: dict[str, float] = {}
@@ -403,15 +399,8 @@ def unit_ratios(text: str) -> dict[str, float]:
 
 
 def near_ratio(low: float, high: float, text: str) -> str | None:
-    """Return which other unit makes numbers in a unit too large by a ratio in an interval, None where none.
-
-    >>> near_ratio(99.0, 101.0, "bar"), near_ratio(1.2, 1.3, "bar")
-    ('kPa read as bar', None)
-    """
-    try:
-        ratios = unit_ratios(text)
-    except UnitError:
-        return None
+    """Return which other unit makes numbers too large by a ratio in an interval, None where none does."""
+    ratios = unit_ratios(text) if is_unit(text) else {}
     slack = 1 + _SAME_RATIO / 10
     return next((name for name, ratio in ratios.items() if low / slack <= ratio <= high * slack), None)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +15,41 @@ import pytest
 import toolkit.diagnosis as diagnosis
 from toolkit.diagnosis import policy
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Threshold:
+    """One number of the policy."""
+
+    section: str
+    name: str
+    value: float | tuple[int, ...]
+    unit: str
+    why: str
+
+
+def thresholds() -> tuple[Threshold, ...]:
+    """Return every number of the policy, section by section."""
+    return tuple(
+        Threshold(
+            section=type(section).__name__.removeprefix("_").lower(),
+            name=field.name,
+            value=getattr(section, field.name),
+            unit=field.metadata["unit"],
+            why=field.metadata["why"],
+        )
+        for section in policy.SECTIONS
+        for field in dataclasses.fields(section)
+    )
+
+
 ROOM = Path(diagnosis.__file__).parent
 JUDGING = sorted([*(ROOM / "search").glob("*.py"), *(ROOM / "answer").glob("*.py")])
 GUARD = 1e-8  # smaller numbers only keep a division or a logarithm from zero
 COUNTED = (0, 1, 2, 3)  # none, one, several: of what a rule is about, not how much
 
 
-@pytest.mark.parametrize("number", policy.thresholds(), ids=lambda one: f"{one.section}.{one.name}")
-def test_every_number_has_a_unit_and_a_reason(number: policy.Threshold) -> None:
+@pytest.mark.parametrize("number", thresholds(), ids=lambda one: f"{one.section}.{one.name}")
+def test_every_number_has_a_unit_and_a_reason(number: Threshold) -> None:
     assert np.all(np.asarray(number.value) > 0)
     assert number.unit
     assert len(number.why.split()) >= 3
@@ -31,9 +60,7 @@ def test_every_number_is_used() -> None:
         path.read_text(encoding="utf-8") for path in ROOM.rglob("*.py") if path.name != "policy.py"
     )
     idle = [
-        f"{one.section}.{one.name}"
-        for one in policy.thresholds()
-        if f"{one.section.upper()}.{one.name}" not in text
+        f"{one.section}.{one.name}" for one in thresholds() if f"{one.section.upper()}.{one.name}" not in text
     ]
     assert not idle
 

@@ -245,6 +245,10 @@ class _Step:
         1e-3, "of a bound", "an estimate as near to it ends there: the effect only imitates another"
     )
     signal: float = _set(0.5, "of an output in its right unit", "what else it may have in it")
+    undone: float = _set(
+        0.5, "of the smaller one's change", "left of two laws of a sensor: less is one curve"
+    )
+    undone_rows: float = _set(0.5, "of the rows", "in which they take each other back: most of the range")
     visible: float = _set(0.01, "of the noise", "an effect that never moves an output by more is not there")
     band_noise: float = _set(2.0, "of the log posterior", "noise before a dead band is taken for more likely")
 
@@ -253,28 +257,12 @@ class _Step:
 class _Units:
     """When a channel may have been recorded in another unit than the stated one."""
 
-    gross: float = _set(
-        0.5, "of an output's spread", "as declared: units differ by a third and more, no calibration does"
-    )
-    left: float = _set(
-        0.2, "of the mean square", "by the right unit, with parameters that a refit has still to find"
-    )
-    most: int = _set(4, "units", "the best of them: a wrong input and a wrong output often do the same")
+    gross: float = _set(0.5, "of an output's spread", "as declared: units are off by more, no calibration is")
+    left: float = _set(0.2, "of the mean square", "by the right unit, its parameters still to be refitted")
+    most: int = _set(4, "units", "the best: a wrong input and a wrong output often do the same")
+    told: float = _set(0.02, "of a ratio", "by which a law's factor may miss it and be told as a unit")
     vague: float = _set(
-        1.25, "times its lower end", "an interval that is wider holds the ratio of some units or others"
-    )
-    told: float = _set(0.02, "of a ratio", "by which a law's own factor may miss it and be told as a unit")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Bends:
-    """When laws of a sensor only bend an output onto a recording."""
-
-    undone: float = _set(
-        0.5, "of the smaller one's change", "that is left of both: what takes half of another back is no law"
-    )
-    rows: float = _set(
-        0.5, "of the rows", "in which two take each other back: on most of the range they are one curve"
+        1.25, "times its lower end", "a wider interval holds the ratio of some units or others"
     )
 
 
@@ -492,36 +480,10 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 SCATTER, AVERAGES = _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
-BENDS, UNITS = _Bends(), _Units()
+UNITS = _Units()
 DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, UNITS, BENDS,
-    PAIRS, UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
+    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, SCATTER, SCREENING, STARTS, STEP, UNITS, PAIRS,
+    UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Threshold:
-    """One number of the policy."""
-
-    section: str
-    name: str
-    value: float | tuple[int, ...]
-    unit: str
-    why: str
-
-
-def thresholds() -> tuple[Threshold, ...]:
-    """Return every number of the policy, section by section."""
-    return tuple(
-        Threshold(
-            section=type(section).__name__.removeprefix("_").lower(),
-            name=field.name,
-            value=getattr(section, field.name),
-            unit=field.metadata["unit"],
-            why=field.metadata["why"],
-        )
-        for section in SECTIONS
-        for field in dataclasses.fields(section)
-    )

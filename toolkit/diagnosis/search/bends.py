@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.policy import BENDS, PRIORS, STEP
+from toolkit.diagnosis.policy import PRIORS, STEP
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.errors import FitError
 
@@ -97,4 +97,4 @@ def _is_undone(problem: Problem, fit: Fit, one: AppliedEffect, other: AppliedEff
     alone = np.minimum(np.abs(first - neither), np.abs(second - neither))
     together = np.abs(both - neither)
     least = STEP.visible * fit.noise[name].marginal_sd
-    return float(np.mean((together < BENDS.undone * alone) & (alone > least))) > BENDS.rows
+    return float(np.mean((together < STEP.undone * alone) & (alone > least))) > STEP.undone_rows

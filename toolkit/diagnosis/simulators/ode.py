@@ -49,8 +49,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
-    from toolkit.diagnosis.simulators.following import Followed
-    from toolkit.diagnosis.simulators.simulator import Following, Largest, Pattern
+    from toolkit.diagnosis.simulators.simulator import Largest
     from toolkit.worker.serve import Handlers
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
@@ -117,7 +116,12 @@ class OdeModel:
             motion=Moving(
                 integrates=True, sizes=self._motion_sizes, units=self._motion_units, way=self._way,
                 position=lambda channel: self.position_of(str(channel)), states=self._ranges(),
-                pushed=self._pushed, followed=self._followed,
+                pushed=lambda run, p, active, channel, pattern: pushed(
+                    self, self._as_driven(run, active), p, active, channel, pattern
+                ),
+                followed=lambda runs, p, active, asked: followed(
+                    self, [self._as_driven(run, active) for run in runs], p, active, asked
+                ),
             ),
         )  # fmt: skip
 
@@ -246,17 +250,6 @@ class OdeModel:
         finer = self.finer(run)
         shown = through_channels(simulated, fine, finer, self.setting(finer), finer.columns)
         return {name: values[::FINER] for name, values in shown.items()}
-
-    def _pushed(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], channel: str | None,
-        pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:  # fmt: skip
-        return pushed(self, self._as_driven(run, active), p, active, channel, pattern)
-
-    def _followed(
-        self, runs: Sequence[Run], p: Mapping[str, float], active: Sequence[AppliedEffect], asked: Following
-    ) -> tuple[Followed, NDArray[np.float64]]:
-        return followed(self, [self._as_driven(run, active) for run in runs], p, active, asked)
 
     def _as_driven(self, run: Run, active: Sequence[AppliedEffect]) -> Run:
         """Return a run with its inputs as they are without the effects that they were recorded with."""
