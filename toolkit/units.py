@@ -90,6 +90,9 @@ _WORDS = {
     "Nm": "(newton*meter)", "Ncm": "(newton*centimeter)", "Nmm": "(newton*millimeter)",
     "kNm": "(kilonewton*meter)", "kph": "(kilometer/hour)", "kmh": "(kilometer/hour)",
     "mph": "(mile/hour)", "rev": "turn", "counts": "digitiser_count", "count": "digitiser_count",
+    **dict.fromkeys(("Ohm", "Ohms"), "ohm"), "kOhm": "kiloohm", "MOhm": "megaohm", "mOhm": "milliohm",
+    **dict.fromkeys(("Volt", "Volts"), "volt"), **dict.fromkeys(("Amp", "Amps", "Ampere"), "ampere"),
+    **dict.fromkeys(("Watt", "Watts"), "watt"), "Farad": "farad", "Henry": "henry", "Siemens": "siemens",
 }  # fmt: skip
 _WRITTEN = {"lb": "lbf", "lbs": "lbf", "kp": "kgf", "Nm": "N*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m"}
 _WORD = re.compile(r"[^\W\d_]+")
@@ -114,6 +117,14 @@ _SCALE = re.compile(
 _SPACED_SCALE = re.compile(r"\bdeg(?:ree)?s?\s+[CF]\b", re.I)
 
 
+INTERVAL_SCALES = frozenset({"temperature"})
+"""Dimensions whose scales have a zero by convention: differences mean something, and ratios of values do not.
+
+20 degC is not twice 10 degC (Stevens, Science 103, 1946). Positions and pressures count as ratio scales:
+their zero is set where a spring or a gauge is at rest, and is the same in every unit.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """A unit as read at the edge: SI value = ``factor`` x value + ``offset``, in ``si``."""
@@ -123,6 +134,15 @@ class Unit:
     offset: float
     si: str
     dimension: str
+
+    @property
+    def is_interval(self) -> bool:
+        """Tell whether its zero is one of convention; a stated difference has none.
+
+        >>> unit("degC").is_interval, unit("K").is_interval, unit("N").is_interval
+        (True, True, False)
+        """
+        return self.dimension in INTERVAL_SCALES and not self.text.startswith("delta_")
 
 
 @cache
@@ -212,7 +232,7 @@ def unit(text: str, *, where: object = None) -> Unit:
             f"unknown unit {text!r}",
             where=where,
             got=text,
-            expected="a unit such as N, lbf, N*m, lbf*ft, deg, rad, mV/V, count, degC, kPa, km/h, s",
+            expected="a unit such as N, lbf, N*m, lbf*ft, deg, rad, mV/V, V, ohm, count, degC, kPa, km/h, s",
             next_step="write the unit in the header as 'NAME [unit]' or in the machine definition",
             rule="unknown-unit",
         ) from error
@@ -349,6 +369,52 @@ def printed(text: str) -> str:
     return text.replace("*", "·")
 
 
+# Further units that people record in, beside those of the machine's own files.
+_ALSO = (
+    "kgf", "g", "kg", "MN", "cm", "µm", "km", "inch", "ft", "min", "h", "µs", "mph", "MPa", "mbar", "hPa",
+    "atm", "mmHg", "N*mm", "lbf*in", "kgf*m", "mV", "V", "kV", "mA", "A", "mW", "W", "kW", "turn", "mrad",
+    "%", "rad/s", "rpm", "ml", "liter", "m^3", "l/min", "m^3/h", "cm/s", "mm/s", "cm/s^2", "m/s^2",
+    "standard_gravity",
+)  # fmt: skip
+_TENS = range(1, 7)
+
+
+@cache
+def unit_ratios(text: str) -> dict[str, float]:
+    """Return by what a number is too large where another unit of its dimension was meant, or a power of ten.
+
+    Units first, both ways: the recording may be in the other unit, or the simulation may expect it.
+
+    >>> {name: round(ratio, 6) for name, ratio in unit_ratios("bar").items() if "kPa" in name}
+    {'kPa read as bar': 100.0, 'bar read as kPa': 0.01}
+    """
+    stated = unit(text)
+    ratios: dict[str, float] = {}
+
+    def add(name: str, ratio: float) -> None:
+        if all(abs(ratio / known - 1) > _ALIKE for known in (1.0, *ratios.values())):
+            ratios[name] = ratio
+
+    others = [] if stated.offset else [*_EXACT, *_ALSO]
+    for other in others:
+        right = unit(other)
+        if right.dimension == stated.dimension and not right.offset:
+            add(f"{right.text} read as {stated.text}", stated.factor / right.factor)
+            add(f"{stated.text} read as {right.text}", right.factor / stated.factor)
+    for power in () if stated.is_interval else _TENS:
+        add(f"{10**power} times the value", 10.0**power)
+        add(f"1/{10**power} of the value", 10.0**-power)
+    return ratios
+
+
+def near_ratio(low: float, high: float, text: str) -> str | None:
+    """Return which other unit makes numbers too large by a ratio in an interval, None where none does."""
+    ratios = unit_ratios(text) if is_unit(text) else {}
+    slack = 1 + _SAME_RATIO / 10
+    return next((name for name, ratio in ratios.items() if low / slack <= ratio <= high * slack), None)
+
+
+_ALIKE = 1e-3  # two ratios of units as near as that are told apart by no recording
 _BESIDE = {"N": "lbf", "lbf": "N", "N*m": "lbf*ft", "lbf*ft": "N*m"}
 
 

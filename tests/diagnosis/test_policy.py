@@ -15,11 +15,6 @@ import pytest
 import toolkit.diagnosis as diagnosis
 from toolkit.diagnosis import policy
 
-ROOM = Path(diagnosis.__file__).parent
-JUDGING = sorted([*(ROOM / "search").glob("*.py"), *(ROOM / "answer").glob("*.py")])
-GUARD = 1e-8  # smaller numbers only keep a division or a logarithm from zero
-COUNTED = (0, 1, 2, 3)  # none, one, several: of what a rule is about, not how much
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Threshold:
@@ -45,6 +40,12 @@ def thresholds() -> tuple[Threshold, ...]:
         for section in policy.SECTIONS
         for field in dataclasses.fields(section)
     )
+
+
+ROOM = Path(diagnosis.__file__).parent
+JUDGING = sorted([*(ROOM / "search").glob("*.py"), *(ROOM / "answer").glob("*.py")])
+GUARD = 1e-8  # smaller numbers only keep a division or a logarithm from zero
+COUNTED = (0, 1, 2, 3)  # none, one, several: of what a rule is about, not how much
 
 
 @pytest.mark.parametrize("number", thresholds(), ids=lambda one: f"{one.section}.{one.name}")

@@ -39,6 +39,9 @@ class Case:
     def values(self, _name):
         return np.linspace(-700.0, 700.0, 30)
 
+    def origin(self, _name):
+        return None
+
     def widest(self, _name):
         return -700.0, 700.0
 

@@ -272,8 +272,25 @@ class _Step:
         1e-3, "of a bound", "an estimate as near to it ends there: the effect only imitates another"
     )
     signal: float = _set(0.5, "of an output in its right unit", "what else it may have in it")
+    undone: float = _set(
+        0.5, "of the smaller one's change", "left of two laws of a sensor: less is one curve"
+    )
+    undone_rows: float = _set(0.5, "of the rows", "in which they take each other back: most of the range")
     visible: float = _set(0.01, "of the noise", "an effect that never moves an output by more is not there")
     band_noise: float = _set(2.0, "of the log posterior", "noise before a dead band is taken for more likely")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Units:
+    """When a channel may have been recorded in another unit than the stated one."""
+
+    gross: float = _set(0.5, "of an output's spread", "as declared: units are off by more, no calibration is")
+    left: float = _set(0.2, "of the mean square", "by the right unit, its parameters still to be refitted")
+    most: int = _set(4, "units", "the best: a wrong input and a wrong output often do the same")
+    told: float = _set(0.02, "of a ratio", "by which a law's factor may miss it and be told as a unit")
+    vague: float = _set(
+        1.25, "times its lower end", "a wider interval holds the ratio of some units or others"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -490,9 +507,10 @@ class _Surface:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 PAST, RATES, SCATTER, AVERAGES = _Past(), _Rates(), _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
+UNITS = _Units()
 DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
 STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
     BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, RATES, PAST, SCATTER, SCREENING, STARTS, STEP,
-    PAIRS, UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
+    UNITS, PAIRS, UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
 )  # fmt: skip

@@ -16,6 +16,12 @@ from toolkit.effects.effect import STAGES, Effect, EffectParameter, Stage
 if TYPE_CHECKING:
     from toolkit.effects.surroundings import Surroundings
 
+ORIGIN, SOURCE_ORIGIN = "_origin", "_origin_from"
+"""Among the values: from where a channel's values are counted, and those of its source; else from zero.
+
+An effect that acts about zero has it where the scale's zero is one of convention (degC): so it does the same
+whatever the unit.
+"""
 Condition = tuple[str, tuple[str, ...]]
 """A condition's key, and its values in the runs in which an effect acts."""
 

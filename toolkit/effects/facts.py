@@ -30,9 +30,9 @@ PatternHook = Callable[["NDArray[np.float64]", Sequence[Values]], "NDArray[np.fl
 # (shown (n,), parameters, setting) -> what the channel would show without the effect
 InverseHook = Callable[["NDArray[np.float64]", Values, "Setting"], "NDArray[np.float64]"]
 
-Where = Literal["output", "cell", "program_cell", "program_load"]
-"""Kinds of channels: an output; a load cell from which outputs are computed; cells and loads of an
-acquisition program of which only the arithmetic is judged."""
+Where = Literal["output", "input", "cell", "program_cell", "program_load"]
+"""Kinds of channels: an output; an input of a simulation; a load cell from which outputs are computed; cells
+and loads of an acquisition program of which only the arithmetic is judged."""
 Second = Literal["with", "from", "record"]
 """What an effect takes beside its channel: the channel it is exchanged ``with``, the one that shows in it
 (``from``), or the calibration ``record`` that replaces the named one."""
@@ -47,7 +47,9 @@ class ChannelFacts:
 
     ``where`` are the kinds of channels that a search puts it on; ``usual`` is the one that a plan means where
     it names none (None: every load cell). ``by_value`` says that it follows the channel's own value: put
-    into a channel that was recorded disturbed, it must not follow that channel's noise. ``between_rows``
+    into a channel that was recorded disturbed, it must not follow that channel's noise. ``about_zero`` says
+    that it depends on where the channel has its zero, which is then the recording's first value where the
+    scale has a zero by convention alone. ``between_rows``
     says that it shows what happened between two rows. ``inverse`` takes it away exactly; without it, a fixed
     point does.
     """
@@ -56,6 +58,7 @@ class ChannelFacts:
     tare: Tare
     by_value: bool
     second: Second | None = None
+    about_zero: bool = False
     usual: str | None = None
     between_rows: bool = False
     inverse: InverseHook | None = None

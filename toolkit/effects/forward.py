@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.effects.applied import AppliedEffect, in_order
+from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect, in_order
 from toolkit.effects.effect import STAGES
 from toolkit.effects.signals import Drive, TireForces
 from toolkit.errors import FitError
@@ -21,6 +21,8 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.effects.effect import ChannelHook
+    from toolkit.effects.facts import Values
     from toolkit.effects.signals import Setting, Tire
 
     Signals = dict[str, NDArray[np.float64]]
@@ -109,9 +111,21 @@ def through(
             leaking = changed.get(source, others.get(source))
             if leaking is None:
                 continue
-            local = with_source(setting, shown(source, leaking))
-        changed[name] = stored(name, hook(shown(name, changed[name]), applied.values, local))
+            local = with_source(setting, _counted(shown(source, leaking), applied.values.get(SOURCE_ORIGIN)))
+        changed[name] = stored(name, _acted(hook, shown(name, changed[name]), applied.values, local))
     return changed
+
+
+def _counted(values: NDArray[np.float64], origin: float | None) -> NDArray[np.float64]:
+    return values if origin is None else values - origin
+
+
+def _acted(
+    hook: ChannelHook, y: NDArray[np.float64], values: Values, setting: Setting
+) -> NDArray[np.float64]:
+    """Return what a hook makes of a channel, about the origin of its scale where it has one by convention."""
+    origin = values.get(ORIGIN)
+    return hook(y, values, setting) if origin is None else hook(y - origin, values, setting) + origin
 
 
 def with_source(setting: Setting, values: NDArray[np.float64]) -> Setting:
@@ -135,9 +149,14 @@ def undone(
     hook, facts = applied.effect.channel, applied.effect.on_channel
     if hook is None or facts is None:
         return recorded
+    values = applied.values
     if facts.inverse is not None:
-        return facts.inverse(recorded, applied.values, setting)
-    local = setting if applied.source is None else with_source(setting, others[applied.source])
+        return _acted(facts.inverse, recorded, values, setting)
+    local = (
+        setting
+        if applied.source is None
+        else with_source(setting, _counted(others[applied.source], values.get(SOURCE_ORIGIN)))
+    )
     # A row that was lost would take those after it along where an effect has a memory.
     present = np.isfinite(recorded)
     if not present.all():
@@ -150,7 +169,7 @@ def undone(
     most: float | None = None
     for _ in range(_STEPS):
         with np.errstate(over="ignore", invalid="ignore"):
-            missed = recorded - hook(guess, applied.values, local)
+            missed = recorded - _acted(hook, guess, values, local)
         error = float(np.abs(missed).max(initial=0.0))
         most = _WILD * max(size, error) if most is None else most
         if not error <= most or not math.isfinite(error):

@@ -99,8 +99,15 @@ class Surroundings(Protocol):
         """Longest way of a run over the position, the usual one from row to row; zero if nothing moves."""
         ...
 
+    def origin(self, name: str | None) -> float | None:
+        """Return the first recorded value of a channel whose scale has a zero by convention, else None."""
+        ...
+
     def spread(self, name: str | None) -> float:
-        """Return the largest magnitude of a channel over all runs, 1 where nothing was recorded of it."""
+        """Return the largest magnitude of a channel over all runs, 1 where nothing was recorded of it.
+
+        Where the channel has an origin, it is counted from there.
+        """
         ...
 
     def values(self, name: str | None) -> NDArray[np.float64]:
@@ -108,7 +115,10 @@ class Surroundings(Protocol):
         ...
 
     def widest(self, name: str | None) -> tuple[float, float] | None:
-        """Return the ends of a channel in the run where its range is widest, None where it has none."""
+        """Return the ends of a channel in the run where its range is widest, None where it has none.
+
+        Where the channel has an origin, they are counted from there.
+        """
         ...
 
     def recorded_range(self, *names: str) -> float:

@@ -58,9 +58,14 @@ class CaseParameter:
 
     def faults(self) -> Iterator[Fault]:
         """Yield bounds that are not around the value."""
-        if self.bounds is not None and not (
-            self.bounds[0] <= self.value <= self.bounds[1] and self.bounds[0] < self.bounds[1]
-        ):
+        if self.bounds is None:
+            return
+        if not self.bounds[0] < self.bounds[1]:
+            yield Fault(
+                key=("bounds",), got=self.bounds, what="the lower bound is not below the upper one",
+                expected="[lower, upper]",
+            )  # fmt: skip
+        elif not self.bounds[0] <= self.value <= self.bounds[1]:
             yield Fault(
                 key=("bounds",), got=self.bounds, what="the value lies outside its bounds",
                 expected=f"bounds around {self.value:g}",

@@ -61,7 +61,7 @@ def test_a_word_that_is_not_known_names_the_nearest_one(tmp_path, old, new, what
         ("value = 94.0", "value = true", "a finite number", "simulation.parameters.mass.value"),
         ("value = 94.0", "", "is missing", "simulation.parameters.mass.value"),
         ("sd = 5.0", "sd = 0.0", "a number above zero", "simulation.parameters.mass.sd"),
-        ("[80.0, 110.0]", "[110.0, 80.0]", "outside its bounds", "simulation.parameters.mass.bounds"),
+        ("[80.0, 110.0]", "[110.0, 80.0]", "not below the upper", "simulation.parameters.mass.bounds"),
         ("[80.0, 110.0]", "[95.0, 110.0]", "outside its bounds", "simulation.parameters.mass.bounds"),
         ("[80.0, 110.0]", "[80.0]", "a finite number, a finite", "simulation.parameters.mass.bounds"),
         ("[80.0, 110.0]", '["80", 110.0]', "a finite number", "simulation.parameters.mass.bounds[1]"),

@@ -12,7 +12,17 @@ def view(*runs):
     slices = tuple(slice(int(end) - len(run), int(end)) for end, run in zip(ends, runs, strict=True))
     column = np.concatenate(runs)
     kept = np.isfinite(column) & (column < 100)
-    return CaseView(SimpleNamespace(observed={"F": column}, kept={"F": kept}, slices=slices, runs=()), "F")
+    return CaseView(
+        SimpleNamespace(
+            case=SimpleNamespace(channels=()),
+            model=SimpleNamespace(outputs=()),
+            observed={"F": column},
+            kept={"F": kept},
+            slices=slices,
+            runs=(),
+        ),
+        "F",
+    )
 
 
 def test_a_range_is_never_taken_over_two_runs():

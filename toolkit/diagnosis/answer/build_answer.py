@@ -25,14 +25,16 @@ from toolkit.diagnosis.answer.next_measurements import equivalent_to, next_measu
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.answer.refit_findings import confounded_findings, refit_findings
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
+from toolkit.diagnosis.policy import PRIORS, SCREENING, UNITS, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
-from toolkit.diagnosis.simulators.parameter_units import unit_of
-from toolkit.effects.applied import AppliedEffect
+from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
+from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.findings import Finding
+from toolkit.units import near_ratio
 
 if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.law.learn import Laws
 
 
@@ -77,7 +79,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
             alpha=SCREENING.alpha / tests,
             units=units,
         ),
-        next_measurements=next_measurements(search, effects, verdict),
+        next_measurements=(*_unit_hints(search, laws), *next_measurements(search, effects, verdict)),
         findings=(
             *findings,
             *_outliers(case, search),
@@ -115,8 +117,8 @@ def _effect(search: Search, step: Step) -> FoundEffect:
     return FoundEffect(
         key=active.key,
         stage=active.effect.stage,
-        statement=active.effect.statement + ("" if runs is None else f" In {_listed(runs)} alone."),
-        equation=active.effect.equation,
+        statement=_statement(problem, active) + ("" if runs is None else f" In {_listed(runs)} alone."),
+        equation=active.effect.equation + _counted_from(problem, active),
         reference=active.effect.reference,
         parameters=(*_parameters(search, active, runs), *_named(active, runs)),
         equivalent_to=equivalent,
@@ -124,6 +126,53 @@ def _effect(search: Search, step: Step) -> FoundEffect:
         held_out_log_score_gain=step.held_out_gain,
         p_value=step.p_value,
     )
+
+
+def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
+    """Return sentences where a law's factor is that of a channel in another unit, within its interval."""
+    problem, hints = search.problem, list[str]()
+    for law in found_laws(search, laws):
+        scaled = law.acts == "multiplies" or law.variables == (law.channel,)
+        for parameter in law.parameters if scaled and law.kind == "output" else ():
+            if parameter.unit != "1" or isinstance(parameter.value, str) or parameter.ci95 is None:
+                continue
+            low, high = sorted(1 + end for end in parameter.ci95)
+            factor = 1 + parameter.value
+            if factor <= 0:
+                continue
+            low, high = min(low, factor / (1 + UNITS.told)), max(high, factor * (1 + UNITS.told))
+            if not low > 0 or high > low * UNITS.vague:
+                continue
+            for name in (law.channel, *(driver.name for driver in problem.case.drivers)):
+                text = channel_unit(problem.case, problem.model, name)
+                ends = (low, high) if name == law.channel else (1 / high, 1 / low)
+                ratio = near_ratio(*ends, text)
+                if ratio is not None and " read as " in ratio:
+                    hints.append(
+                        f"Check the unit of {name}: the law's factor {factor:.4g} is that of {ratio}."
+                    )
+    return tuple(dict.fromkeys(hints))[:2]
+
+
+def _statement(problem: Problem, active: AppliedEffect) -> str:
+    """Return what an effect is; of a ratio of units also of which."""
+    effect = active.effect
+    if not effect.needs_signal or not effect.names:
+        return effect.statement
+    ratio = active.values[effect.names[0]]
+    text = near_ratio(ratio, ratio, channel_unit(problem.case, problem.model, active.channel))
+    return effect.statement if text is None else f"{effect.statement.removesuffix('.')}: {text}."
+
+
+def _counted_from(problem: Problem, active: AppliedEffect) -> str:
+    """Return from where an effect counts values whose scale has a zero by convention alone."""
+    ends = {active.channel: ORIGIN, active.source: SOURCE_ORIGIN}
+    told = [
+        f"{name} from {active.values[key]:.6g} {channel_unit(problem.case, problem.model, name)}"
+        for name, key in ends.items()
+        if key in active.values
+    ]
+    return f"; counted: {', '.join(told)}" if told else ""
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -120,9 +120,11 @@ def _curve(
     low, high = float(signal.values.min()), float(signal.values.max())
     x = np.linspace(low, high, LAWS.points)
 
+    counted = replace(signal, values=x).values_in(trial.shape)
+
     def at(values: dict[str, float]) -> NDArray[np.float64]:
         with np.errstate(all="ignore"):
-            return np.broadcast_to(curve({"x": x}, values), LAWS.points).astype(float)
+            return np.broadcast_to(curve({"x": counted}, values), LAWS.points).astype(float)
 
     values = dict(fitted.values)
     y, slopes = at(values), []

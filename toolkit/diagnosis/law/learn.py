@@ -27,7 +27,8 @@ from toolkit.diagnosis.law.trial import (
 )
 from toolkit.diagnosis.law.unseen_runs import laws_on_unseen_runs
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
-from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
+from toolkit.diagnosis.search.bends import at_bound
+from toolkit.diagnosis.search.forward_step import joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, best_of
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError

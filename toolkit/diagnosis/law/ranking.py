@@ -240,5 +240,5 @@ def _evaluated(problem: Problem, base: Fit, trial: Trial) -> Array:
             values = _unit(applied, name).values
             with np.errstate(all="ignore"):
                 change = np.broadcast_to(cast("Array", law(signals, values, run.t)), run.rows)
-            columns[rows, k] = simulated * change if trial.acts == "multiplies" else change
+                columns[rows, k] = simulated * change if trial.acts == "multiplies" else change
     return columns

@@ -30,12 +30,14 @@ class Shape:
 
     ``units`` are those of its parameters, of ``{y}`` what the law acts on, ``{x}`` and ``{z}``;
     ``starts`` gives values of the parameters that shape it: (signal, time), each (rows,), to a list of them.
+    ``about_zero`` says that the law depends on where its signals have their zero.
     """
 
     form: Form
     text: str
     units: Mapping[str, str]
     starts: Starts = lambda _, __: [{}]
+    about_zero: bool = True
 
 
 def _spread(x: Array) -> float:
@@ -90,8 +92,10 @@ def _reaches(x: Array, _: Array) -> list[dict[str, float]]:
     return [{"reach": share * _spread(x)} for share in (0.02, 0.1, 0.3)]
 
 
-def _static(text: str, starts: Starts | None = None, **units: str) -> Shape:
-    return Shape(form="static", text=text, units=units, starts=starts or (lambda _, __: [{}]))
+def _static(text: str, starts: Starts | None = None, *, about_zero: bool = True, **units: str) -> Shape:
+    return Shape(
+        form="static", text=text, units=units, starts=starts or (lambda _, __: [{}]), about_zero=about_zero
+    )
 
 
 _TURN = "2*pi"
@@ -125,8 +129,8 @@ TWO: tuple[Shape, ...] = (
     _static("a*{x}*{z}**2", a="{y}/({x}*{z}^2)"),
 )
 ALIKE: tuple[Shape, ...] = (
-    _static("a*({x} - {z})", a="{y}/{x}"),
-    _static("a*({x} - {z})*abs({x} - {z})", a="{y}/{x}^2"),
+    _static("a*({x} - {z})", about_zero=False, a="{y}/{x}"),
+    _static("a*({x} - {z})*abs({x} - {z})", about_zero=False, a="{y}/{x}^2"),
 )
 """Shapes of two signals in one unit: an exchange between them."""
 MODE = Shape(
@@ -135,9 +139,15 @@ MODE = Shape(
 )  # fmt: skip
 REMEMBERING: tuple[Shape, ...] = (
     Shape(form="mode", text="a*lag({x}, tau)", units={"a": "{y}/{x}", "tau": "s"}, starts=_times),
-    Shape(form="mode", text="a*({x} - lag({x}, tau))", units={"a": "{y}/{x}", "tau": "s"}, starts=_times),
+    Shape(
+        form="mode", text="a*({x} - lag({x}, tau))", units={"a": "{y}/{x}", "tau": "s"}, starts=_times,
+        about_zero=False,
+    ),
     MODE,
-    Shape(form="loop", text="a*loop({x}, reach)", units={"a": "{y}", "reach": "{x}"}, starts=_reaches),
+    Shape(
+        form="loop", text="a*loop({x}, reach)", units={"a": "{y}", "reach": "{x}"}, starts=_reaches,
+        about_zero=False,
+    ),
 )  # fmt: skip
 TONE = Shape(
     form="tone", units={"a1": "{y}", "a2": "{y}", "frequency": "Hz"},
@@ -162,4 +172,4 @@ def curve(x: Array) -> Shape:
     knots = np.unique(np.quantile(x, np.linspace(0.01, 0.99, LAWS.knots)))
     points = ", ".join(f"{knot:.6g}, a{i}" for i, knot in enumerate(knots, start=1))
     units = {f"a{i}": "{y}" for i in range(1, len(knots) + 1)}
-    return Shape(form="static", text=f"spline({{x}}, {points})", units=units)
+    return Shape(form="static", text=f"spline({{x}}, {points})", units=units, about_zero=False)

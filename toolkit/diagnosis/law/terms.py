@@ -18,6 +18,7 @@ from toolkit.diagnosis.law.ranking import all_responses
 from toolkit.diagnosis.law.shapes import ALIKE, ONE, TWO, Shape, pulse
 from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
 from toolkit.diagnosis.policy import LAWS
+from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.law import ITSELF, POSITION, TIME
@@ -67,9 +68,14 @@ def _signals(problem: Problem, motion: Moving, channel: str, of: str) -> list[Si
     """Return what a law in the equation of a state may read: itself first, then its position, then others."""
     sizes = motion.sizes(channel, lambda _: 1.0)
     _, speed, position = map(reduced, motion.units(channel))
+    view = CaseView(problem, channel)
+
     symmetric = np.linspace(-1, 1, 41)
     grid = sizes.fastest * symmetric if of == "velocity" else np.linspace(0, sizes.level, 41)
-    listed = [Signal(written=f"[{ITSELF}]", name=channel, unit=speed, values=grid)]
+    own = view.origin(channel)
+    if own is not None:
+        grid = next(np.array(state.quantiles) for state in motion.states if state.name == channel)
+    listed = [Signal(written=f"[{ITSELF}]", name=channel, unit=speed, values=grid, origin=own)]
     names = {channel}
     if sizes.has_position:
         name = motion.position(channel) or POSITION
@@ -87,10 +93,13 @@ def _signals(problem: Problem, motion: Moving, channel: str, of: str) -> list[Si
             inputs.append((driver.name, reduced(problem.case.unit(driver.name)), np.concatenate(columns)))
     times = np.concatenate([run.t for run in problem.runs])
     moving = [
-        Signal(written=f"[{name}]", name=name, unit=text, values=values, steady=name != TIME)
+        Signal(
+            written=f"[{name}]", name=name, unit=text, values=values, steady=name != TIME,
+            origin=view.origin(name),
+        )
         for name, text, values in (*inputs, (TIME, "s", times))
         if np.ptp(values) > 1e-9 * np.abs(values).max(initial=0.0)
-    ]
+    ]  # fmt: skip
     return listed + moving
 
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from toolkit.diagnosis.law.shapes import MODE, ONE, REMEMBERING, TONE, TWO, UNLOCKED, Form, Shape, curve, rung
 from toolkit.diagnosis.policy import LAWS, STRUCTURE
+from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.unexplained import beyond_its_past, strongest_events, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.setting import dimension
@@ -43,6 +44,7 @@ class Signal:
     """What a law may depend on: how a formula writes it, its channel, its unit, and its recorded values.
 
     ``steady`` signals are recorded or simulated values themselves, no rates: of these two make a product.
+    One with an ``origin`` is on a scale whose zero is one of convention: laws about zero count it from there.
     """
 
     written: str
@@ -50,6 +52,19 @@ class Signal:
     unit: str
     values: Array = field(compare=False)
     steady: bool = True
+    origin: float | None = None
+
+    def written_in(self, shape: Shape) -> str:
+        """Return how a law of a shape writes it."""
+        if self.origin is None or not shape.about_zero:
+            return self.written
+        return f"({self.written} - {self.origin:.9g})"
+
+    def values_in(self, shape: Shape) -> Array:
+        """Return its values as a law of a shape counts them."""
+        if self.origin is None or not shape.about_zero:
+            return self.values
+        return self.values - self.origin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,7 +109,7 @@ def started(
 ) -> Iterator[Trial]:
     """Give a law at every start of what shapes it; ``force`` is the unit of what enters an equation."""
     t = np.concatenate([run.t for run in problem.runs]) if problem.case.has_time else np.arange(2.0)
-    for start in shape.starts(signals[0].values, t):
+    for start in shape.starts(signals[0].values_in(shape), t):
         yield trial_at(problem, shape, signals, acts, channel, start, force=force)
 
 
@@ -104,7 +119,7 @@ def trial_at(
 ) -> Trial:  # fmt: skip
     """Return a law at one start, the amplitudes zero; ``force`` is the unit of what enters an equation."""
     case = problem.case
-    tokens = dict(zip(("x", "z"), (signal.written for signal in signals), strict=False))
+    tokens = dict(zip(("x", "z"), (signal.written_in(shape) for signal in signals), strict=False))
     text = shape.text.format(**tokens) if "{x}" in shape.text else shape.text
     effect = law_effect(law_name(acts, text))
     y = {"adds": channel_unit(case, problem.model, channel), "multiplies": "1", "enters": force}[acts]
@@ -147,12 +162,13 @@ _SPEEDS = ("speed", "frequency")
 def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
     """Return what a law on an output may depend on: inputs, their rates and ways, the output itself, time."""
     case, timed = problem.case, problem.case.has_time
+    view = CaseView(problem, output)
     listed = []
 
     def with_rate(name: str, of: str, values: Array, text: str) -> None:
         if np.ptp(values) <= 1e-9 * np.abs(values).max(initial=0.0):
             return
-        listed.append(Signal(written=f"[{name}]", name=of, unit=text, values=values))
+        listed.append(Signal(written=f"[{name}]", name=of, unit=text, values=values, origin=view.origin(of)))
         if timed:
             rates = [
                 np.gradient(values[rows], run.t) if run.rows > 1 else np.zeros(run.rows)
@@ -200,10 +216,12 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
     """Give every law that some outputs may show, at every start, without gains."""
     for output in outputs:
         signals = signals_of(problem, base, output)
+        # Of a value that is counted from an arbitrary zero a multiple is nothing.
+        multiplies = CaseView(problem, output).origin(output) is None
         for signal in signals:
             for shape in ONE:
                 yield from started(problem, shape, (signal,), "adds", output)
-                if ITSELF not in signal.written:
+                if ITSELF not in signal.written and multiplies:
                     yield from started(problem, shape, (signal,), "multiplies", output)
             for shape in REMEMBERING if problem.case.has_time and signal.name != "time" else ():
                 yield from started(problem, shape, (signal,), "adds", output)

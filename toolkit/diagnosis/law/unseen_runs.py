@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 from toolkit.diagnosis.fit.folds import hold_out
 from toolkit.diagnosis.law.ranking import all_responses, at_coefficients, likely
 from toolkit.diagnosis.policy import UNSEEN
-from toolkit.diagnosis.search.forward_step import at_bound, joint_fit
+from toolkit.diagnosis.search.bends import at_bound
+from toolkit.diagnosis.search.forward_step import joint_fit
 from toolkit.diagnosis.search.unseen_runs import asked_of_unseen_runs, gains_of, takes_most
 from toolkit.errors import FitError
 

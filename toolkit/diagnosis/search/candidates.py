@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.policy import STARTS
 from toolkit.diagnosis.search.case_view import CaseView
-from toolkit.effects.applied import AppliedEffect, EffectKey
+from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect, EffectKey
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Values
@@ -130,11 +130,14 @@ def candidates(
 ) -> tuple[CandidateEffect, ...]:
     """Return every candidate of a case, scaled by how the case is seen at each place."""
     listed = []
+    inputs = {driver.name for driver in problem.case.drivers}
     for effect in (*effects().values(), INPUT_NOISE):
         if effect.in_time and not problem.case.has_time:
             continue
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
+            if channel in inputs and effect.channel is not None:
+                continue  # asked where the declared simulation is grossly wrong: `wrong_units`
             case = view(problem, channel, source)
             confined = effect.in_case(case)
             starts = _starts(case, confined)
@@ -145,8 +148,11 @@ def candidates(
 
 
 def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
+    if effect.term is not None and effect.term.limit is not None and case.origin(case.channel) is not None:
+        return ()  # a level above a zero that means nothing
     if not effect.parameters:
-        return (Start(values={}, directions=({},), amplitudes=()),)
+        values = origins(case, effect)
+        return (Start(values=values, directions=(values,), amplitudes=()),)
     scales = {
         parameter.name: 1.0 if parameter.scale is None else parameter.scale(case)
         for parameter in effect.parameters
@@ -156,6 +162,7 @@ def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
         for parameter in effect.parameters
     }
     extra |= {} if effect.numerics is None else dict(effect.numerics(case))
+    extra |= origins(case, effect)
     phases = {
         parameter.phase_of: parameter.name
         for parameter in effect.parameters
@@ -196,6 +203,14 @@ def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
                 )
             )
     return tuple(starts)
+
+
+def origins(case: Surroundings, effect: Effect) -> dict[str, float]:
+    """Return from where the values of an effect's channels are counted, where not from their own zero."""
+    if effect.on_channel is None or not effect.on_channel.about_zero:
+        return {}
+    counted = {ORIGIN: case.origin(case.channel), SOURCE_ORIGIN: case.origin(case.source)}
+    return {key: origin for key, origin in counted.items() if origin is not None}
 
 
 def _shape_values(case: Surroundings, shape: EffectParameter, scale: float) -> list[float]:

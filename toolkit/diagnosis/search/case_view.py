@@ -89,11 +89,24 @@ class CaseView:
         moving = self._problem.model.capability.motion
         return (0.0, 0.0) if moving is None else moving.way(self.channel)
 
+    def origin(self, name: str | None) -> float | None:
+        """Return the first recorded value of a channel whose scale has a zero by convention, else None."""
+        if name is None:
+            return None
+        try:
+            stated = unit(channel_unit(self._problem.case, self._problem.model, name))
+        except UnitError:
+            return None
+        if not stated.is_interval:
+            return None
+        values = self.values(name)
+        return float(values[0]) if len(values) else None
+
     def spread(self, name: str | None) -> float:
         """Return the largest magnitude of a channel over all runs, 1 where nothing was recorded of it."""
         if name is None:
             return 1.0
-        values = np.abs(self.values(name))
+        values = np.abs(self.values(name) - (self.origin(name) or 0.0))
         return float(values.max()) if len(values) and values.max() > 0 else 1.0
 
     def values(self, name: str | None) -> NDArray[np.float64]:
@@ -114,7 +127,9 @@ class CaseView:
             columns = [run.columns[str(name)] for run in self._problem.runs if name in run.columns]
         finite = [column[np.isfinite(column)] for column in columns]
         ranges = [(float(column.min()), float(column.max())) for column in finite if len(column)]
-        return max(ranges, key=lambda ends: ends[1] - ends[0], default=None)
+        ends = max(ranges, key=lambda ends: ends[1] - ends[0], default=None)
+        origin = self.origin(name)
+        return ends if ends is None or origin is None else (ends[0] - origin, ends[1] - origin)
 
     def recorded_range(self, *names: str) -> float:
         """Return the range of the first of these channels that was recorded, 1 where none was."""

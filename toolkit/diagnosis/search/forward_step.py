@@ -14,6 +14,7 @@ from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.fit.unknown_past import past_gain
 from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
+from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.effects.applied import AppliedEffect, EffectKey
@@ -165,12 +166,11 @@ def best_step(
         gain = scores.total - held_base.total
         if gain < STEP.least_gain or trial.score - base.log_posterior < STEP.least_gain:
             continue
-        # One that a later effect drives to its bound is no better than one that starts there.
-        if any(at_bound(each) for each in made.active) or not matters(problem, held_base, scores, least):
+        if only_bends(problem, made) or not matters(problem, held_base, scores, least):
             continue
         if not beyond_form(problem, refitted, held_base, scores, form):
             continue
-        if made.active[-1].effect.needs_signal and not _shows(problem, scores, made.active[-1]):
+        if made.active[-1].effect.needs_signal and not shows_signal(problem, scores, made.active[-1]):
             continue
         standing.append((trial, scores))
         if not _leaves_more_than_noise(problem, made):
@@ -210,15 +210,21 @@ def _leaves_more_than_noise(problem: Problem, made: Fit) -> bool:
     return any(each.process_sd > each.sensor_sd for each in parts)
 
 
-def _shows(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> bool:
+def shows_signal(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> bool:
     """Tell whether an output has the simulated signal in it, and is not only made small by a factor."""
-    name = str(effect.channel)
-    if name not in problem.names:
-        return True
-    rows = problem.kept[name]
-    simulated = held_out.simulated[name][rows]
-    residual = problem.observed[name][rows] - simulated
-    return float(np.mean(residual**2)) < STEP.signal**2 * float(np.mean(simulated**2))
+    names = [str(effect.channel)]
+    if effect.channel in {driver.name for driver in problem.case.drivers}:
+        names = list(problem.names)  # of an input's unit some output tells
+    view = CaseView(problem, effect.channel)
+
+    def has_signal(name: str) -> bool:
+        rows = problem.kept[name]
+        simulated = held_out.simulated[name][rows]
+        residual = problem.observed[name][rows] - simulated
+        simulated = simulated - (view.origin(name) or 0.0)
+        return float(np.mean(residual**2)) < STEP.signal**2 * float(np.mean(simulated**2))
+
+    return any(has_signal(name) if name in problem.names else True for name in names)
 
 
 def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Rival, ...]:
@@ -318,15 +324,3 @@ def _shared(effect: AppliedEffect, share: float) -> AppliedEffect:
 def _shapes(effect: AppliedEffect) -> int:
     """Return how many parameters only shape an effect: they make it no less able to imitate another."""
     return sum(parameter.off is None and not parameter.ends_count for parameter in effect.searched)
-
-
-def at_bound(effect: AppliedEffect) -> bool:
-    """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
-    for parameter in effect.searched:
-        if parameter.ends_count:
-            continue
-        value = effect.values[parameter.name]
-        for bound in parameter.bounds:
-            if math.isfinite(bound) and bound != 0 and abs(value - bound) < STEP.bound * abs(bound):
-                return True
-    return False

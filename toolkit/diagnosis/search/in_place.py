@@ -17,9 +17,9 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, jacobian
 from toolkit.diagnosis.fit.noise import whiten
 from toolkit.diagnosis.policy import FOLLOWING
+from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.forward_step import (
     Rival,
-    at_bound,
     joint_fit,
     least_in_place,
     score_in_place,
@@ -53,7 +53,7 @@ def best_in_place(
     for candidate in _alike(problem, joint, applied, listed)[: FOLLOWING.in_place]:
         least = least_in_place(problem, max(scores.values()), candidate)
         instead = joint_fit(problem, replace(joint, active=others), (candidate,), least=least)
-        if instead is not None and not any(at_bound(each) for each in instead.active):
+        if instead is not None and not only_bends(problem, instead):
             fits[candidate.key] = (instead, instead.active[-1])
             scores[candidate.key] = score_in_place(problem, *fits[candidate.key])
     best = max(scores, key=lambda key: scores[key])

@@ -21,7 +21,8 @@ from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.unknown_past import past_gain
 from toolkit.diagnosis.policy import PAIRS, SCREENING, STEP
-from toolkit.diagnosis.search.forward_step import Rival, Step, at_bound, drifts_faster, joint_fit
+from toolkit.diagnosis.search.bends import only_bends
+from toolkit.diagnosis.search.forward_step import Rival, Step, drifts_faster, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
@@ -107,7 +108,7 @@ def best_pair(
     for pair in _of_different_effects(ranked_pairs(screen, scored))[: PAIRS.fitted]:
         members = _reached(screen, pair)
         joint = None if members is None else joint_fit(problem, base, members)
-        if joint is None or any(at_bound(each) for each in joint.active):
+        if joint is None or only_bends(problem, joint):
             continue
         if not drifts_faster(problem, base, joint):
             fitted.append((pair, joint))

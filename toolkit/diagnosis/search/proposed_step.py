@@ -11,10 +11,10 @@ from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import FOLLOWING, PAIRS, STEP
+from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.forward_step import (
     Joint,
     Step,
-    at_bound,
     best_step,
     cost,
     drifts_faster,
@@ -96,7 +96,7 @@ def _joined(
     """
     members = proposed.together[:count]
     joint = joint_fit(problem, base, [scored.active for scored in members], begin=members[0].p)
-    if joint is None or any(at_bound(applied) for applied in joint.active):
+    if joint is None or only_bends(problem, joint):
         return None
     if drifts_faster(problem, base, joint):
         return None

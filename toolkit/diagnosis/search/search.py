@@ -29,13 +29,14 @@ from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.diagnosis.search.unseen_runs import shown_on_unseen_runs
+from toolkit.diagnosis.search.wrong_units import is_listed, unit_step, wrong_units
+from toolkit.effects.applied import ORIGIN, AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.search.candidates import CandidateEffect
-    from toolkit.effects.applied import AppliedEffect
 
 # What of a found effect matters for its size alone: the zero beneath it, the noise that went through it.
 
@@ -158,7 +159,10 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     if problem.rates and refitted.plain:
         refitted = fit(problem, start=refitted.p)
     folds = folds_of(problem, refitted)
+    wrong = wrong_units(problem, (nominal, refitted))
     listed = candidates(problem)
+    if wrong and not is_listed(wrong[0], listed):
+        listed = (*wrong, *listed)
     skipped: list[str] = []
     steps: list[Step] = []
     base = refitted
@@ -198,6 +202,14 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 before = structure
             if turn == STEP.most_effects:
                 break
+            seen = {trial.candidate.key for trial in view.significant}
+            if turn == 0 and not any(candidate.key in seen for candidate in wrong):
+                budget.check(f"step {turn + 1}: wrong units")
+                outcome = unit_step(problem, folds, base, held_base, wrong)
+                if outcome is not None:
+                    base, held_base, step = outcome
+                    steps.append(step)
+                    continue
             if led is not None and led.outcome is not None:
                 base, held_base, more = beside_rivals(
                     problem, folds, base, held_base, led, led.outcome, view,
@@ -305,7 +317,9 @@ def _stepped(
         if lattice is None:
             continue
         width = candidate.active.effect.names[0]
-        active = replace(candidate.active, values={width: lattice.step, f"_half_{width}": lattice.half_width})
+        origin = {key: value for key, value in candidate.starts[0].values.items() if key == ORIGIN}
+        sizes = {width: lattice.step, f"_half_{width}": lattice.half_width}
+        active = replace(candidate.active, values=sizes | origin)
         gain = lattice.log_score_gain
         step = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
@@ -314,7 +328,10 @@ def _stepped(
         with_steps = replace_effects(problem, base, (*base.active, active))
         held_out = HeldOut(
             scores=held_base.scores,
-            simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], lattice.step)},
+            simulated={
+                **held_base.simulated,
+                name: _rounded(held_base.simulated[name], lattice.step, origin.get(ORIGIN, 0.0)),
+            },
             fits=held_base.fits,
         )
         if matters(problem, held_base, held_out, STEP.first):
@@ -323,8 +340,8 @@ def _stepped(
     return base, held_base, steps
 
 
-def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    return np.asarray(step * np.round(values / step))
+def _rounded(values: NDArray[np.float64], step: float, origin: float) -> NDArray[np.float64]:
+    return np.asarray(step * np.round((values - origin) / step) + origin)
 
 
 def _pruned(
@@ -394,7 +411,7 @@ def _told_from_none(
     for applied in base.active:
         own, at = at, at + len(applied.searched)
         sizes = [(i, each) for i, each in enumerate(applied.searched) if each.off is not None]
-        if len(sizes) != 1 or len(steps) < 2:
+        if len(sizes) != 1:
             continue
         (i, size) = sizes[0]
         sd = math.sqrt(max(float(base.covariance[own + i, own + i]), 0.0))
@@ -412,6 +429,8 @@ def _told_from_none(
             scale = np.ones(len(base.covariance))
             scale[own + i] = abs(applied.values[size.name] - (size.off or 0.0)) / math.sqrt(2 * lost) / sd
             base = replace(base, covariance=base.covariance * np.outer(scale, scale))
+            continue
+        if len(steps) < 2:
             continue
         try:
             scores = hold_out(problem, folds, bare.active, bare)

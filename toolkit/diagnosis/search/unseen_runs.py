@@ -18,8 +18,9 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
 from toolkit.diagnosis.policy import PRIORS, SCREENING, UNSEEN, VERDICT
+from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.case_view import CaseView
-from toolkit.diagnosis.search.forward_step import Rival, Step, at_bound, joint_fit
+from toolkit.diagnosis.search.forward_step import Rival, Step, joint_fit
 from toolkit.diagnosis.search.noise_floor import is_beyond_noise
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
 from toolkit.diagnosis.search.screen_step import Look, about_declared
@@ -101,7 +102,7 @@ def _fitted(problem: Problem, base: Fit, view: Look) -> list[tuple[Scored, Fit]]
     best: dict[object, tuple[Scored, Fit]] = {}
     for begin, trial in starts:
         made = joint_fit(problem, begin, (trial.active,), plain=True)
-        if made is None or any(at_bound(each) for each in made.active):
+        if made is None or only_bends(problem, made):
             continue
         before = best.get(trial.candidate.key)
         if before is None or _left(problem, made.simulated) < _left(problem, before[1].simulated):

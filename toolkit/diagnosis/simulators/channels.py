@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.setting import dimension
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
-from toolkit.effects.forward import through
+from toolkit.effects.forward import through, undone
 from toolkit.effects.signals import Setting
 
 if TYPE_CHECKING:
@@ -51,6 +51,25 @@ def channel_places(
             if source != to and (_both_loads(to_unit, unit) or dimension(unit) == dimension(to_unit))
         ]
     return [(name, None) for name, _ in outputs]
+
+
+def input_places(effect: Effect, inputs: Sequence[tuple[str, str]]) -> list[tuple[str | None, str | None]]:
+    """Return the inputs that an effect may have been in when they were recorded."""
+    if effect.on_channel is None or "input" not in effect.on_channel.where:
+        return []
+    return [(name, None) for name, _ in inputs]
+
+
+def true_inputs(
+    run: Run, active: Sequence[AppliedEffect], inputs: set[str], setting: Setting
+) -> dict[str, NDArray[np.float64]]:
+    """Return the inputs of a run that were recorded with an effect in them, as they are without it."""
+    true: dict[str, NDArray[np.float64]] = {}
+    for applied in active:
+        name = str(applied.channel)
+        if applied.effect.channel is not None and name in inputs and applied.acts_in(run):
+            true[name] = undone(true.get(name, run.columns[name]), applied, setting, run.columns)
+    return true
 
 
 def _both_loads(channel: str, source: str) -> bool:

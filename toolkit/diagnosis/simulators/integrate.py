@@ -74,6 +74,7 @@ def integrate(
     rates = rate(float(t[0]), start)
     if rates.shape != start.shape:
         raise IntegrationError(f"rhs gives {rates.size} rates for {start.size} states")
+    _check_numbers(float(t[0]), start, rates)
     absolute, k = atol.tolist(), rates.tolist()
     for i in range(len(t) - 1):
         x, k, step, at = _advance(rate, float(t[i]), float(t[i + 1]), x, k, absolute, step, slides)
@@ -159,22 +160,38 @@ def _at(rate: Rate, t: float, y: list[float], hold: Callable[[list[float]], None
     return rates
 
 
+def _check_numbers(t: float, x: NDArray[np.float64], rates: NDArray[np.float64]) -> None:
+    """Refuse rates that are no numbers, with the time and the state that rhs was asked at."""
+    if not np.isfinite(rates).all():
+        bad = int(np.flatnonzero(~np.isfinite(rates))[0])
+        state = ", ".join(f"{value:.6g}" for value in x.tolist())
+        raise IntegrationError(f"rhs gives {rates[bad]} for state {bad + 1} at t = {t:g} s, x = [{state}]")
+
+
 def _stiff(
     rate: Rate, t: float, end: float, x: NDArray[np.float64], atol: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     from scipy.integrate import solve_ivp
 
     calls_left = _MOST
+    bad: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def counted(at: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
         # Before a state that runs off within finite time, the solver's steps would shrink for ever.
-        nonlocal calls_left
+        nonlocal calls_left, bad
         calls_left -= 1
         if calls_left < 0:
             raise IntegrationError(f"no end is reached near {at:g} s")
-        return rate(at, state)
+        rates = rate(at, state)
+        if bad is None and not np.isfinite(rates).all() and np.isfinite(state).all():
+            bad = at, state.copy(), rates
+        return rates
 
     solved = solve_ivp(counted, (t, end), x, method="LSODA", rtol=RTOL, atol=atol)
     if not solved.success or not np.isfinite(solved.y[:, -1]).all():
-        raise IntegrationError(str(solved.message))
+        if bad is not None:
+            _check_numbers(*bad)
+        raise IntegrationError(
+            str(solved.message) if not solved.success else f"the state is no number at {end:g} s"
+        )
     return np.asarray(solved.y[:, -1], dtype=np.float64)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.channels import channel_places, through_channels
+from toolkit.diagnosis.simulators.channels import (
+    channel_places,
+    input_places,
+    through_channels,
+    true_inputs,
+)
 from toolkit.diagnosis.simulators.equation import Equation, failed
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
@@ -65,6 +69,8 @@ class OdeModel:
         self.parameters = case.parameters
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self.drivers = tuple(driver.name for driver in case.drivers)
+        self._inputs = {driver.name for driver in case.drivers if driver.role == "input"}
+        self._driven: dict[Any, Run] = {}
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
         self._held = 0  # bytes of what is kept
@@ -110,7 +116,12 @@ class OdeModel:
             motion=Moving(
                 integrates=True, sizes=self._motion_sizes, units=self._motion_units, way=self._way,
                 position=lambda channel: self.position_of(str(channel)), states=self._ranges(),
-                pushed=functools.partial(pushed, self), followed=functools.partial(followed, self),
+                pushed=lambda run, p, active, channel, pattern: pushed(
+                    self, self._as_driven(run, active), p, active, channel, pattern
+                ),
+                followed=lambda runs, p, active, asked: followed(
+                    self, [self._as_driven(run, active) for run in runs], p, active, asked
+                ),
             ),
         )  # fmt: skip
 
@@ -221,6 +232,7 @@ class OdeModel:
         self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a free simulation over the whole run."""
+        run = self._as_driven(run, active)
         key, forces = self._key(run, p, active)
         if key not in self._kept:
             states = self.integrated(run, p, forces, alone=key in self._alone)
@@ -239,6 +251,17 @@ class OdeModel:
         shown = through_channels(simulated, fine, finer, self.setting(finer), finer.columns)
         return {name: values[::FINER] for name, values in shown.items()}
 
+    def _as_driven(self, run: Run, active: Sequence[AppliedEffect]) -> Run:
+        """Return a run with its inputs as they are without the effects that they were recorded with."""
+        disturbed = [applied for applied in active if applied.channel in self._inputs]
+        if not disturbed:
+            return run
+        key = (run, tuple((applied.key, tuple(applied.values.items())) for applied in disturbed))
+        if key not in self._driven:
+            true = true_inputs(run, disturbed, self._inputs, self.setting(run))
+            self._driven[key] = replace(run, columns={**run.columns, **true})
+        return self._driven[key]
+
     def _prepare(
         self,
         runs: Sequence[Run],
@@ -250,6 +273,8 @@ class OdeModel:
             return
         listed = {}
         for p, active in points:
+            if any(applied.channel in self._inputs for applied in active):
+                continue
             keys = tuple(self._key(run, p, active)[0] for run in runs)
             listed[keys] = (p, [applied for applied in active if applied.effect.stage == "dynamics"])
         # Those that are known already are done again with the others: their steps are then the same, and
@@ -439,9 +464,10 @@ class OdeModel:
             meanings = declared_dimensions(listed) | self._dimensions
             return [(self.states[i], None) for i in fitting(effect.term, at, self.derivative_of, meanings)]
         others = [(driver.name, driver.unit) for driver in self.case.drivers]
-        return channel_places(
+        found = channel_places(
             effect, [(output.name, output.unit) for output in self.outputs], others, drivers
         )
+        return found + input_places(effect, [pair for pair in others if pair[0] in self._inputs])
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.channels import channel_places
+from toolkit.diagnosis.simulators.channels import channel_places, input_places
 from toolkit.diagnosis.simulators.following import Followed, following_shapes, padded
 from toolkit.diagnosis.simulators.simulator import (
     Capability,
@@ -98,7 +98,9 @@ class OdeApart:
         if effect.term is None:
             outputs = [(output.name, output.unit) for output in self.outputs]
             drivers = [(driver.name, driver.unit) for driver in self.case.drivers]
-            return channel_places(effect, outputs, drivers, {name for name, _ in drivers})
+            inputs = [(driver.name, driver.unit) for driver in self.case.drivers if driver.role == "input"]
+            found = channel_places(effect, outputs, drivers, {name for name, _ in drivers})
+            return found + input_places(effect, inputs)
         if is_law(effect.name):
             return [(state, None) for state in term_places(self.places)]
         return self._places[effect.name]

@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.diagnosis.simulators.array_table import ArrayTable, Trials
-from toolkit.diagnosis.simulators.channels import channel_places, through_channels
+from toolkit.diagnosis.simulators.channels import (
+    channel_places,
+    input_places,
+    through_channels,
+    true_inputs,
+)
 from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Output
@@ -124,6 +129,7 @@ class PythonModel(AlongMotion):
             Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
         )
         self._names = {channel.name for channel in case.channels}
+        self._inputs = {channel.name for channel in case.drivers if channel.role == "input"}
         self._load = nominal_load(case)
         self._settings: dict[Run, Setting] = {}
         self._kept: dict[tuple[Run, tuple[float, ...]], dict[str, NDArray[np.float64]]] = {}
@@ -159,7 +165,7 @@ class PythonModel(AlongMotion):
         ):
             simulated = self._tire(run, p, active, around)
         else:
-            simulated = self.call(run, p, {})
+            simulated = self.call(run, p, true_inputs(run, active, self._inputs, around))
         forces = [
             applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
         ]
@@ -204,6 +210,8 @@ class PythonModel(AlongMotion):
         if self.motion is not None:
             found += self.motion.places(effect)
         others = [(driver.name, driver.unit) for driver in self.case.drivers]
+        if not self._is_tire:
+            found += input_places(effect, [pair for pair in others if pair[0] in self._inputs])
         return found + channel_places(
             effect, [(output.name, output.unit) for output in self.outputs], others, drivers
         )

@@ -44,6 +44,7 @@ EFFECT = Effect(
         where=("output", "cell", "program_cell", "program_load"),
         tare="alike",
         by_value=False,
+        about_zero=True,
         inverse=_restored,
     ),
     discrete=True,

@@ -56,6 +56,6 @@ EFFECT = Effect(
     ),
     channel=_creeping,
     remembers=True,
-    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True),
+    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True, about_zero=True),
     histories=(History(values={FROM_REST: 1.0}, text="unloaded before each run"),),
 )

@@ -56,7 +56,7 @@ EFFECT = Effect(
         ),
     ),
     channel=_leaking,
-    on_channel=ChannelFacts(where=("output",), tare="own", by_value=False, second="from"),
+    on_channel=ChannelFacts(where=("output",), tare="own", by_value=False, about_zero=True, second="from"),
     alike=Alike(group="pull", holds=_pulls),
     correctable=Correctable(
         unit="({channel})/({from})", undo=_taken_out, channels=("FY", "MZ"), sources=("FZ", "FY", "MZ")

@@ -57,6 +57,6 @@ EFFECT = Effect(
         ),
     ),
     channel=_dead,
-    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True),
+    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True, about_zero=True),
     noise_key=NOISE,
 )

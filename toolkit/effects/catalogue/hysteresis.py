@@ -100,7 +100,7 @@ EFFECT = Effect(
     ),
     channel=_looping,
     remembers=True,
-    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True),
+    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True, about_zero=True),
     numerics=_span,
     zero_beside=_half_loop,
 )

@@ -46,5 +46,5 @@ EFFECT = Effect(
         ),
     ),
     channel=_bent,
-    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True),
+    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True, about_zero=True),
 )

@@ -43,6 +43,6 @@ EFFECT = Effect(
         ),
     ),
     channel=_stepped,
-    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=False),
+    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=False, about_zero=True),
     from_digits=True,
 )

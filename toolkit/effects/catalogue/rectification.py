@@ -31,7 +31,9 @@ EFFECT = Effect(
     separates="a load of the other sign",
     parameters=(),
     channel=_folded,
-    on_channel=ChannelFacts(where=("output", "cell", "program_load"), tare="own", by_value=False),
+    on_channel=ChannelFacts(
+        where=("output", "cell", "program_load"), tare="own", by_value=False, about_zero=True
+    ),
     discrete=True,
     reshapes=True,
 )

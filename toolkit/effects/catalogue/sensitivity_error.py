@@ -47,6 +47,7 @@ EFFECT = Effect(
         where=("output", "cell", "program_cell", "program_load"),
         tare="alike",
         by_value=True,
+        about_zero=True,
         inverse=_restored,
     ),
     not_correctable="a cell's sensitivity belongs into a new calibration",

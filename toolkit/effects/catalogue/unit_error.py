@@ -87,7 +87,11 @@ EFFECT = Effect(
     channel=_converted,
     confined_by=("date", ANY_OTHER),
     on_channel=ChannelFacts(
-        where=("output", "program_cell", "program_load"), tare="alike", by_value=False, inverse=_restored
+        where=("output", "input", "program_cell", "program_load"),
+        tare="alike",
+        by_value=False,
+        about_zero=True,
+        inverse=_restored,
     ),
     discrete=True,
     needs_signal=True,

@@ -282,8 +282,11 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
                 + (f"  (95 %: {interval})" if interval else "")
             )
         lines.append(f"  takes {100 * law.share_of_gap:.0f} % of the mean square that was left")
-    for channel, names in answer.depends_on:
+    listed = list(dict.fromkeys(answer.depends_on))  # the largest first
+    for channel, names in listed[:_STRUCTURES]:
         lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
+    if len(listed) > _STRUCTURES:
+        lines.append(f"and {len(listed) - _STRUCTURES} smaller ones over other variables: see diagnosis.json")
     for place in answer.mismatch:
         for at in place.where[:1]:
             extent = "over all of" if at.whole else "mostly where"
@@ -328,6 +331,7 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
     return "\n".join([*lines, "", f"written to {out}"])
 
 
+_STRUCTURES = 3  # told on a screen, of dozens that overlap
 _CUT = "something is missing; the budget was spent before every known effect was tried"
 _RUNS_DIFFER = (
     "runs differ by more than their noise; within the runs nothing is missing that this recording could show"

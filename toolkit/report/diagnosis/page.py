@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -101,20 +102,34 @@ def cause(diagnosis: Diagnosis) -> str | None:
             if not isinstance(parameter.value, str)
             for value, interval in (rounded(parameter.value, parameter.ci95),)
         ]
-        names.append(", ".join((_name(effect), *sizes)))
+        told = is_told_from_none(effect)
+        names.append((not told, ("" if told else "perhaps ") + ", ".join((_name(effect), *sizes))))
     shares = []
     for fit in diagnosis.held_out:
         above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
         explained = fit.refitted_rmse**2 - fit.augmented_rmse**2
         if above > 0 and explained > 0:
             shares.append((explained, above, fit.channel))
+    listed = "; ".join(name for _, name in sorted(names, key=lambda entry: entry[0]))
     if not shares:
-        return "; ".join(names) + "."
+        return listed + "."
     explained, above, channel = max(shares, key=lambda share: share[0] / share[1])
     share_text = (
         f"{100 * explained / above:.0f} % of the mean square by which {channel} is off beyond its noise"
     )
-    return f"{'; '.join(names)}: explains {share_text}, on rows that no fit has seen."
+    return f"{listed}: explains {share_text}, on rows that no fit has seen."
+
+
+def is_told_from_none(effect: FoundEffect) -> bool:
+    """Tell whether the interval of one of an effect's sizes leaves out that there is none."""
+    known = effects().get(effect.name)
+    off = {parameter.name: parameter.off for parameter in known.parameters} if known else {}
+    intervals = [
+        (zero, parameter.ci95)
+        for parameter in effect.parameters
+        if (zero := off.get(parameter.name)) is not None and math.isfinite(zero)
+    ]
+    return not intervals or any(ci is None or not ci[0] <= zero <= ci[1] for zero, ci in intervals)
 
 
 def page(result: Result, use: CalibrationUse | None = None) -> str:

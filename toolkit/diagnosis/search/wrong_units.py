@@ -1,0 +1,151 @@
+"""Wrong units of inputs and outputs: looked for first, where a simulation as declared is grossly wrong.
+
+A number that was recorded in another unit is off by a ratio that is known beforehand, and no parameter
+within its prior makes up for it. The search of small effects would describe it by a law of a factor. Here
+every ratio between the units of a channel's dimension, and every power of ten, is simulated from the declared
+parameters and from the refitted ones, and what takes nearly all of the error is a candidate like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
+from toolkit.diagnosis.fit.sensor_noise import spread
+from toolkit.diagnosis.policy import UNITS
+from toolkit.diagnosis.search.bends import only_bends
+from toolkit.diagnosis.search.candidates import CandidateEffect, Start
+from toolkit.diagnosis.search.forward_step import Rival, Step, joint_fit, shows_signal
+from toolkit.diagnosis.search.unseen_runs import gains_of, takes_most
+from toolkit.diagnosis.simulators.parameter_units import channel_unit
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effects
+from toolkit.errors import FitError, UnitError
+from toolkit.units import unit_ratios
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.fit import Fit
+    from toolkit.diagnosis.fit.problem import Problem
+
+
+def wrong_units(problem: Problem, fits: Sequence[Fit]) -> tuple[CandidateEffect, ...]:
+    """Return wrong units that take nearly all of a gross error, the best first; none where none is gross.
+
+    Parameters
+    ----------
+    fits : the simulation as declared, and refitted
+    """
+    declared = fits[0]
+    wrong = [name for name in problem.names if _is_gross(problem, name, declared.residual[name])]
+    if not wrong:
+        return ()
+    before = min(_error(problem, made.residual, wrong) for made in fits)
+    found: list[tuple[float, CandidateEffect]] = []
+    for applied in _ratios(problem):
+        left = [error for made in fits if (error := _left(problem, made, applied, wrong)) is not None]
+        if left and min(left) < UNITS.left * before:
+            start = Start(
+                values=dict(applied.values),
+                directions=(dict(applied.values),),
+                amplitudes=applied.effect.names,
+            )
+            found.append((min(left), CandidateEffect(active=applied, starts=(start,))))
+    return tuple(candidate for _, candidate in sorted(found, key=lambda entry: entry[0])[: UNITS.most])
+
+
+def is_listed(candidate: CandidateEffect, listed: Sequence[CandidateEffect]) -> bool:
+    """Tell whether a candidate is among others with the same values."""
+    return any(
+        each.key == candidate.key
+        and any(_same(start.values, candidate.active.values) for start in each.starts)
+        for each in listed
+    )
+
+
+def _same(values: Mapping[str, float], others: Mapping[str, float]) -> bool:
+    return all(math.isclose(values.get(name, 0.0), value, rel_tol=1e-6) for name, value in others.items())
+
+
+def unit_step(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, wrong: Sequence[CandidateEffect]
+) -> tuple[Fit, HeldOut, Step] | None:
+    """Return the wrong unit that leaves the least of unseen rows, if it takes most; None where none does.
+
+    Unseen rows alone decide, in independent values: a coloured noise that has taken up an error of most of
+    the signal finds the small rest of the right unit, which is rougher, the less likely.
+    """
+    shown: list[tuple[Fit, HeldOut]] = []
+    for candidate in wrong:
+        made = joint_fit(problem, base, (candidate.active,), plain=True)
+        if made is None or only_bends(problem, made):
+            continue
+        try:
+            held_out = hold_out(problem, folds, made.active, made)
+        except FitError:
+            continue
+        if takes_most(problem, held_base, held_out) and shows_signal(problem, held_out, candidate.active):
+            shown.append((made, held_out))
+    if not shown:
+        return None
+    gains = gains_of(problem, held_base, shown)
+    best = max(range(len(shown)), key=lambda i: gains[i])
+    made, held_out = shown[best]
+    tests = sum(1 for _ in _ratios(problem))
+    step = Step(
+        active=made.active[-1],
+        p_value=min(1.0, tests * math.exp(-min(gains[best], 700.0))),
+        held_out_gain=gains[best],
+        gain=gains[best],
+        rivals=tuple(
+            Rival(active=each.active[-1], difference=gains[i] - gains[best])
+            for i, (each, _) in enumerate(shown)
+            if i != best
+        ),
+    )
+    return made, held_out, step
+
+
+def _is_gross(problem: Problem, name: str, residual: NDArray[np.float64]) -> bool:
+    error = residual[problem.kept[name]]
+    return bool(len(error)) and float(np.sqrt(np.mean(error**2))) > UNITS.gross * spread(problem, name)
+
+
+def _ratios(problem: Problem) -> Iterator[AppliedEffect]:
+    """Give every ratio at every channel where an effect of units may act."""
+    inputs = {driver.name for driver in problem.case.drivers}
+    for effect in effects().values():
+        if effect.on_channel is None or "input" not in effect.on_channel.where:
+            continue
+        for channel, source in problem.model.places(effect):
+            if channel not in problem.names and channel not in inputs:
+                continue
+            try:
+                ratios = unit_ratios(channel_unit(problem.case, problem.model, channel))
+            except UnitError:
+                continue
+            for ratio in ratios.values():
+                values = {effect.names[0]: ratio}
+                yield AppliedEffect(effect=effect, channel=channel, source=source, values=values)
+
+
+def _left(problem: Problem, made: Fit, applied: AppliedEffect, names: Sequence[str]) -> float | None:
+    try:
+        simulated = problem.simulate(made.p, (*made.active, applied))
+    except FitError:  # so large an input is beyond what the simulation can do
+        return None
+    return _error(problem, {name: problem.observed[name] - simulated[name] for name in names}, names)
+
+
+def _error(problem: Problem, residual: dict[str, NDArray[np.float64]], names: Sequence[str]) -> float:
+    """Return the mean of the outputs' mean squares over those of the recording."""
+    shares = [
+        np.mean(residual[name][problem.kept[name]] ** 2) / max(spread(problem, name) ** 2, 1e-300)
+        for name in names
+    ]
+    return float(np.mean(shares))
