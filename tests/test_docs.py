@@ -18,8 +18,7 @@ from tests.house.pages import GENERATED, written
 from tests.house.source import ROOT, contracts, layers
 from tests.recipes import new_files
 from toolkit.cli import main
-from toolkit.declared import Source, build
-from toolkit.diagnosis.answer.serial import as_json
+from toolkit.declared import Source, build, json_value
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.case.simulation import (
     ColumnsSimulation,
@@ -171,7 +170,7 @@ def _paths(value: object, path: str = "") -> Iterator[str]:
 
 def test_the_page_has_the_keys_of_an_answer(tmp_path: Path) -> None:
     recordings = {f"r{seed}__csv": carriage(seed=seed, coulomb=0.0, drag=800.0) for seed in range(2)}
-    answer = as_json(diagnose(read_case(write_case(tmp_path, HEAD + TWO, **recordings)), None).diagnosis)
+    answer = json_value(diagnose(read_case(write_case(tmp_path, HEAD + TWO, **recordings)), None).diagnosis)
     text = (DOCS / "case.md").read_text(encoding="utf-8").partition("| key |")[2]
     listed = set(re.findall(r"(?m)^\| `([^`]+)` \|", text))
     shown = {path for path in _paths(answer) if not path.startswith(("findings", "depends_on"))}

@@ -31,7 +31,7 @@ from proof import model as generated
 from proof.catalogue import CONFOUNDED
 from proof.files import write_case
 from tests.coverage.rows import exact_interval
-from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis
 from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -173,7 +173,7 @@ def one(kind: Kind, number: int, seed: int, folder: Path) -> Outcome | str:
 
 
 def _after(
-    kind: Kind, drawn: draw.Drawn, diagnosis: Diagnosis, effect: FoundEffect, true: str, case: Path,
+    kind: Kind, drawn: draw.Drawn, diagnosis: Diagnosis, effect: DiagnosedEffect, true: str, case: Path,
     seed: int, number: int,
 ) -> Outcome | str:  # fmt: skip
     rng = np.random.default_rng([seed, number, 1])

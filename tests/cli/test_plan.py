@@ -16,7 +16,7 @@ import toolkit
 from tests.planning.class_factory import answer, found, write_case
 from tests.planning.planning_factory import LOADS, earlier
 from toolkit.cli.main import _register, app
-from toolkit.diagnosis.answer.serial import as_json
+from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 from toolkit.lab.plans import protocol_plan
 from toolkit.planning import protocol_plan as planning
@@ -129,7 +129,7 @@ def diagnosed(tmp_path):
     folder = tmp_path / "answer"
     folder.mkdir()
     leaves = answer(read_case(case).sha256, found("channel_delay", "filter_lag"))
-    (folder / "diagnosis.json").write_text(json.dumps({"schema": 1, **as_json(leaves)}), encoding="utf-8")
+    (folder / "diagnosis.json").write_text(json.dumps({"schema": 1, **json_value(leaves)}), encoding="utf-8")
     (folder / "model.toml").write_text('[answer]\ncase = "../case/CASE.toml"\n', encoding="utf-8")
     return folder
 

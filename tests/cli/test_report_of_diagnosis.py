@@ -13,8 +13,8 @@ from tests.report.diagnosis.test_answer import ANSWER
 from tests.report.report_factory import make_record, make_result
 from tests.report.template_factory import make, p
 from toolkit.cli.report import command
-from toolkit.diagnosis.answer.answer import Diagnosis, Recorded
-from toolkit.diagnosis.answer.serial import as_json
+from toolkit.declared import json_value
+from toolkit.diagnosis.answer.answer import DiagnosedRecording, Diagnosis
 from toolkit.errors import ConfigError
 from toolkit.lab.tire_tests import resolve
 from toolkit.lab.tire_tests.handover import diagnosis_findings
@@ -30,7 +30,7 @@ ANOTHERS = (("f+1", "ab" * 32), ("f-1", "cd" * 32))
 
 
 def of(*recordings: tuple[str, str], own: bool = True) -> Diagnosis:
-    made = tuple(Recorded(name=name, sha256=digest, own=own) for name, digest in recordings)
+    made = tuple(DiagnosedRecording(name=name, sha256=digest, own=own) for name, digest in recordings)
     return dataclasses.replace(ANSWER, recordings=made)
 
 
@@ -75,7 +75,7 @@ def test_the_command_refuses_the_one_and_says_the_other(tmp_path: Path, monkeypa
     out = tmp_path / "out"
 
     def report(answer: Diagnosis) -> int:
-        (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": 1} | as_json(answer)))
+        (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": 1} | json_value(answer)))
         return command([Path("any")], template=template, out=out, diagnosis=tmp_path, json=True)
 
     with pytest.raises(ConfigError):

@@ -44,8 +44,8 @@ def test_a_load_cell_taken_as_a_straight_line_is_not_linear(tmp_path):
     assert "nonlinearity" in classes(made)[0]
     assert made.remaining == "nothing"
     # NIST certifies a residual standard deviation of 0.000205163 for the quadratic
-    assert made.held_out[0].noise_floor == pytest.approx(0.000205163, rel=0.15)
-    assert made.held_out[0].augmented_rmse < 0.2 * made.held_out[0].refitted_rmse
+    assert made.fit.held_out[0].noise_floor == pytest.approx(0.000205163, rel=0.15)
+    assert made.fit.held_out[0].augmented_rmse < 0.2 * made.fit.held_out[0].refitted_rmse
 
 
 def test_the_programs_sign_of_E5(tmp_path):
@@ -53,16 +53,16 @@ def test_the_programs_sign_of_E5(tmp_path):
     assert made.verdict == "equivalent"
     assert classes(made) == [{"channel_sign", "wrong_calibration"}]
     assert made.effects[0].name != "channel_sign" or made.effects[0].channel == "E5"
-    assert [one.channel for one in made.held_out] == ["FY", "MZ"]
+    assert [one.channel for one in made.fit.held_out] == ["FY", "MZ"]
     # what the printed digits leave: half a unit of the cells' fourth decimal, three cells, in lbf
-    assert made.held_out[0].augmented_rmse < 1e-3
+    assert made.fit.held_out[0].augmented_rmse < 1e-3
 
 
 def test_a_light_ball_is_held_back_by_the_air(tmp_path):
     made = diagnosed("whiffle-1", tmp_path)
     assert len(made.effects) == 1
     assert classes(made)[0] & {"viscous_damping", "quadratic_drag"}
-    assert made.held_out[0].augmented_rmse < 0.1 * made.held_out[0].refitted_rmse
+    assert made.fit.held_out[0].augmented_rmse < 0.1 * made.fit.held_out[0].refitted_rmse
     # A speed of release far off its prior is no reason to withdraw the drag: it is told.
     far = [each.name for each in made.nominal_parameters if abs(each.shift_in_sd or 0.0) > 3]
     asked = [sentence for sentence in made.next_measurements if "far off its prior" in sentence]
@@ -92,5 +92,5 @@ def test_a_positioning_drive_rubs(tmp_path):
     # Janot, Gautier, Brunot (2019), identified on the whole recording: 20.4 N. There its offset of
     # 3.2 N is seen as well, and the proof asks for both sizes.
     assert dry.parameters[0].value == pytest.approx(20.4, rel=0.1)
-    force = made.held_out[0]
+    force = made.fit.held_out[0]
     assert force.augmented_rmse < force.refitted_rmse / 3

@@ -109,7 +109,7 @@ def test_a_makers_flat_table_against_a_drum_is_its_curvature(tmp_path):
     low, high = parameters["reduction"].ci95
     assert low - (high - low) / 2 < 1 - shorter**2 < high + (high - low) / 2
     assert all(abs(one.shift_in_sd) < 1 for one in found.nominal_parameters)
-    for one in found.held_out:
+    for one in found.fit.held_out:
         assert one.augmented_rmse < 1.1 * one.noise_floor < 0.5 * one.nominal_rmse
 
 

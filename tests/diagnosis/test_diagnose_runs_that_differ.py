@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import CELL, cell_case, write_case
+from toolkit.diagnosis.answer.answer import Dependence
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
@@ -29,8 +30,8 @@ def test_a_curved_cell_is_named_though_its_zero_moves(tmp_path, seed):
     assert "nonlinearity" in (effect.name, *effect.equivalent_to)
     # What remains is that the runs differ, and the answer says so.
     assert answer.remaining == "unknown"
-    assert ("F", ("run",)) in answer.depends_on
-    assert answer.held_out[0].augmented_rmse < 0.8 * answer.held_out[0].refitted_rmse
+    assert Dependence(channel="F", variables=("run",)) in answer.depends_on
+    assert answer.fit.held_out[0].augmented_rmse < 0.8 * answer.fit.held_out[0].refitted_rmse
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

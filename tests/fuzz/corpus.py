@@ -142,14 +142,14 @@ def _case() -> Mapping[str, bytes]:
 
 @cache
 def _answer() -> Mapping[str, bytes]:
-    from toolkit.diagnosis.answer.serial import as_json
+    from toolkit.declared import json_value
     from toolkit.diagnosis.case.reader import read_case
     from toolkit.diagnosis.diagnose import diagnose
 
     with tempfile.TemporaryDirectory() as folder:
         runs = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=800.0) for i in range(2)}
         case = read_case(write_case(Path(folder), HEAD + TWO, simulator=SIMULATOR, **runs))
-        answer = {"schema": 1, **as_json(diagnose(case, None).diagnosis), "model": None}
+        answer = {"schema": 1, **json_value(diagnose(case, None).diagnosis), "model": None}
     return {"diagnosis.json": json.dumps(answer).encode()}
 
 

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis, EffectEvidence, HeldOutFit
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.effects.applied import EffectKey
 
 SIMULATOR = """import pandas as pd
 def simulate(inputs, p):
@@ -71,19 +70,21 @@ def problem(case: Path) -> Problem:
     return problem_of(read, model_of(read, None))
 
 
-def found(name: str, *others: str, channel: str | None = "F") -> FoundEffect:
+def found(name: str, *others: str, channel: str | None = "F") -> DiagnosedEffect:
     """An effect of an answer, with the others of its class."""
-    return FoundEffect(
-        key=EffectKey(name, channel), stage="acquisition", statement="", equation="", reference="",
-        parameters=(), equivalent_to=others, rejected=(), held_out_log_score_gain=100.0, p_value=0.0,
+    return DiagnosedEffect(
+        name=name, channel=channel, stage="acquisition", statement="", equation="", reference="",
+        parameters=(), equivalent_to=others, rejected=(),
+        evidence=EffectEvidence(held_out_log_score_gain=100.0, p_value=0.0),
     )  # fmt: skip
 
 
-def answer(case_sha256: str, *effects: FoundEffect) -> Diagnosis:
+def answer(case_sha256: str, *effects: DiagnosedEffect) -> Diagnosis:
     """An answer with effects."""
     return Diagnosis(
         title="t", case_sha256=case_sha256, verdict="equivalent", remaining="nothing", mismatch=(),
-        effects=effects, nominal_parameters=(), held_out=(), held_out_by="runs", depends_on=(), not_found=(),
+        effects=effects, nominal_parameters=(), fit=HeldOutFit(held_out_by="runs", held_out=()),
+        depends_on=(), not_found=(),
         next_measurements=(), findings=(), complete=True, skipped=(), recordings=(),
     )  # fmt: skip
 

@@ -51,7 +51,7 @@ def test_a_makers_flat_table_against_the_lower_values_of_a_drum(flat_table):
     assert effect.stage == "road"
     covers(parameters["reduction"], 0.15)
     # what the free factors of friction and stiffness alone leave is several times the noise
-    FY = next(one for one in flat_table.held_out if one.channel == "FY")
+    FY = next(one for one in flat_table.fit.held_out if one.channel == "FY")
     assert FY.augmented_rmse < 1.2 * FY.noise_floor < 0.5 * FY.refitted_rmse
 
 

@@ -18,7 +18,7 @@ from tests.workbench.conftest import Served, filled, plain, serving
 from tests.workbench.test_app_numbers import numbers
 from tests.workbench.test_home_page import command
 from tests.workbench.test_jobs_page import done
-from toolkit.diagnosis.answer.serial import as_json
+from toolkit.declared import json_value
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.lab.desk.holdings import holding_id
@@ -55,7 +55,7 @@ def _plan_all(folder: Path) -> None:
     late = home / "diagnoses" / "late"
     late.mkdir(parents=True)
     leaves = answer(read_case(case).sha256, found("channel_delay", "filter_lag"))
-    (late / "diagnosis.json").write_text(json.dumps({"schema": 1, **as_json(leaves)}), encoding="utf-8")
+    (late / "diagnosis.json").write_text(json.dumps({"schema": 1, **json_value(leaves)}), encoding="utf-8")
     (late / "model.toml").write_text('[answer]\ncase = "../../cases/late/CASE.toml"\n', encoding="utf-8")
     ids = {}
     with serving(home) as bench:

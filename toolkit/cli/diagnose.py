@@ -68,8 +68,8 @@ def command(
     payload = write_diagnosis(diagnosed, out, timing=lambda: output.timing, opened=opened, by=by)
     text = diagnosis_text(diagnosed.result.diagnosis, out)
     warned = False
-    if opened is not None:
-        document = payload["document"]
+    if payload.document is not None:
+        document = payload.document
         warned = bool(document["warnings"])
         text += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"
         text += "".join(f"\n  warning {warning}" for warning in document["warnings"])

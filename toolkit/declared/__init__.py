@@ -72,8 +72,9 @@ expected=..., rule=...)``.
 names file and text, and what was taken from another file); `attempt` where faults are wanted and no
 error. `plain` and `toml_text` write; what is read again is equal.
 **Answers**: `answer` makes the JSON document of a dataclass, ``"schema": 1`` first; those that a
-function builds key by key are typed dictionaries (`declared.answers`). **Pages**: `starter`, `reference`,
-`json_schema`.
+function builds key by key are typed dictionaries (`declared.answers`). `object_of` reads a document back; a
+number that may be NaN is an `OrNan`, and a property that is `derived` stands in the document too. **Pages**:
+`starter`, `reference`, `json_schema`.
 
 **To convert a format**: (1) write its malformed files as a parametrised test; (2) declare the classes
 with the field names that the code uses; (3) give ``FORMAT`` the rule ids of today; (4) turn checks
@@ -84,6 +85,7 @@ reads back equal.
 
 from toolkit.declared.declaration import table_of
 from toolkit.declared.describe import json_schema, reference, starter
+from toolkit.declared.documents import object_of
 from toolkit.declared.faults import Fault, Source, refuse
 from toolkit.declared.marks import (
     Above,
@@ -96,12 +98,14 @@ from toolkit.declared.marks import (
     Format,
     Keyed,
     Names,
+    OrNan,
     Quantity,
     Short,
     Size,
     Text,
     Unit,
     UnitName,
+    derived,
 )
 from toolkit.declared.text import answer, attempt, build, json_value, plain, read, read_text, toml_text
 from toolkit.spelling import nearest
@@ -118,6 +122,7 @@ __all__ = [
     "Format",
     "Keyed",
     "Names",
+    "OrNan",
     "Quantity",
     "Short",
     "Size",
@@ -128,9 +133,11 @@ __all__ = [
     "answer",
     "attempt",
     "build",
+    "derived",
     "json_schema",
     "json_value",
     "nearest",
+    "object_of",
     "plain",
     "read",
     "read_text",

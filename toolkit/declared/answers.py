@@ -57,8 +57,8 @@ from typing import (
     is_typeddict,
 )
 
-from toolkit.declared.declaration import keys_of, sparse_keys
-from toolkit.declared.marks import Entry
+from toolkit.declared.declaration import outputs_of
+from toolkit.declared.marks import Entry, Keyed, NullIsNan
 
 T = TypeVar("T")
 _WORDS: dict[Any, tuple[str, str]] = {
@@ -200,7 +200,7 @@ def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
             fixed = origin is tuple and inner[-1] is not Ellipsis
             yield from departures(entry, inner[at] if fixed else inner[0], f"{place}[{at}]")
     elif not _holds(value, annotation):
-        yield f"{place}: {value!r:.60} is no {_words(annotation)}"
+        yield f"{place}: {value!r:.60} is no {words_of(annotation)}"
 
 
 def _holds(value: Any, annotation: Any) -> bool:
@@ -220,9 +220,7 @@ def _is_table(annotation: Any) -> bool:
 def _entries(cls: Any) -> Iterator[tuple[str, Any, bool]]:
     """Yield key, annotation and whether every answer has it."""
     if not is_typeddict(cls):
-        hints = typing.get_type_hints(cls, include_extras=True)
-        sparse = sparse_keys(cls)
-        yield from ((key, hints[name], key not in sparse) for name, key in keys_of(cls))
+        yield from ((output.key, output.annotation, not output.sparse) for output in outputs_of(cls))
         return
     for key, annotation in typing.get_type_hints(cls, include_extras=True).items():
         # `__required_keys__` does not know the marks of annotations that are kept as texts.
@@ -232,10 +230,17 @@ def _entries(cls: Any) -> Iterator[tuple[str, Any, bool]]:
 def _bare(annotation: Any) -> tuple[Any, str]:
     """Return an annotation without its marks, and the text beside it."""
     meaning = ""
+    marks: list[Any] = []
     while get_origin(annotation) in (Annotated, typing.NotRequired, typing.Required):
-        marks = (mark.help if isinstance(mark, Entry) else mark for mark in get_args(annotation)[1:])
-        meaning = meaning or next((mark for mark in marks if isinstance(mark, str)), "")
+        marks += get_args(annotation)[1:]
         annotation = get_args(annotation)[0]
+    for mark in marks:
+        if isinstance(mark, Entry | str):
+            meaning = meaning or (mark.help if isinstance(mark, Entry) else mark)
+        elif isinstance(mark, NullIsNan):
+            annotation |= None
+        elif isinstance(mark, Keyed):  # pairs of a name and its value
+            annotation = Mapping[str, get_args(get_args(annotation)[0])[1]]  # type: ignore[misc]
     if _is_table(annotation) and callable(as_dict := getattr(annotation, "as_dict", None)):
         # An object that says how it is printed is declared by that.
         annotation = typing.get_type_hints(as_dict, include_extras=True)["return"]
@@ -250,7 +255,8 @@ def _is_list(origin: Any) -> bool:
     return isinstance(origin, type) and issubclass(origin, Sequence | Iterator | frozenset)
 
 
-def _words(annotation: Any) -> str:
+def words_of(annotation: Any) -> str:
+    """Return what an annotation holds, for people."""
     annotation = _bare(annotation)[0]
     origin, inner = get_origin(annotation), get_args(annotation)
     if annotation is Any:
@@ -258,25 +264,25 @@ def _words(annotation: Any) -> str:
     if _is_table(annotation):
         return f"`{annotation.__name__}`"
     if origin in (Union, types.UnionType):
-        return " or ".join(map(_words, inner))
+        return " or ".join(map(words_of, inner))
     if origin is Literal:
         return " or ".join(f'"{word}"' if isinstance(word, str) else str(word) for word in inner)
     if _is_mapping(origin):
         return f"by name: {_grouped(inner[1])}"
     if origin is tuple and inner[-1] is not Ellipsis:
-        return f"[{', '.join(map(_words, inner))}]"
+        return f"[{', '.join(map(words_of, inner))}]"
     if _is_list(origin):
         return f"list of {_grouped(inner[0])}"
     return _WORDS[annotation][0]
 
 
 def _grouped(annotation: Any) -> str:
-    words = _words(annotation)
+    words = words_of(annotation)
     return f"({words})" if " or " in words else words
 
 
 def _linked(annotation: Any) -> str:
-    return re.sub(r"`(\w+)`", lambda name: f"[{name[0]}](#{name[1].lower()})", _words(annotation))
+    return re.sub(r"`(\w+)`", lambda name: f"[{name[0]}](#{name[1].lower()})", words_of(annotation))
 
 
 def _table_schema(cls: Any, *, document: bool = False) -> dict[str, Any]:

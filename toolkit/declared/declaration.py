@@ -9,7 +9,7 @@ import pathlib
 import types
 import typing
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from toolkit.declared.kinds import (
     AnyKind,
@@ -95,23 +95,45 @@ def fields_of(cls: type) -> tuple[Field, ...]:
     return tuple(fields)
 
 
-@functools.cache
-def keys_of(cls: type) -> tuple[tuple[str, str], ...]:
-    """Return name and key of the fields of an answer, whatever they hold."""
-    hints = typing.get_type_hints(cls, include_extras=True)
-    entries = [
-        (declared.name, _mark(_bare(hints[declared.name])[1], Entry) or Entry())
-        for declared in dataclasses.fields(cls)
-    ]
-    return tuple((name, entry.key or name) for name, entry in entries if entry.output)
+class Output(NamedTuple):
+    """An entry of an answer: the attribute that holds it, its key, and what is declared of it."""
+
+    name: str
+    key: str
+    annotation: Any
+    sparse: bool
+    by_name: bool
+
+    def written(self, value: Any) -> Any:
+        """Return the value of the attribute as a mapping where its pairs are one in the answer."""
+        return dict(value) if self.by_name and value is not None else value
 
 
 @functools.cache
-def sparse_keys(cls: type) -> frozenset[str]:
-    """Return the keys that an answer leaves out while they hold None."""
+def outputs_of(cls: type) -> tuple[Output, ...]:
+    """Return the entries of an answer, whatever they hold, and the properties that are `derived`."""
     hints = typing.get_type_hints(cls, include_extras=True)
-    marks = {name: _mark(_bare(hints[name])[1], Entry) or Entry() for name, _ in keys_of(cls)}
-    return frozenset(entry.key or name for name, entry in marks.items() if entry.sparse)
+    outputs = []
+    for declared in dataclasses.fields(cls):
+        marks = _bare(hints[declared.name])[1]
+        entry = _mark(marks, Entry) or Entry()
+        if entry.output:
+            outputs.append(_output(declared.name, entry, hints[declared.name], marks))
+    for base in reversed(cls.__mro__):
+        for name, member in vars(base).items():
+            method = member.fget if isinstance(member, property) else None
+            if method is not None and hasattr(method, "derived"):
+                entry, after = method.derived
+                held = typing.get_type_hints(method, include_extras=True)["return"]
+                names = [output.name for output in outputs]
+                place = len(names) if after is None else names.index(after) + 1
+                outputs.insert(place, _output(name, entry, Annotated[held, entry], _bare(held)[1]))
+    return tuple(outputs)
+
+
+def _output(name: str, entry: Entry, annotation: Any, marks: Marks) -> Output:
+    by_name = _mark(marks, Keyed) is not None
+    return Output(name, entry.key or name, annotation, entry.sparse, by_name)
 
 
 def kind_of(annotation: Any, marks: Marks = ()) -> tuple[Kind, bool]:

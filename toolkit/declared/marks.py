@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Annotated, Any, Self, TypeVar
 
 Path = tuple[str | int, ...]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,29 @@ class Entry:
     asked: str = ""
     together: str = ""
     by_command: str = ""
+
+
+def derived(
+    meaning: str = "", *, key: str | None = None, after: str | None = None, sparse: bool = False
+) -> Callable[[T], T]:
+    """Mark a method below ``@property``: an answer has its value too, behind that of the field ``after``.
+
+    Without ``after`` it stands at the end. A document that is read back is not asked for it.
+    """
+
+    def mark(method: T) -> T:
+        vars(method)["derived"] = Entry(meaning, key=key, sparse=sparse), after
+        return method
+
+    return mark
+
+
+@dataclass(frozen=True)
+class NullIsNan:
+    """A number that may be NaN, which is null in an answer; as a type, `OrNan`."""
+
+
+OrNan = Annotated[float, NullIsNan()]
 
 
 @dataclass(frozen=True)

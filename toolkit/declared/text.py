@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from toolkit.declared.declaration import form_of, keys_of, sparse_keys, table_of
+from toolkit.declared.declaration import form_of, outputs_of, table_of
 from toolkit.declared.faults import Fault, Source, refuse
 from toolkit.declared.kinds import Place
 from toolkit.declared.marks import Format
@@ -179,9 +179,12 @@ def json_value(value: Any) -> Any:
         as_dict = getattr(value, "as_dict", None)
         if callable(as_dict):
             return json_value(as_dict())
-        sparse = sparse_keys(type(value))
-        held = ((key, getattr(value, name)) for name, key in keys_of(type(value)))
-        return {key: json_value(entry) for key, entry in held if entry is not None or key not in sparse}
+        held = ((output, getattr(value, output.name)) for output in outputs_of(type(value)))
+        return {
+            output.key: json_value(output.written(entry))
+            for output, entry in held
+            if entry is not None or not output.sparse
+        }
     if isinstance(value, enum.Enum):
         return json_value(value.value)
     if isinstance(value, int):

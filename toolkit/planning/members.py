@@ -24,7 +24,7 @@ from toolkit.errors import ConfigError, FitError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+    from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.effects.applied import AppliedEffect
@@ -55,7 +55,7 @@ class Predicted:
     spread: dict[str, Array]
 
 
-def class_of(diagnosis: Diagnosis, where: object) -> FoundEffect:
+def class_of(diagnosis: Diagnosis, where: object) -> DiagnosedEffect:
     """Return the first effect of an answer that others explain as well.
 
     Raises
@@ -73,7 +73,7 @@ def class_of(diagnosis: Diagnosis, where: object) -> FoundEffect:
     return effect
 
 
-def members_of(problem: Problem, diagnosis: Diagnosis, effect: FoundEffect) -> tuple[Member, ...]:
+def members_of(problem: Problem, diagnosis: Diagnosis, effect: DiagnosedEffect) -> tuple[Member, ...]:
     """Return the members of an effect's class that can be fitted, the likeliest first.
 
     The other effects of the answer stay beside each.
@@ -110,7 +110,7 @@ def members_of(problem: Problem, diagnosis: Diagnosis, effect: FoundEffect) -> t
     return tuple(sorted(members, key=lambda member: -member.fit.log_posterior))
 
 
-def _at_answer(candidate: CandidateEffect, found: FoundEffect) -> AppliedEffect:
+def _at_answer(candidate: CandidateEffect, found: DiagnosedEffect) -> AppliedEffect:
     values = {p.name: p.value for p in found.parameters if isinstance(p.value, float)}
     return dataclasses.replace(candidate.active, values=candidate.starts[0].values | values)
 

@@ -154,7 +154,7 @@ def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(tmp_p
     again = diagnose(read_case(case, model=path), None).diagnosis
     assert (again.verdict, again.effects) == ("nothing", ())
     # what the first answer ends with is what the second begins with
-    for before, after in zip(found.held_out, again.held_out, strict=True):
+    for before, after in zip(found.fit.held_out, again.fit.held_out, strict=True):
         assert after.nominal_rmse < 1.1 * before.noise_floor
     own = [one for one in again.nominal_parameters if one.name.startswith(effect.name)]
     assert len(own) == len(effect.parameters)

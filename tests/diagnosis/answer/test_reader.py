@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
+from toolkit.declared import json_value
 from toolkit.diagnosis.answer.reader import read_answer
-from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.errors import ConfigError, ToolkitError
@@ -20,7 +20,12 @@ from toolkit.errors import ConfigError, ToolkitError
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     seen = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=800.0) for i in range(2)}
     case = read_case(write_case(tmp_path_factory.mktemp("drag"), HEAD + TWO, **seen))
-    return {"schema": 1, **as_json(diagnose(case, None).diagnosis), "model": None, "timing": {"seconds": 1.0}}
+    return {
+        "schema": 1,
+        **json_value(diagnose(case, None).diagnosis),
+        "model": None,
+        "timing": {"seconds": 1.0},
+    }
 
 
 def test_an_answer_is_read_back_as_it_was_written(told: dict[str, Any], tmp_path: Path) -> None:
@@ -31,7 +36,7 @@ def test_an_answer_is_read_back_as_it_was_written(told: dict[str, Any], tmp_path
     for given in (file, tmp_path):
         answer, found = read_answer(given)
         assert found == file
-        assert as_json(answer) == {key: told[key] for key in as_json(answer)}
+        assert json_value(answer) == {key: told[key] for key in json_value(answer)}
 
 
 def test_an_answer_names_its_recordings_and_an_older_one_does_not(

@@ -53,7 +53,7 @@ def test_a_refit_that_makes_unseen_rows_worse_is_told(tmp_path):
     text = cell_case(10.0, 'T = { unit = "K", role = "covariate" }\n').replace("gain", "warm")
     text = text.replace("value = 1.0", "value = 0.0").replace('unit = "1"', 'unit = "N/K"')
     findings, answer = told(tmp_path, text, WARM, [table(0, warmth=0.01), table(1, warmth=20.0)])
-    (output,) = answer.held_out
+    (output,) = answer.fit.held_out
     assert output.refitted_rmse > 2 * output.nominal_rmse
     assert "the simulation as declared by" in findings["refit-worse"].message
 

@@ -216,7 +216,9 @@ def test_a_value_far_off_is_in_no_mean(tmp_path: Path) -> None:
     )
     assert "case-averaged" in {finding.rule for finding in answer.findings}
     assert answer.verdict == clean.verdict == "nothing"
-    assert answer.held_out[0].refitted_rmse == pytest.approx(clean.held_out[0].refitted_rmse, rel=0.05)
+    assert answer.fit.held_out[0].refitted_rmse == pytest.approx(
+        clean.fit.held_out[0].refitted_rmse, rel=0.05
+    )
 
 
 def test_a_run_that_was_recorded_more_slowly_is_averaged_over_fewer_rows(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ import typer
 from typer.testing import CliRunner, Result
 
 from toolkit.cli import diagnose, simulate
+from toolkit.declared import json_value
 from toolkit.diagnosis.answer.reader import read_answer
-from toolkit.diagnosis.answer.serial import as_json
 
 SIMULATOR = """
 def simulate(inputs, p):
@@ -118,7 +118,7 @@ def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path):
     assert "with the laws" in page
     read, _ = read_answer(tmp_path / "out")
     written = json.loads((tmp_path / "out/diagnosis.json").read_text())
-    assert as_json(read)["laws"] == written["laws"]
+    assert json_value(read)["laws"] == written["laws"]
 
     # The model takes the law up: nothing of it is left to be found.
     settled = run(

@@ -20,5 +20,5 @@ def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(
     classes = [{effect.name, *effect.equivalent_to} for effect in answer.effects]
     assert {"channel_delay"} in classes
     assert any({"crosstalk", "conicity"} <= each for each in classes)
-    force = answer.held_out[0]
+    force = answer.fit.held_out[0]
     assert force.augmented_rmse < 0.05 * force.refitted_rmse

@@ -54,7 +54,7 @@ def test_a_rest_above_a_tenth_of_the_spread_is_never_nothing(tmp_path):
     assert (found.variables, found.rest) == ((LARGE,), True)
     answer = diagnose(case, None).diagnosis
     assert (answer.verdict, answer.remaining, answer.effects) == ("unknown", "unknown", ())
-    noise = answer.held_out[0].noise
+    noise = answer.fit.held_out[0].noise
     assert noise.process_sd > noise.sensor_sd
     assert noise.total_sd == pytest.approx(2.5, rel=0.25)
 

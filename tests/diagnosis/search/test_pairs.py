@@ -50,8 +50,8 @@ def test_two_effects_that_hide_each_other_are_both_named(tmp_path, seed):
         low, high = effects[name].parameters[0].ci95
         reach = (high - low) / 2
         assert low - reach < truth < high + reach  # four standard errors
-        assert effects[name].p_value < 0.003
-        assert effects[name].held_out_log_score_gain > 10
+        assert effects[name].evidence.p_value < 0.003
+        assert effects[name].evidence.held_out_log_score_gain > 10
 
 
 def test_the_pair_is_ranked_first_where_no_single_effect_is_significant(tmp_path):

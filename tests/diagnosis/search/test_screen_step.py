@@ -74,4 +74,4 @@ def test_a_refit_that_stays_near_its_priors_is_looked_at_from_there_alone(tmp_pa
 def test_an_unsigned_sensor_is_named(tmp_path):
     answer = diagnose(speeds(tmp_path, unsigned=True), None).diagnosis
     assert [effect.name for effect in answer.effects] == ["rectification"]
-    assert answer.held_out[0].augmented_rmse < 0.03
+    assert answer.fit.held_out[0].augmented_rmse < 0.03

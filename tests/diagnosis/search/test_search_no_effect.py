@@ -56,7 +56,7 @@ def test_a_simulator_that_knows_of_no_reversal_has_the_wrong_sign_there_and_no_o
     (one,) = made.effects
     assert (one.name, one.channel) == ("channel_sign", "FY")
     assert made.remaining == "nothing"
-    assert made.held_out[0].augmented_rmse == pytest.approx(8, rel=0.05)
+    assert made.fit.held_out[0].augmented_rmse == pytest.approx(8, rel=0.05)
 
 
 def test_an_effect_that_nothing_shows_is_dropped_and_the_others_keep_their_covariance(tmp_path):

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from tests.diagnosis.cases import HEAD, ONE, SIMULATOR, TWO, carriage, write_case
-from toolkit.diagnosis.answer.serial import as_json
+from toolkit.declared import json_value
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -49,7 +49,7 @@ def test_a_simulator_of_ten_minutes_gives_a_partial_answer(tmp_path):
     slow = WAITS.replace("WAIT", "time.sleep(600)")
     case = read_case(write_case(tmp_path, HEAD + TWO + PREDICT, simulator=slow, more__csv=carriage(seed=4)))
     result = diagnose(case, None, budget_s=5.0)  # loading on a busy machine takes two
-    made = as_json(result.diagnosis)
+    made = json_value(result.diagnosis)
     assert made["complete"] is False
     assert made["verdict"] == "untestable"
     assert made["skipped"][0] == "the simulation as declared"
@@ -72,8 +72,8 @@ def test_a_budget_that_ends_in_the_refit_still_tells_the_error_as_declared(tmp_p
     made = diagnose(case, None, budget_s=5.0).diagnosis
     assert not made.complete
     # 20 N of dry friction, and parameters off by 1 kg and 10 N s/m: about 20 N
-    assert made.held_out[0].nominal_rmse == pytest.approx(20.0, abs=3.0)
-    assert math.isnan(made.held_out[0].noise_floor)
+    assert made.fit.held_out[0].nominal_rmse == pytest.approx(20.0, abs=3.0)
+    assert math.isnan(made.fit.held_out[0].noise_floor)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 30])
@@ -81,13 +81,13 @@ def test_outputs_that_stand_still_are_untestable(tmp_path, rows):
     still = carriage(rows=rows).assign(F=3.0)
     made = diagnose(read_case(write_case(tmp_path, r0__csv=still, r1__csv=still)), None).diagnosis
     assert (made.verdict, made.complete, made.effects) == ("untestable", True, ())
-    assert as_json(made)["fit"]["held_out"][0]["noise_floor"] is None
+    assert json_value(made)["fit"]["held_out"][0]["noise_floor"] is None
 
 
 def test_an_output_without_a_single_sample_is_untestable(tmp_path):
     none = carriage(rows=20).assign(F=math.nan)
     made = diagnose(read_case(write_case(tmp_path, HEAD + ONE, r0__csv=none)), None).diagnosis
-    assert (made.verdict, made.held_out) == ("untestable", ())
+    assert (made.verdict, made.fit.held_out) == ("untestable", ())
 
 
 def test_a_search_that_is_cut_off_never_says_that_nothing_is_missing(tmp_path):
@@ -102,7 +102,7 @@ def test_a_search_that_is_cut_off_never_says_that_nothing_is_missing(tmp_path):
     made = diagnose(case, None, tell=late).diagnosis
     assert (made.verdict, made.remaining, made.complete) == ("untestable", "unknown", False)
     assert made.skipped[0].startswith("step 1: structure")
-    assert made.held_out[0].refitted_rmse > 0
+    assert made.fit.held_out[0].refitted_rmse > 0
 
 
 @pytest.mark.parametrize("step", ["refit of the nominal", "step 1: structure"])
@@ -121,5 +121,5 @@ def test_an_equation_whose_worker_is_late_is_still_answered(tmp_path, monkeypatc
     made = diagnose(case, None, tell=late).diagnosis
     assert not made.complete
     assert made.skipped[0].startswith(step)
-    assert made.held_out[0].nominal_rmse > 0
+    assert made.fit.held_out[0].nominal_rmse > 0
     assert {one.unit for one in made.not_found if one.name == "coulomb_friction"} <= {"N/s", ""}

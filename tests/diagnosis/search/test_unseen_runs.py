@@ -72,7 +72,7 @@ def test_a_wheel_that_is_slowed_by_the_air_has_its_drag_named(tmp_path: Path) ->
     (effect,) = made.effects
     assert "quadratic_drag" in (effect.name, *effect.equivalent_to)
     assert effect.parameters[0].value == pytest.approx(2e-3, rel=0.1)
-    assert made.held_out[0].augmented_rmse < 0.1 * made.held_out[0].refitted_rmse
+    assert made.fit.held_out[0].augmented_rmse < 0.1 * made.fit.held_out[0].refitted_rmse
 
 
 @pytest.mark.parametrize(("drag", "runs"), [(0.0, 3), (2e-3, 2)])

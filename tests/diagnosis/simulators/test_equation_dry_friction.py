@@ -134,4 +134,4 @@ def test_friction_that_a_refitted_damping_hides_is_found(tmp_path):
     assert one.name == "coulomb_friction"
     low, high = one.parameters[0].ci95
     assert low - (high - low) / 2 < 0.24 < high + (high - low) / 2
-    assert made.held_out[0].augmented_rmse == pytest.approx(0.004, rel=0.1)
+    assert made.fit.held_out[0].augmented_rmse == pytest.approx(0.004, rel=0.1)

@@ -9,7 +9,7 @@ import pytest
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.tire_case import TIR, sweep, toml
-from toolkit.diagnosis.answer.answer import Recorded
+from toolkit.diagnosis.answer.answer import DiagnosedRecording
 from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -186,7 +186,9 @@ def test_the_machines_own_workbook_names_the_sign_of_E5(tmp_path):
         ("channel_sign", "E5", ("wrong_calibration",))
     ]
     assert {one.rule for one in made.findings} == {"case-one-run", "case-calibration"}
-    assert made.recordings == (Recorded(name="run.xlsx", sha256=hashlib.sha256(book).hexdigest(), own=True),)
+    assert made.recordings == (
+        DiagnosedRecording(name="run.xlsx", sha256=hashlib.sha256(book).hexdigest(), own=True),
+    )
 
 
 def test_a_table_under_the_programs_own_headers_is_that_workbook(tmp_path):

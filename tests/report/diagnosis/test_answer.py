@@ -11,14 +11,16 @@ import pytest
 from tests.report.report_factory import make_record, make_result
 from tests.report.template_factory import FOLDER, grey_png, opened, p, texts
 from toolkit.diagnosis.answer.answer import (
+    ChannelMismatch,
+    DiagnosedEffect,
     Diagnosis,
-    FoundEffect,
-    FoundParameter,
+    EffectEstimate,
+    EffectEvidence,
+    HeldOutChannel,
     HeldOutFit,
-    Mismatch,
-    Place,
+    MismatchPlace,
+    RejectedEffect,
 )
-from toolkit.effects.applied import EffectKey
 from toolkit.findings import Finding
 from toolkit.report.content import ReportContent
 from toolkit.report.diagnosis.answer import DIAGNOSIS, Told
@@ -33,24 +35,24 @@ from toolkit.report.word.package import open_package, read_template
 from toolkit.report.word.scan import scan
 from toolkit.report.word.xml import stories
 
-EFFECT = FoundEffect(
-    key=EffectKey("quadratic_drag", "F"), stage="dynamics", statement="Drag is missing.",
+EFFECT = DiagnosedEffect(
+    name="quadratic_drag", channel="F", stage="dynamics", statement="Drag is missing.",
     equation="F = - drag v|v|", reference="Newton", equivalent_to=("viscous_damping",),
-    rejected=(("coulomb_friction", -12.0),),
-    held_out_log_score_gain=106.5, p_value=1e-12,
-    parameters=(FoundParameter(name="drag", value=808.0, unit="N", ci95=(780.0, 835.0), runs=None),),
+    rejected=(RejectedEffect(name="coulomb_friction", log_likelihood_less=12.0),),
+    evidence=EffectEvidence(held_out_log_score_gain=106.5, p_value=1e-12),
+    parameters=(EffectEstimate(name="drag", value=808.0, unit="N", ci95=(780.0, 835.0), runs=None),),
 )  # fmt: skip
 ANSWER = Diagnosis(
     title="A carriage", case_sha256="ab" * 32, verdict="equivalent", remaining="nothing", effects=(EFFECT,),
     mismatch=(
-        Mismatch(channel="F", p_value=1e-9, share_of_variance=0.9, where=(
-            Place(variable="v", start=0.5, end=1.5, unit="m/s", runs=("r0",)),
+        ChannelMismatch(channel="F", p_value=1e-9, share_of_variance=0.9, where=(
+            MismatchPlace(variable="v", start=0.5, end=1.5, unit="m/s", runs=("r0",)),
         )),
     ),
-    nominal_parameters=(), held_out_by="run", depends_on=(), not_found=(), findings=(), complete=True,
-    skipped=(), held_out=(HeldOutFit(
+    nominal_parameters=(), depends_on=(), not_found=(), findings=(), complete=True,
+    skipped=(), fit=HeldOutFit(held_out_by="run", held_out=(HeldOutChannel(
         channel="F", unit="N", nominal_rmse=30.0, refitted_rmse=9.0, augmented_rmse=2.0, noise_floor=2.0,
-    ),),
+    ),)),
     next_measurements=("a run at twice the speed",),
 )  # fmt: skip
 
@@ -96,7 +98,12 @@ def test_the_chapter_is_there_with_a_diagnosis_alone(name: str, opinion: str, tm
 
 def test_a_diagnosis_that_found_nothing_has_no_opinion(tmp_path: Path) -> None:
     nothing = dataclasses.replace(
-        ANSWER, verdict="nothing", effects=(), mismatch=(), held_out=(), next_measurements=()
+        ANSWER,
+        verdict="nothing",
+        effects=(),
+        mismatch=(),
+        next_measurements=(),
+        fit=dataclasses.replace(ANSWER.fit, held_out=()),
     )
     said = made("org", Told(answer=nothing), tmp_path)
     tags = {one.tag for one in said.manifest}

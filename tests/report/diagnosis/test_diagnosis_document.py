@@ -77,7 +77,7 @@ def test_the_tables_hold_the_answer_s_numbers(dragged: Any) -> None:
     assert 10 <= drag.ci95[1] - drag.ci95[0] < 100
     assert row[4] == f"{drag.ci95[0]:.0f} to {drag.ci95[1]:.0f}"
     (errors,) = found.tables["errors"].rows
-    assert float(errors[4]) == pytest.approx(answer.held_out[0].augmented_rmse, rel=5e-3)
+    assert float(errors[4]) == pytest.approx(answer.fit.held_out[0].augmented_rmse, rel=5e-3)
     assert [row[0] for row in found.tables["recorded"].rows] == ["r0.csv", "r1.csv"]
     shown = {row[0] for row in found.tables["not_found"].rows}
     said = found.values["diagnosis.not_observable"].value
@@ -100,7 +100,7 @@ def test_nothing_found_has_no_opinion_and_no_bar_of_effects(clean: Any) -> None:
 def test_the_chart_of_ten_seconds_is_error_over_noise(dragged: Any) -> None:
     plots = content(dragged).plots
     assert set(plots) == {"diagnosis_errors", "diagnosis_where_1", "diagnosis_run"}
-    (one,) = dragged[1].diagnosis.held_out
+    (one,) = dragged[1].diagnosis.fit.held_out
     bars = [curve.y[0] for curve in plots["diagnosis_errors"].curves[:3]]
     errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)
     assert bars == pytest.approx([value / one.noise_floor for value in errors])

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import carriage, write_case
+from toolkit.diagnosis.answer.answer import Dependence
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.findings import Finding
@@ -45,7 +46,7 @@ def test_the_map_of_runs_is_over_the_noise_of_the_first_chart(dragged, monkeypat
     monkeypatch.setattr(figures, "_write_cells", lambda _axes, values, _most: seen.append(values))
     figures.run_map(dragged.search, dragged.diagnosis, after=False)
     (row,) = seen[0]
-    (one,) = dragged.diagnosis.held_out
+    (one,) = dragged.diagnosis.fit.held_out
     residual = dragged.search.refitted.residual["F"]
     # Runs of equal length: their mean square over the noise is that of all rows.
     assert np.sqrt(np.mean(row**2)) == pytest.approx(
@@ -81,7 +82,7 @@ def test_a_mean_over_loads_that_repeat_has_no_point_where_none_was_recorded():
 
 
 def test_the_noise_is_no_larger_than_an_error_that_was_reached(dragged):
-    for one in dragged.diagnosis.held_out:
+    for one in dragged.diagnosis.fit.held_out:
         assert one.noise_floor <= one.augmented_rmse
 
 
@@ -164,7 +165,7 @@ def test_a_residual_is_mapped_over_every_kind_of_variable():
     assert turned.min() >= 0
     assert turned.max() < 360
     np.testing.assert_allclose(np.exp(1j * np.deg2rad(turned[:n])), np.exp(7j * t), atol=1e-9)
-    made = SimpleNamespace(held_out=[SimpleNamespace(channel="FY", noise_floor=2.0)])
+    made = SimpleNamespace(fit=SimpleNamespace(held_out=[SimpleNamespace(channel="FY", noise_floor=2.0)]))
     drawn = size_maps(found, made, "FY", after=True)
     assert drawn is not None
     assert drawn.startswith(b"<?xml")
@@ -190,7 +191,11 @@ def test_a_residual_that_is_only_too_large_depends_on_nothing(dragged):
     cause = ("more than its stated noise",)
     large = dataclasses.replace(dragged.diagnosis.mismatch[0], share_of_variance=0.0, where=())
     made = dataclasses.replace(
-        dragged.diagnosis, verdict="unknown", effects=(), mismatch=(large,), depends_on=(("F", cause),)
+        dragged.diagnosis,
+        verdict="unknown",
+        effects=(),
+        mismatch=(large,),
+        depends_on=(Dependence(channel="F", variables=cause),),
     )
     html = page(dataclasses.replace(dragged, diagnosis=made))
     assert "F is off by more than its stated noise" in html
@@ -201,7 +206,7 @@ def test_a_residual_that_is_only_too_large_depends_on_nothing(dragged):
 
 def test_the_first_line_has_the_cause_its_size_and_what_it_explains(dragged):
     line = cause(dragged.diagnosis)
-    (effect,), (fit,) = dragged.diagnosis.effects, dragged.diagnosis.held_out
+    (effect,), (fit,) = dragged.diagnosis.effects, dragged.diagnosis.fit.held_out
     assert line is not None
     assert line.startswith(effect.name)
     # of the mean square above the noise

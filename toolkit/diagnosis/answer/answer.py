@@ -1,17 +1,22 @@
-"""The answer to a case: verdict, mismatch, effects, fits, and what could not have been seen."""
+"""The answer to a case: verdict, mismatch, effects, fits, and what could not have been seen.
+
+`declared.json_value` writes it as ``diagnosis.json`` holds it, and `answer.reader` reads it back.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
+from toolkit.declared import Entry, Keyed, OrNan, derived
+from toolkit.diagnosis.fit.sensor_noise import ChannelNoise
+from toolkit.effects.applied import EffectKey
+from toolkit.effects.facts import Second
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
-    from toolkit.diagnosis.fit.sensor_noise import NoiseParts
-    from toolkit.effects.applied import EffectKey
 
 LAWS_STEP = "laws"
 """The step of a search, among those skipped, that looks for laws of what has no name."""
@@ -19,18 +24,28 @@ Verdict = Literal["named", "equivalent", "unknown", "nothing", "untestable"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where a mismatch is: a range of a channel, of time, or the value of a condition.
+class DiagnosedRecording:
+    """A recording of a case."""
 
-    ``whole`` says that the range is all that was recorded: the mismatch is everywhere.
+    name: str
+    sha256: str
+    own: Annotated[bool, Entry("whether the virtual machine recorded it")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MismatchPlace:
+    """Where a channel departs from the simulation.
+
+    A range of a channel or of time, or twice the value of a condition. ``whole`` says that the range is all
+    that was recorded: the mismatch is everywhere.
     """
 
     variable: str
-    start: float | str | None
-    end: float | str | None
+    start: Annotated[OrNan | str | None, Entry(key="from")]
+    end: Annotated[OrNan | str | None, Entry(key="to")]
     unit: str
     runs: tuple[str, ...]
-    whole: bool = False
+    whole: Annotated[bool, Entry(output=False)] = False
 
     def ends(self, number: Callable[[float], str]) -> str:
         """Return the ends of a range, each as ``number`` writes it; a condition's one value as it stands."""
@@ -40,183 +55,230 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mismatch:
-    """One output that the refitted simulation does not explain; share of the refitted residual's variance."""
+class ChannelMismatch:
+    """How far a channel departs from the simulation."""
 
     channel: str
-    p_value: float
-    share_of_variance: float
-    where: tuple[Place, ...]
+    p_value: OrNan
+    share_of_variance: Annotated[OrNan, Entry("of the refitted residual")]
+    where: tuple[MismatchPlace, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FoundParameter:
-    """A fitted parameter with its 95 % interval; a text where the parameter is a name."""
+class EffectEstimate:
+    """A parameter of an effect that a diagnosis names."""
 
     name: str
-    value: float | str
+    value: Annotated[OrNan | str, Entry("a text where the parameter is a name")]
     unit: str
-    ci95: tuple[float, float] | None
-    runs: tuple[str, ...] | None
+    ci95: Annotated[tuple[OrNan, OrNan] | None, Entry("interval for a coverage of 95 %")]
+    runs: Annotated[tuple[str, ...] | None, Entry("in which it acts; null for all")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FoundEffect:
-    """An effect that explains a mismatch, and the names that explain it as well."""
+class RejectedEffect:
+    """An effect that explains less."""
 
-    key: EffectKey
+    name: str
+    log_likelihood_less: Annotated[OrNan, Entry("at most: one that is far behind is not fitted to its end")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EffectEvidence:
+    """What speaks for an effect."""
+
+    held_out_log_score_gain: Annotated[OrNan, Entry("on runs that no fit has seen")]
+    p_value: Annotated[OrNan, Entry("against the chance of the whole search")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnosedEffect:
+    """An effect that a diagnosis names."""
+
+    name: str
     stage: str
+    channel: Annotated[str | None, Entry("or state that it acts on")]
     statement: str
     equation: str
     reference: str
-    parameters: tuple[FoundParameter, ...]
-    equivalent_to: tuple[str, ...]
-    rejected: tuple[tuple[str, float], ...]
-    held_out_log_score_gain: float
-    p_value: float
+    parameters: tuple[EffectEstimate, ...]
+    equivalent_to: Annotated[tuple[str, ...], Entry("effects that this recording cannot tell from it")]
+    rejected: tuple[RejectedEffect, ...]
+    evidence: EffectEvidence
 
     @property
-    def name(self) -> str:
-        """Name of the effect."""
-        return self.key.name
+    def key(self) -> EffectKey:
+        """Its identity; its source and its runs stand among its parameters."""
+        words = {one.name: one.value for one in self.parameters if isinstance(one.value, str)}
+        runs = self.parameters[0].runs if self.parameters else None
+        return EffectKey(
+            name=self.name, channel=self.channel,
+            source=next((words[word] for word in get_args(Second) if word in words), None),
+            runs=None if runs is None else frozenset(runs),
+        )  # fmt: skip
 
-    @property
-    def channel(self) -> str | None:
-        """Channel or state that it acts on."""
-        return self.key.channel
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawPlace:
+    """Where a law acts."""
+
+    kind: Literal["output", "state"]
+    channel: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawCurve:
-    """A law of one signal as it runs over what was recorded, with its 95 % band; lists of one length."""
+    """A law of one signal over what was recorded."""
 
-    x: tuple[float, ...]
-    y: tuple[float, ...]
-    low: tuple[float, ...]
-    high: tuple[float, ...]
+    x: tuple[OrNan, ...]
+    y: tuple[OrNan, ...]
+    band95: Annotated[
+        tuple[tuple[OrNan, ...], tuple[OrNan, ...]], Entry("lower and upper ends of a 95 % band")
+    ]
     unit: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FoundLaw:
-    """What structure without a name is answered by: where it acts, on what it depends, and how.
+class ResembledEffect:
+    """A known effect that a law is like."""
 
-    ``kind`` is that of its place, an output or the equation of a state. ``formula`` is None of a curve that
-    no formula fits; ``held_out_log_score_gain`` None of what explains and does not predict.
-    ``confounded_with`` are nominal parameters that moved far because of it; ``resembles`` known effects like
-    it, with the share of its response that is left beside each.
-    """
+    name: str
+    distance: Annotated[OrNan, Entry("share of the law's response that is left beside the effect's")]
 
-    kind: Literal["output", "state"]
-    channel: str
-    form: str
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawEvidence:
+    """What speaks for a law."""
+
+    held_out_log_score_gain: Annotated[float | None, Entry("null of what explains and does not predict")]
+    p_value: OrNan
+    share_of_gap: Annotated[OrNan, Entry("of the mean square that it takes")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnosedLaw:
+    """A law of what no known effect explains."""
+
+    place: LawPlace
+    form: Annotated[str, Entry("static, mode, loop, event or tone")]
     acts: Literal["adds", "multiplies"]
     variables: tuple[str, ...]
     memory_s: float | None
-    formula: str | None
-    parameters: tuple[FoundParameter, ...]
+    formula: Annotated[str | None, Entry("null of a curve")]
+    parameters: tuple[EffectEstimate, ...]
     curve: LawCurve | None
-    ranges: tuple[tuple[str, float, float], ...]
-    resembles: tuple[tuple[str, float], ...]
-    confounded_with: tuple[str, ...]
-    held_out_log_score_gain: float | None
-    p_value: float
-    share_of_gap: float
+    ranges: Annotated[
+        tuple[tuple[str, tuple[OrNan, OrNan]], ...],
+        Keyed(),
+        Entry("recorded range of each variable", key="range"),
+    ]
+    resembles: tuple[ResembledEffect, ...]
+    confounded_with: Annotated[tuple[str, ...], Entry("parameters that moved far because of it")]
+    evidence: LawEvidence
 
     @property
     def sentence(self) -> str:
         """What it says, for people."""
-        place = f"{self.channel} = {self.channel}_model"
+        channel = self.place.channel
+        place = f"{channel} = {channel}_model"
         law = self.formula or f"a curve of {' and '.join(self.variables)}"
-        if self.kind == "state":
-            text = f"in the equation of {self.channel}: d{self.channel}/dt = ... - ({law})"
+        if self.place.kind == "state":
+            text = f"in the equation of {channel}: d{channel}/dt = ... - ({law})"
         elif self.acts == "multiplies":
             text = f"{place} * (1 + {law})"
         else:
             text = f"{place} + {law}"
         runs = self.parameters[0].runs if self.parameters else None
         text += f", in {' and '.join(runs)} alone" if runs is not None else ""
-        return text if self.held_out_log_score_gain is not None else f"{text}; it explains, not predicts"
+        explains_alone = self.evidence.held_out_log_score_gain is None
+        return f"{text}; it explains, not predicts" if explains_alone else text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NominalParameter:
-    """A parameter of the simulation before and after the fit."""
+    """A parameter of the simulation, before and after it was fitted."""
 
     name: str
-    before: float
-    after: float
+    before: OrNan
+    after: OrNan
     unit: str
     prior_sd: float | None
 
     @property
+    @derived("how far it moved, in its prior's standard deviation")
     def shift_in_sd(self) -> float | None:
         """How far it moved, in its prior's standard deviation."""
         return None if not self.prior_sd else (self.after - self.before) / self.prior_sd
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HeldOutFit:
-    """Root mean square errors of an output on rows that no fit has seen, in its unit.
+class HeldOutChannel:
+    """How well a channel is predicted in runs that no fit has seen.
 
-    ``with_laws_rmse`` has the laws of what has no name in it, None without any. ``noise`` parts the sensor's
-    noise from the process's; None where no fit was made, and in older answers.
+    Root mean square errors, in the unit of the channel; ``with_laws_rmse`` is None without any law.
     """
 
     channel: str
     unit: str
-    nominal_rmse: float
-    refitted_rmse: float
-    augmented_rmse: float
-    noise_floor: float
-    noise: NoiseParts | None = None
-    with_laws_rmse: float | None = None
+    nominal_rmse: OrNan
+    refitted_rmse: OrNan
+    augmented_rmse: Annotated[OrNan, Entry("with the effects that are named")]
+    noise_floor: OrNan
+    with_laws_rmse: Annotated[float | None, Entry("with the laws of what has no name too")] = None
+    noise: Annotated[ChannelNoise | None, Entry("null where no fit was made, and in older answers")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NotFound:
-    """An effect that was not found: the smallest size that this recording would have shown, 80 % power."""
+class HeldOutFit:
+    """How well the channels are predicted."""
+
+    held_out_by: str
+    held_out: tuple[HeldOutChannel, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dependence:
+    """What an unexplained remainder depends on."""
+
+    channel: str
+    variables: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AbsentEffect:
+    """An effect that was not found, and how large it would have had to be."""
 
     name: str
-    minimum_detectable: float | None
+    minimum_detectable: Annotated[
+        float | None, Entry("the smallest size that this recording would have shown, 80 % power")
+    ]
     unit: str
     observable: bool
     why: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recorded:
-    """A recording that the answer rests on: its file's name and SHA-256.
-
-    ``own`` tells a file as the machine's acquisition program wrote it from a table made for the case.
-    """
-
-    name: str
-    sha256: str
-    own: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """The whole answer; ``recordings`` is None in one of a version that did not write them down."""
+    """Why a simulation and a recording differ."""
 
     title: str
     case_sha256: str
+    recordings: Annotated[
+        tuple[DiagnosedRecording, ...] | None, Entry("null in an answer of a version that did not name them")
+    ] = None
     verdict: Verdict
-    remaining: Literal["nothing", "unknown"]
-    mismatch: tuple[Mismatch, ...]
-    effects: tuple[FoundEffect, ...]
-    nominal_parameters: tuple[NominalParameter, ...]
-    held_out: tuple[HeldOutFit, ...]
-    held_out_by: str
-    depends_on: tuple[tuple[str, tuple[str, ...]], ...]
-    not_found: tuple[NotFound, ...]
-    next_measurements: tuple[str, ...]
-    findings: tuple[Finding, ...]
-    complete: bool
+    remaining: Annotated[Literal["nothing", "unknown"], Entry("what is left unexplained")]
+    complete: Annotated[bool, Entry("whether the search ended by itself")]
     skipped: tuple[str, ...]
-    recordings: tuple[Recorded, ...] | None = None
-    laws: tuple[FoundLaw, ...] = ()
+    mismatch: tuple[ChannelMismatch, ...]
+    effects: tuple[DiagnosedEffect, ...]
+    laws: Annotated[tuple[DiagnosedLaw, ...], Entry("of what has no name")] = ()
+    nominal_parameters: tuple[NominalParameter, ...]
+    fit: HeldOutFit
+    depends_on: tuple[Dependence, ...]
+    not_found: tuple[AbsentEffect, ...]
+    next_measurements: Annotated[tuple[str, ...], Entry("what to measure next")]
+    findings: tuple[Finding, ...]
 
 
 def cut_short(skipped: Sequence[str]) -> bool:
@@ -227,9 +289,11 @@ def cut_short(skipped: Sequence[str]) -> bool:
 def only_runs_differ(diagnosis: Diagnosis) -> bool:
     """Tell whether all that is left without a name are zeros and gains of the runs."""
     bare = diagnosis.verdict == "unknown" and not diagnosis.laws and not diagnosis.skipped
-    return bare and bool(diagnosis.depends_on) and all(by == ("run",) for _, by in diagnosis.depends_on)
+    return (
+        bare and bool(diagnosis.depends_on) and all(by.variables == ("run",) for by in diagnosis.depends_on)
+    )
 
 
-def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:
+def recorded(runs: Iterable[Run]) -> tuple[DiagnosedRecording, ...]:
     """Return what an answer says of the recordings of a case."""
-    return tuple(Recorded(name=run.name, sha256=run.sha256, own=run.own) for run in runs)
+    return tuple(DiagnosedRecording(name=run.name, sha256=run.sha256, own=run.own) for run in runs)

@@ -9,11 +9,15 @@ import numpy as np
 
 from toolkit.diagnosis.answer.answer import (
     LAWS_STEP,
+    ChannelMismatch,
+    Dependence,
+    DiagnosedEffect,
     Diagnosis,
-    FoundEffect,
-    FoundParameter,
-    Mismatch,
+    EffectEstimate,
+    EffectEvidence,
+    HeldOutFit,
     NominalParameter,
+    RejectedEffect,
     Verdict,
     recorded,
 )
@@ -65,10 +69,12 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         mismatch=_mismatches(search, unknown=unknown),
         effects=effects,
         nominal_parameters=nominal,
-        held_out=with_laws(search, laws, held_out_errors(search, unknown=unknown)),
-        held_out_by=search.folds.told(len(search.problem.runs)),
+        fit=HeldOutFit(
+            held_out_by=search.folds.told(len(search.problem.runs)),
+            held_out=with_laws(search, laws, held_out_errors(search, unknown=unknown)),
+        ),
         depends_on=tuple(
-            (structure.output, structure.variables)
+            Dependence(channel=structure.output, variables=structure.variables)
             for structure in search.structure or (search.structure_before if unknown else ())
         ),
         not_found=not_found(
@@ -94,7 +100,11 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
 
 
 def _verdict(
-    search: Search, effects: tuple[FoundEffect, ...], nominal: tuple[NominalParameter, ...], *, unknown: bool
+    search: Search,
+    effects: tuple[DiagnosedEffect, ...],
+    nominal: tuple[NominalParameter, ...],
+    *,
+    unknown: bool,
 ) -> Verdict:
     if effects:
         return "equivalent" if any(effect.equivalent_to for effect in effects) else "named"
@@ -105,7 +115,7 @@ def _verdict(
     return "nothing"
 
 
-def _effect(search: Search, step: Step) -> FoundEffect:
+def _effect(search: Search, step: Step) -> DiagnosedEffect:
     problem, active = search.problem, step.active
     runs = None if active.runs is None else tuple(run.name for run in problem.runs if run.name in active.runs)
     equivalent = equivalent_to(problem, step)
@@ -114,17 +124,20 @@ def _effect(search: Search, step: Step) -> FoundEffect:
         for rival in reversed(step.rivals)
         if rival.active.effect.name not in (*equivalent, active.effect.name)
     }
-    return FoundEffect(
-        key=active.key,
+    return DiagnosedEffect(
+        name=active.key.name,
         stage=active.effect.stage,
+        channel=active.key.channel,
         statement=_statement(problem, active) + ("" if runs is None else f" In {_listed(runs)} alone."),
         equation=active.effect.equation + _counted_from(problem, active),
         reference=active.effect.reference,
         parameters=(*_parameters(search, active, runs), *_named(active, runs)),
         equivalent_to=equivalent,
-        rejected=tuple(rejected.items()),
-        held_out_log_score_gain=step.held_out_gain,
-        p_value=step.p_value,
+        rejected=tuple(
+            RejectedEffect(name=name, log_likelihood_less=-difference)
+            for name, difference in rejected.items()
+        ),
+        evidence=EffectEvidence(held_out_log_score_gain=step.held_out_gain, p_value=step.p_value),
     )
 
 
@@ -181,7 +194,7 @@ def _listed(names: tuple[str, ...]) -> str:
 
 def _parameters(
     search: Search, active: AppliedEffect, runs: tuple[str, ...] | None
-) -> tuple[FoundParameter, ...]:
+) -> tuple[EffectEstimate, ...]:
     from scipy.stats import t as student
 
     problem, augmented = search.problem, search.augmented
@@ -212,11 +225,11 @@ def _parameters(
         if unit == "deg" and parameter.name.startswith("phase"):
             turns = 360.0 * math.floor(value / 360.0)
             value, ci = value - turns, None if ci is None else (ci[0] - turns, ci[1] - turns)
-        result.append(FoundParameter(name=parameter.name, value=value, unit=unit, ci95=ci, runs=runs))
+        result.append(EffectEstimate(name=parameter.name, value=value, unit=unit, ci95=ci, runs=runs))
     return tuple(result)
 
 
-def _named(active: AppliedEffect, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+def _named(active: AppliedEffect, runs: tuple[str, ...] | None) -> tuple[EffectEstimate, ...]:
     """Return what of an effect is no number: the other channel or record, its history, the runs it is in."""
     texts = {}
     if active.effect.second is not None and active.source is not None:
@@ -226,7 +239,7 @@ def _named(active: AppliedEffect, runs: tuple[str, ...] | None) -> tuple[FoundPa
     if not active.effect.parameters and runs is not None:
         texts["runs"] = ", ".join(runs)
     return tuple(
-        FoundParameter(name=name, value=value, unit="", ci95=None, runs=runs) for name, value in texts.items()
+        EffectEstimate(name=name, value=value, unit="", ci95=None, runs=runs) for name, value in texts.items()
     )
 
 
@@ -245,7 +258,7 @@ def _nominal(search: Search, *, before_effects: bool) -> tuple[NominalParameter,
     )
 
 
-def _mismatches(search: Search, *, unknown: bool) -> tuple[Mismatch, ...]:
+def _mismatches(search: Search, *, unknown: bool) -> tuple[ChannelMismatch, ...]:
     problem = search.problem
     mismatches = []
     for name in problem.names:
@@ -271,7 +284,7 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[Mismatch, ...]:
         if unknown:
             share, signal = max((share, signal), structured(search, name), key=lambda pair: pair[0])
         mismatches.append(
-            Mismatch(
+            ChannelMismatch(
                 channel=name,
                 p_value=min(p_values),
                 share_of_variance=share,

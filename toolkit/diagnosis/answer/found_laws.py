@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer.answer import FoundLaw, FoundParameter, LawCurve
+from toolkit.diagnosis.answer.answer import (
+    DiagnosedLaw,
+    EffectEstimate,
+    LawCurve,
+    LawEvidence,
+    LawPlace,
+    ResembledEffect,
+)
 from toolkit.diagnosis.policy import LAWS, VERDICT
 from toolkit.effects.law import formula
 
@@ -25,7 +32,7 @@ def with_laws(search: Search, laws: Laws) -> Search:
     return replace(search, augmented=laws.fit, held_augmented=laws.held_out)
 
 
-def found_laws(search: Search, laws: Laws) -> tuple[FoundLaw, ...]:
+def found_laws(search: Search, laws: Laws) -> tuple[DiagnosedLaw, ...]:
     """Return the laws for the answer.
 
     Parameters
@@ -36,7 +43,7 @@ def found_laws(search: Search, laws: Laws) -> tuple[FoundLaw, ...]:
     return tuple(_found(whole, law) for law in laws.listed)
 
 
-def _found(search: Search, law: Law) -> FoundLaw:
+def _found(search: Search, law: Law) -> DiagnosedLaw:
     trial = law.trial
     same = (applied for applied in search.augmented.active if applied.key == law.applied.key)
     fitted = next(same, law.applied)
@@ -48,16 +55,15 @@ def _found(search: Search, law: Law) -> FoundLaw:
     plain = formula(fitted.effect.name.split(": ", 1)[1]).plain(fitted.channel)
     for signal in trial.signals:
         plain = plain.replace(signal.written.strip("[]"), signal.name) if trial.acts == "enters" else plain
-    return FoundLaw(
-        kind="state" if trial.acts == "enters" else "output",
-        channel=str(fitted.channel),
+    return DiagnosedLaw(
+        place=LawPlace(kind="state" if trial.acts == "enters" else "output", channel=str(fitted.channel)),
         form=trial.form,
         acts="multiplies" if trial.acts == "multiplies" else "adds",
         variables=tuple(signal.name for signal in trial.signals),
         memory_s=_memory(fitted),
         formula=None if shaped else plain,
         parameters=tuple(
-            FoundParameter(
+            EffectEstimate(
                 name=name, value=value, unit=fitted.units[name], runs=runs,
                 ci95=(value - half, value + half)
                 if math.isfinite(half) and half < VERDICT.open_interval * max(abs(value), 1e-300)
@@ -67,13 +73,15 @@ def _found(search: Search, law: Law) -> FoundLaw:
         ),
         curve=_curve(law, fitted, covariance, _quantile(search)),
         ranges=tuple(
-            (signal.name, float(signal.values.min()), float(signal.values.max())) for signal in trial.signals
+            (signal.name, (float(signal.values.min()), float(signal.values.max())))
+            for signal in trial.signals
         ),
-        resembles=law.resembles,
+        resembles=tuple(ResembledEffect(name=name, distance=distance) for name, distance in law.resembles),
         confounded_with=law.confounded,
-        held_out_log_score_gain=law.held_out_gain,
-        p_value=law.p_value,
-        share_of_gap=min(max(law.share, 0.0), 1.0),
+        evidence=LawEvidence(
+            held_out_log_score_gain=law.held_out_gain, p_value=law.p_value,
+            share_of_gap=min(max(law.share, 0.0), 1.0),
+        ),
     )  # fmt: skip
 
 
@@ -134,6 +142,6 @@ def _curve(
     J = np.stack(slopes, axis=1)
     half = quantile * np.sqrt(np.clip(np.einsum("ij,jk,ik->i", J, covariance, J), 0.0, None))
     return LawCurve(
-        x=tuple(x.tolist()), y=tuple(y.tolist()), low=tuple((y - half).tolist()),
-        high=tuple((y + half).tolist()), unit=trial.unit,
+        x=tuple(x.tolist()), y=tuple(y.tolist()),
+        band95=(tuple((y - half).tolist()), tuple((y + half).tolist())), unit=trial.unit,
     )  # fmt: skip

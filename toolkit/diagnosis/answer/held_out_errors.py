@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer.answer import HeldOutFit
-from toolkit.diagnosis.fit.sensor_noise import NoiseParts, noise_parts
+from toolkit.diagnosis.answer.answer import HeldOutChannel
+from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts
 from toolkit.diagnosis.fit.structure import groups
 from toolkit.diagnosis.law.trial import bracketed
 from toolkit.diagnosis.search.search import Search
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.law.learn import Laws
 
 
-def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
+def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutChannel, ...]:
     """Return the errors of every output; of one that only drifts those of its rates.
 
     Parameters
@@ -40,7 +40,7 @@ def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
             return math.sqrt(float(np.mean(away**2)))
 
         errors.append(
-            HeldOutFit(
+            HeldOutChannel(
                 channel=output.name,
                 unit=reduced(f"{bracketed(output.unit)}/s") if output.name in problem.rates else output.unit,
                 nominal_rmse=rmse(search.nominal.simulated[output.name]),
@@ -57,7 +57,7 @@ def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
     return tuple(errors)
 
 
-def judged_noise(search: Search, name: str) -> NoiseParts:
+def judged_noise(search: Search, name: str) -> ChannelNoise:
     """Return the noise of what is judged of an output, the sensor's apart."""
     problem, parts = search.problem, noise_parts(search.problem, search.augmented, name)
     if name not in problem.rates:
@@ -67,7 +67,7 @@ def judged_noise(search: Search, name: str) -> NoiseParts:
     return replace(parts, sensor_sd=sensor, process_sd=math.sqrt(max(total - sensor**2, 0.0)))
 
 
-def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutFit, ...]) -> tuple[HeldOutFit, ...]:
+def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) -> tuple[HeldOutChannel, ...]:
     """Return held-out errors with those that the laws leave beside them; an event tells nothing there."""
     if not any(law.predicts for law in laws.listed):
         return errors

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer.answer import Place
+from toolkit.diagnosis.answer.answer import MismatchPlace
 from toolkit.diagnosis.policy import LOCATION
 from toolkit.units import unit
 
@@ -24,7 +24,7 @@ def places(
     signal: NDArray[np.float64],
     simulated: NDArray[np.float64],
     depends_on: Sequence[str] = (),
-) -> tuple[Place, ...]:
+) -> tuple[MismatchPlace, ...]:
     """Return the ranges that hold most of a mismatch: of what it depends on first, then the narrowest.
 
     Parameters
@@ -39,7 +39,7 @@ def places(
     if energy_sum <= 0:
         return ()
     rows = problem.kept[name]
-    ranges: list[tuple[float, Place]] = []
+    ranges: list[tuple[float, MismatchPlace]] = []
     unit_of = {output.name: output.unit for output in problem.model.outputs}
     for variable, measure, x in [*_variables(problem), (name, unit_of[name], simulated)]:
         span = _range(x, energy, rows)
@@ -49,7 +49,7 @@ def places(
             ranges.append(
                 (
                     share,
-                    Place(
+                    MismatchPlace(
                         variable=variable,
                         start=low,
                         end=high,
@@ -109,7 +109,7 @@ def _range(
 
 def _conditions(
     problem: Problem, energy: NDArray[np.float64], rows: NDArray[np.bool_]
-) -> list[tuple[float, Place]]:
+) -> list[tuple[float, MismatchPlace]]:
     ranges = []
     energy_sum, n = float(energy.sum()), float(rows.sum())
     keys = dict.fromkeys(key for run in problem.runs for key in run.conditions)
@@ -125,7 +125,9 @@ def _conditions(
             if energy_there >= LOCATION.held * energy_sum:
                 share = sum(float(rows[problem.slices[i]].sum()) for i in which) / n
                 runs = tuple(problem.runs[i].name for i in which)
-                ranges.append((share, Place(variable=key, start=level, end=level, unit="", runs=runs)))
+                ranges.append(
+                    (share, MismatchPlace(variable=key, start=level, end=level, unit="", runs=runs))
+                )
     return ranges
 
 

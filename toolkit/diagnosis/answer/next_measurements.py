@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.answer.answer import FoundEffect, Verdict, cut_short
+from toolkit.diagnosis.answer.answer import DiagnosedEffect, Verdict, cut_short
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
@@ -30,7 +30,7 @@ def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for name in names if name != own))
 
 
-def apart(effect: FoundEffect) -> str:
+def apart(effect: DiagnosedEffect) -> str:
     """Return the measurements that would tell an effect from its class, and of which names each speaks."""
     statements: dict[str, list[str]] = {}
     for name in (effect.name, *effect.equivalent_to):
@@ -38,7 +38,7 @@ def apart(effect: FoundEffect) -> str:
     return "; ".join(f"{text} ({', '.join(names)})" for text, names in statements.items() if text)
 
 
-def parted(effect: FoundEffect) -> str:
+def parted(effect: DiagnosedEffect) -> str:
     """Return the sentence that says what would tell an effect from its class, or from what is like it."""
     others = effect.equivalent_to or _akin(effect.name)
     if not others:
@@ -93,7 +93,9 @@ def outsized(search: Search) -> bool:
     return False
 
 
-def next_measurements(search: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:
+def next_measurements(
+    search: Search, effects: tuple[DiagnosedEffect, ...], verdict: Verdict
+) -> tuple[str, ...]:
     """Return a sentence for each measurement that would say more than this case does."""
     sentences = [text for effect in effects if (text := parted(effect))]
     if verdict == "unknown":

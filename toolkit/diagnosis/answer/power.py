@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer.answer import NotFound
+from toolkit.diagnosis.answer.answer import AbsentEffect
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.effects.catalogue import effects
 
@@ -27,7 +27,7 @@ def not_found(
     *,
     alpha: float,
     units: dict[int, str],
-) -> tuple[NotFound, ...]:
+) -> tuple[AbsentEffect, ...]:
     """Return every effect that is not named, with its minimum detectable size.
 
     Parameters
@@ -66,7 +66,7 @@ def not_found(
         if name not in best:
             why = "found, but what stays without a name outweighs it" if name in withdrawn else NO_PLACE
             entries.append(
-                NotFound(
+                AbsentEffect(
                     name=name, minimum_detectable=None, unit="", observable=name in withdrawn, why=why
                 )
             )  # fmt: skip
@@ -75,7 +75,9 @@ def not_found(
         why = "" if visible else "its response vanishes here, or the free parameters take it all"
         if not visible and name in beyond:
             why = "it would not have been seen at any usual size that leaves the outputs in their own range"
-        entries.append(NotFound(name=name, minimum_detectable=size, unit=unit, observable=visible, why=why))
+        entries.append(
+            AbsentEffect(name=name, minimum_detectable=size, unit=unit, observable=visible, why=why)
+        )
     return tuple(entries)
 
 

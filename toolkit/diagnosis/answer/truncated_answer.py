@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer.answer import Diagnosis, HeldOutFit, NominalParameter, NotFound, recorded
+from toolkit.diagnosis.answer.answer import (
+    AbsentEffect,
+    Diagnosis,
+    HeldOutChannel,
+    HeldOutFit,
+    NominalParameter,
+    recorded,
+)
 from toolkit.diagnosis.policy import ROWS
 from toolkit.effects.catalogue import effects
 
@@ -76,11 +83,13 @@ def without_search(
             )
             for parameter in case.parameters
         ),
-        held_out=() if problem is None or simulated is None else _as_declared(problem, simulated),
-        held_out_by="none: no fit was made",
+        fit=HeldOutFit(
+            held_out_by="none: no fit was made",
+            held_out=() if problem is None or simulated is None else _as_declared(problem, simulated),
+        ),
         depends_on=(),
         not_found=tuple(
-            NotFound(name=name, minimum_detectable=None, unit="", observable=False, why=why)
+            AbsentEffect(name=name, minimum_detectable=None, unit="", observable=False, why=why)
             for name in effects()
         ),
         next_measurements=next_measurements,
@@ -91,7 +100,7 @@ def without_search(
     )
 
 
-def _as_declared(problem: Problem, simulated: Stacked) -> tuple[HeldOutFit, ...]:
+def _as_declared(problem: Problem, simulated: Stacked) -> tuple[HeldOutChannel, ...]:
     """Return the error of the simulation as declared, three times; noise that nobody stated is unknown."""
     errors = []
     for output in problem.model.outputs:
@@ -101,7 +110,7 @@ def _as_declared(problem: Problem, simulated: Stacked) -> tuple[HeldOutFit, ...]
         away = problem.observed[output.name][counted] - simulated[output.name][counted]
         error = math.sqrt(float(np.mean(away**2)))
         errors.append(
-            HeldOutFit(
+            HeldOutChannel(
                 channel=output.name, unit=output.unit, nominal_rmse=error, refitted_rmse=error,
                 augmented_rmse=error, noise_floor=output.sd or math.nan,
             )

@@ -30,7 +30,7 @@ _ROBUST = 1.4826  # standard deviation of a normal distribution over its median 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NoiseParts:
+class ChannelNoise:
     """Noise of one output, in its unit: the sensor's, the rest of a residual, and what shows the first."""
 
     sensor_sd: float
@@ -48,7 +48,7 @@ class NoiseParts:
         return self.how != "differences" and self.total_sd <= NOISE.as_known * self.sensor_sd
 
 
-def noise_parts(problem: Problem, fit: Fit, name: str) -> NoiseParts:
+def noise_parts(problem: Problem, fit: Fit, name: str) -> ChannelNoise:
     """Return the two noises of an output beside a fit."""
     counted = problem.kept[name]
     residual = fit.residual[name][counted]
@@ -59,7 +59,7 @@ def noise_parts(problem: Problem, fit: Fit, name: str) -> NoiseParts:
         sensor, how = floor, "resolution"
     if how in ("differences", "resolution"):
         sensor = min(sensor, total) if total > 0 else sensor
-    return NoiseParts(sensor_sd=sensor, process_sd=math.sqrt(max(total**2 - sensor**2, 0.0)), how=how)
+    return ChannelNoise(sensor_sd=sensor, process_sd=math.sqrt(max(total**2 - sensor**2, 0.0)), how=how)
 
 
 def _sensor(problem: Problem, fit: Fit, name: str) -> tuple[float, Evidence]:

@@ -7,13 +7,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NotRequired, cast
+from typing import TYPE_CHECKING, Annotated
 
-from toolkit.diagnosis.answer.serial import DiagnosisEntries
+from toolkit.declared import Entry, answer
+from toolkit.declared.answers import extended
+from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.lab.answers import (
     DeliveredDocument,
-    DraftKeys,
-    Timed,
     Timing,
     delivered_keys,
     draft_keys,
@@ -23,24 +23,28 @@ from toolkit.lab.answers import (
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.diagnose import Result
     from toolkit.report.word.package import Template
     from toolkit.worker.posix import Limits
 
 
-class DiagnosisFile(DiagnosisEntries, DraftKeys, Timed):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnosisFile(Diagnosis):
     """What ``diagnosis.json`` holds beside its schema."""
 
-    model: Annotated[str | None, "file of the simulation with these effects in it"]
+    draft: Annotated[bool, Entry("whether a record is used that is not approved and in force")]
+    draft_reasons: Annotated[tuple[str, ...], Entry("why")]
+    model: Annotated[str | None, Entry("file of the simulation with these effects in it")]
+    timing: Timing
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnoseAnswer(DiagnosisFile):
     """Why a simulation and a recording differ."""
 
-    document: NotRequired[DeliveredDocument]
     out: str
+    document: Annotated[DeliveredDocument | None, Entry(sparse=True)] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,30 +151,25 @@ def write_diagnosis(
         the folder cannot be written to, or the document not be made: then nothing of it was changed
     """
     from toolkit.diagnosis.answer.model_text import MODEL
-    from toolkit.diagnosis.answer.serial import as_json
     from toolkit.publication import publication
     from toolkit.report.diagnosis.page import page
 
     model = diagnosed.model(out)
     drawn = page(diagnosed.result, diagnosed.use)
-    content: DiagnosisFile = {
-        **as_json(diagnosed.result.diagnosis),
-        **draft_keys(*([diagnosed.use] if diagnosed.use else [])),
-        "model": None if model is None else MODEL,
-        "timing": timing(),
-    }
-    answer = json.dumps({"schema": 1, **content}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
+    content = extended(
+        DiagnosisFile, diagnosed.result.diagnosis, **draft_keys(*([diagnosed.use] if diagnosed.use else [])),
+        model=None if model is None else MODEL, timing=timing(),
+    )  # fmt: skip
+    written = json.dumps(answer(content), ensure_ascii=False, indent=2, allow_nan=False) + "\n"
     files = {f"predictions/{name}": rows for name, rows in diagnosed.result.predictions}
-    files |= {"diagnosis.html": drawn, "diagnosis.json": answer}
+    files |= {"diagnosis.html": drawn, "diagnosis.json": written}
     with publication(out) as stage:
-        for name, written in files.items():
+        for name, text in files.items():
             (stage / name).parent.mkdir(exist_ok=True)
-            (stage / name).write_text(written, encoding="utf-8")
+            (stage / name).write_text(text, encoding="utf-8")
         _write_model(out / MODEL, model, stage)
-        payload = cast("DiagnoseAnswer", {**content, "out": str(out)})
-        if opened is not None:
-            payload["document"] = _write_document(diagnosed, opened, out, stage, by=by)
-    return payload
+        document = None if opened is None else _write_document(diagnosed, opened, out, stage, by=by)
+    return extended(DiagnoseAnswer, content, out=str(out), document=document)
 
 
 def _write_document(
@@ -242,20 +241,20 @@ def _writable(out: Path) -> None:
         )
 
 
-def diagnosis_text(answer: Diagnosis, out: Path) -> str:
+def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
     from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
     from toolkit.report.diagnosis.numbers import chance, rounded
     from toolkit.report.diagnosis.page import cause, simulated
 
-    cut = answer.verdict == "unknown" and cut_short(answer.skipped)
-    verdict = _CUT if cut else _RUNS_DIFFER if only_runs_differ(answer) else _VERDICTS[answer.verdict]
-    if answer.verdict == "untestable" and answer.skipped:
+    cut = diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped)
+    verdict = _CUT if cut else _RUNS_DIFFER if only_runs_differ(diagnosis) else _VERDICTS[diagnosis.verdict]
+    if diagnosis.verdict == "untestable" and diagnosis.skipped:
         verdict = "the budget was spent before this recording could be judged"
-    mark = simulated(answer)
+    mark = simulated(diagnosis)
     lines = [mark] if mark else []
-    lines.append(f"{answer.title}: {' '.join(filter(None, (cause(answer), verdict)))}")
-    for effect in answer.effects:
+    lines.append(f"{diagnosis.title}: {' '.join(filter(None, (cause(diagnosis), verdict)))}")
+    for effect in diagnosis.effects:
         channel = f" on {effect.channel}" if effect.channel else ""
         lines += ["", f"{effect.name}{channel} ({effect.stage}): {effect.statement}", f"  {effect.equation}"]
         for parameter in effect.parameters:
@@ -268,10 +267,10 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
         if effect.equivalent_to:
             lines.append(f"  this recording cannot tell it from: {', '.join(effect.equivalent_to)}")
         lines.append(
-            f"  held-out log score +{effect.held_out_log_score_gain:.1f}, "
-            f"{chance(effect.p_value)} in the search"
+            f"  held-out log score +{effect.evidence.held_out_log_score_gain:.1f}, "
+            f"{chance(effect.evidence.p_value)} in the search"
         )
-    for law in answer.laws:
+    for law in diagnosis.laws:
         lines += ["", f"law without a name: {law.sentence}"]
         for parameter in law.parameters:
             if isinstance(parameter.value, str) or not math.isfinite(parameter.value):
@@ -281,13 +280,17 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
                 f"  {parameter.name} = {value} {parameter.unit}"
                 + (f"  (95 %: {interval})" if interval else "")
             )
-        lines.append(f"  takes {100 * law.share_of_gap:.0f} % of the mean square that was left")
-    listed = list(dict.fromkeys(answer.depends_on))  # the largest first
-    for channel, names in listed[:_STRUCTURES]:
+        lines.append(f"  takes {100 * law.evidence.share_of_gap:.0f} % of the mean square that was left")
+    structures = list(
+        dict.fromkeys((by.channel, tuple(by.variables)) for by in diagnosis.depends_on)
+    )  # the largest first
+    for channel, names in structures[:_STRUCTURES]:
         lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
-    if len(listed) > _STRUCTURES:
-        lines.append(f"and {len(listed) - _STRUCTURES} smaller ones over other variables: see diagnosis.json")
-    for place in answer.mismatch:
+    if len(structures) > _STRUCTURES:
+        lines.append(
+            f"and {len(structures) - _STRUCTURES} smaller ones over other variables: see diagnosis.json"
+        )
+    for place in diagnosis.mismatch:
         for at in place.where[:1]:
             extent = "over all of" if at.whole else "mostly where"
             lines.append(
@@ -302,11 +305,11 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
             *([] if o.with_laws_rmse is None else [f"{o.with_laws_rmse:.4g}"]),
             f"{o.noise_floor:.4g}",
         ]
-        for o in answer.held_out
+        for o in diagnosis.fit.held_out
     ]
-    lawful = ["with laws"] if any(o.with_laws_rmse is not None for o in answer.held_out) else []
+    lawful = ["with laws"] if any(o.with_laws_rmse is not None for o in diagnosis.fit.held_out) else []
     if rows:
-        lines += ["", f"error on held-out rows (by {answer.held_out_by}):"]
+        lines += ["", f"error on held-out rows (by {diagnosis.fit.held_out_by}):"]
         lines.append(
             table(
                 ["output", "unit", "nominal", "refitted", "augmented", *lawful, "noise"],
@@ -314,20 +317,20 @@ def diagnosis_text(answer: Diagnosis, out: Path) -> str:
                 align="<<>>>>" + ">" * len(lawful),
             )
         )
-    moved = [parameter for parameter in answer.nominal_parameters if parameter.prior_sd]
+    moved = [parameter for parameter in diagnosis.nominal_parameters if parameter.prior_sd]
     if moved:
         cells = [
             [o.name, o.unit, f"{o.before:.5g}", f"{o.after:.5g}", f"{o.shift_in_sd or 0:+.1f}"] for o in moved
         ]
         lines += ["", table(["parameter", "unit", "before", "after", "shift/sd"], cells, align="<<>>>")]
-    lines += ["", *answer.next_measurements] if answer.next_measurements else []
-    if not answer.complete:
+    lines += ["", *diagnosis.next_measurements] if diagnosis.next_measurements else []
+    if not diagnosis.complete:
         lines += [
             "",
-            f"incomplete: the budget was spent before {answer.skipped[0]}; a larger --budget goes on",
+            f"incomplete: the budget was spent before {diagnosis.skipped[0]}; a larger --budget goes on",
         ]
-    if answer.findings:
-        lines += ["", "findings (toolkit explain RULE tells more):", *finding_lines(answer.findings)]
+    if diagnosis.findings:
+        lines += ["", "findings (toolkit explain RULE tells more):", *finding_lines(diagnosis.findings)]
     return "\n".join([*lines, "", f"written to {out}"])
 
 

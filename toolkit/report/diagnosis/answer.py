@@ -22,7 +22,7 @@ from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+    from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.search.search import Search
     from toolkit.report.style import Style
@@ -66,7 +66,7 @@ DIAGNOSIS: Document[Told] = Document(
 
 def _summary(source: Told, style: Style) -> str:
     sentences = []
-    for fit in source.answer.held_out:
+    for fit in source.answer.fit.held_out:
         if source.answer.effects:
             ends = (
                 f"from {_n(fit.refitted_rmse, style)} to {_n(fit.augmented_rmse, style)} {printed(fit.unit)}"
@@ -114,7 +114,7 @@ def _where(source: Told, style: Style) -> str | None:
 
 def _remains(source: Told, _style: Style) -> str:
     if source.answer.depends_on:
-        listed = "; ".join(over(channel, names) for channel, names in source.answer.depends_on[:6])
+        listed = "; ".join(over(by.channel, by.variables) for by in source.answer.depends_on[:6])
         return f"Structure that no named effect explains, a description and not physics: {listed}."
     if source.answer.remaining == "unknown":
         return "Not judged: no search was made, or none to its end."
@@ -142,7 +142,7 @@ def _released(source: Told, _style: Style) -> str | None:
 
 
 def _held_out_by(source: Told, _style: Style) -> str:
-    return f"Held out by {source.answer.held_out_by}; each in turn, the fits made on the rest."
+    return f"Held out by {source.answer.fit.held_out_by}; each in turn, the fits made on the rest."
 
 
 def _complete(source: Told, _style: Style) -> str | None:
@@ -229,7 +229,7 @@ def found_parameters(source: Told, style: Style) -> Rows:
 )
 def errors(source: Told, style: Style) -> Rows:
     """Return the errors of every output."""
-    for fit in source.answer.held_out:
+    for fit in source.answer.fit.held_out:
         yield (
             fit.channel, printed(fit.unit), _n(fit.nominal_rmse, style), _n(fit.refitted_rmse, style),
             _n(fit.augmented_rmse, style) if source.answer.effects else "-", _n(fit.noise_floor, style),
@@ -248,8 +248,8 @@ def errors(source: Told, style: Style) -> Rows:
 def rejected(source: Told, style: Style) -> Rows:
     """Return the alternatives to each effect, the best six."""
     for effect in source.answer.effects:
-        for name, less in effect.rejected[:6]:
-            yield _label(effect), name, _n(-less, style)
+        for other in effect.rejected[:6]:
+            yield _label(effect), other.name, _n(other.log_likelihood_less, style)
 
 
 @DIAGNOSIS.table(
@@ -305,11 +305,11 @@ def next_measurements(source: Told, _style: Style) -> Rows:
 )
 def errors_chart(source: Told, style: Style) -> Iterator[Plot]:
     """Return the chart, where something was fitted; the document of a case without a search has none."""
-    if source.answer.held_out and (source.case is None or source.search is not None):
+    if source.answer.fit.held_out and (source.case is None or source.search is not None):
         yield errors_plot(source.answer, style)
 
 
-def _label(effect: FoundEffect) -> str:
+def _label(effect: DiagnosedEffect) -> str:
     return f"{effect.name} on {effect.channel}" if effect.channel else effect.name
 
 

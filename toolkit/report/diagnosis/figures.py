@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.answer.answer import Diagnosis, FoundLaw, Place
+    from toolkit.diagnosis.answer.answer import DiagnosedLaw, Diagnosis, MismatchPlace
     from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.search import Search
 
@@ -44,7 +44,7 @@ _WIDE = 200.0  # errors over noise from which a chart goes by powers of ten
 
 def error_bars(diagnosis: Diagnosis) -> bytes:
     """Return the chart of the first ten seconds: held-out error over noise, a bar for each simulation."""
-    names = [fit.channel for fit in diagnosis.held_out]
+    names = [fit.channel for fit in diagnosis.fit.held_out]
 
     def draw(figure: Figure) -> None:
         from matplotlib.patches import Rectangle
@@ -53,10 +53,10 @@ def error_bars(diagnosis: Diagnosis) -> bytes:
         steps = [("as declared", GREY, "nominal_rmse"), ("refitted", ORANGE, "refitted_rmse")]
         if diagnosis.effects:
             steps.append(("with the effect", BLUE, "augmented_rmse"))
-        if any(fit.with_laws_rmse is not None for fit in diagnosis.held_out):
+        if any(fit.with_laws_rmse is not None for fit in diagnosis.fit.held_out):
             steps.append(("with the laws", VIOLET, "with_laws_rmse"))
         for i, (label, colour, field) in enumerate(steps):
-            values = [getattr(fit, field) / max(fit.noise_floor, 1e-300) for fit in diagnosis.held_out]
+            values = [getattr(fit, field) / max(fit.noise_floor, 1e-300) for fit in diagnosis.fit.held_out]
             at = np.arange(len(names)) + (i - (len(steps) - 1) / 2) * 0.78 / len(steps)
             bars = axes.barh(at, values, height=0.72 / len(steps), color=colour, label=label)
             axes.bar_label(
@@ -84,7 +84,7 @@ def error_bars(diagnosis: Diagnosis) -> bytes:
     return draw_svg((8.6, 1.5 + 0.85 * max(len(names), 1)), draw)
 
 
-def mismatch_map(search: Search, channel: str, place: Place, *, after: bool) -> bytes | None:
+def mismatch_map(search: Search, channel: str, place: MismatchPlace, *, after: bool) -> bytes | None:
     """Return an output's residual over the variable that holds its mismatch, before and after."""
     problem = search.problem
     x = variable_of(search, place.variable)
@@ -174,21 +174,21 @@ def drawn(t: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.fl
     return t[rows], y[rows]
 
 
-def law_curve(law: FoundLaw) -> bytes | None:
+def law_curve(law: DiagnosedLaw) -> bytes | None:
     """Return a law of one signal with its 95 % band, None of one that has no curve."""
-    curve = law.curve
+    curve, place = law.curve, law.place
     if curve is None:
         return None
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
-        axes.fill_between(curve.x, curve.low, curve.high, color=VIOLET, alpha=0.25, linewidth=0, label="95 %")
+        axes.fill_between(curve.x, *curve.band95, color=VIOLET, alpha=0.25, linewidth=0, label="95 %")
         axes.plot(curve.x, curve.y, color=VIOLET, linewidth=1.4, label=law.formula or "curve")
         axes.axhline(0, color="#333333", linewidth=0.8)
         axes.set_xlabel(law.variables[0])
         label = "factor less one" if law.acts == "multiplies" else f"added [{curve.unit}]"
         axes.set_ylabel(
-            f"{law.channel}: {label}" if law.kind == "output" else f"taken from d{law.channel}/dt"
+            f"{place.channel}: {label}" if place.kind == "output" else f"taken from d{place.channel}/dt"
         )
         axes.legend(frameon=False)
 
@@ -198,7 +198,7 @@ def law_curve(law: FoundLaw) -> bytes | None:
 def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     """Return root mean square residuals over the noise of the first chart, by run and output."""
     problem = search.problem
-    floors = {score.channel: score.noise_floor for score in diagnosis.held_out}
+    floors = {score.channel: score.noise_floor for score in diagnosis.fit.held_out}
     names = [name for name in problem.names if name in floors]
     fits = [("refitted", search.refitted)] + ([("with the effect", search.augmented)] if after else [])
 
@@ -324,7 +324,7 @@ def variables(search: Search) -> list[Variable]:
 def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool) -> bytes | None:
     """Return an output's root mean square residual over its noise, a panel for each variable."""
     noise = max(
-        next((score.noise_floor for score in diagnosis.held_out if score.channel == channel), 0.0), 1e-300
+        next((score.noise_floor for score in diagnosis.fit.held_out if score.channel == channel), 0.0), 1e-300
     )
     shown_variables = variables(search)[:_PANELS]
     mask = search.problem.kept[channel]

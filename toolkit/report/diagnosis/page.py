@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, FoundLaw, Mismatch
+    from toolkit.diagnosis.answer.answer import ChannelMismatch, DiagnosedEffect, DiagnosedLaw, Diagnosis
     from toolkit.diagnosis.diagnose import Result
 
 _NEAREST = 8  # candidates that are listed as rejected
@@ -40,7 +40,7 @@ RUNS_DIFFER = (
 class _Effect:
     """An effect that was found, its parameters and why it was chosen."""
 
-    found: FoundEffect
+    found: DiagnosedEffect
     title: str
     parameters: Table
     reason: str
@@ -105,7 +105,7 @@ def cause(diagnosis: Diagnosis) -> str | None:
         told = is_told_from_none(effect)
         names.append((not told, ("" if told else "perhaps ") + ", ".join((_name(effect), *sizes))))
     shares = []
-    for fit in diagnosis.held_out:
+    for fit in diagnosis.fit.held_out:
         above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
         explained = fit.refitted_rmse**2 - fit.augmented_rmse**2
         if above > 0 and explained > 0:
@@ -172,10 +172,10 @@ def _lead(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     if diagnosis.effects:
         return [(_name(effect), effect.statement) for effect in diagnosis.effects]
     if diagnosis.verdict == "unknown" and diagnosis.laws:
-        share = f"{100 * diagnosis.laws[0].share_of_gap:.0f} %"
+        share = f"{100 * diagnosis.laws[0].evidence.share_of_gap:.0f} %"
         return [("", f"It takes {share} of what was left; it is a description, and no known effect's name.")]
     if diagnosis.verdict == "unknown":
-        parts = [over(channel, names) for channel, names in diagnosis.depends_on[:3]]
+        parts = [over(by.channel, by.variables) for by in diagnosis.depends_on[:3]]
         return [("", f"What remains: {'; '.join(parts)}.")]
     if diagnosis.skipped and diagnosis.verdict == "untestable":
         return [("", f"The budget was spent at: {diagnosis.skipped[0]}. Nothing can be said yet.")]
@@ -184,12 +184,12 @@ def _lead(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     return [("", "What is left is noise; the list below says how large each effect would have had to be.")]
 
 
-def _name(effect: FoundEffect) -> str:
+def _name(effect: DiagnosedEffect) -> str:
     where = f" on {effect.channel}" if effect.channel else ""
     return effect.name + where + (f" (or {', '.join(effect.equivalent_to)})" if effect.equivalent_to else "")
 
 
-def _effect(result: Result, effect: FoundEffect) -> _Effect:
+def _effect(result: Result, effect: DiagnosedEffect) -> _Effect:
     rows = [
         (
             parameter.name,
@@ -212,7 +212,7 @@ def _effect(result: Result, effect: FoundEffect) -> _Effect:
     )
 
 
-def _law(law: FoundLaw) -> _Law:
+def _law(law: DiagnosedLaw) -> _Law:
     rows = [
         (parameter.name, value, parameter.unit, interval)
         for parameter in law.parameters
@@ -220,18 +220,19 @@ def _law(law: FoundLaw) -> _Law:
         for value, interval in (rounded(parameter.value, parameter.ci95),)
     ]
     svg = figures.law_curve(law)
-    notes = [f"It takes {100 * law.share_of_gap:.0f} % of the mean square that was left"]
-    if law.held_out_log_score_gain is None:
+    gain = law.evidence.held_out_log_score_gain
+    notes = [f"It takes {100 * law.evidence.share_of_gap:.0f} % of the mean square that was left"]
+    if gain is None:
         notes[0] += ", on rows that were fitted: of others it says nothing."
     else:
-        notes[0] += (
-            f" on rows that no fit has seen; their log score rose by {law.held_out_log_score_gain:.1f}."
-        )
-    notes += [f"{name} was recorded from {few(low, 4)} to {few(high, 4)}." for name, low, high in law.ranges]
+        notes[0] += f" on rows that no fit has seen; their log score rose by {gain:.1f}."
+    notes += [
+        f"{name} was recorded from {few(low, 4)} to {few(high, 4)}." for name, (low, high) in law.ranges
+    ]
     if law.confounded_with:
         notes.append(f"It may be taken for {', '.join(law.confounded_with)}, which moved far because of it.")
     if law.resembles:
-        near = ", ".join(f"{name} ({100 * distance:.0f} % apart)" for name, distance in law.resembles)
+        near = ", ".join(f"{near.name} ({100 * near.distance:.0f} % apart)" for near in law.resembles)
         notes.append(f"Known effects that are like it, and explain less: {near}.")
     return _Law(
         sentence=law.sentence,
@@ -257,15 +258,17 @@ def condition(result: Result, runs: Sequence[str]) -> str:
     return f" ({', '.join(shared)})" if shared else ""
 
 
-def _reason(effect: FoundEffect) -> str:
+def _reason(effect: DiagnosedEffect) -> str:
     text = (
-        f"On rows that no fit had seen the log score rose by {effect.held_out_log_score_gain:.1f}; "
-        f"the chance that a search of this size finds as much in noise: {chance(effect.p_value)}."
+        f"On rows that no fit had seen the log score rose by {effect.evidence.held_out_log_score_gain:.1f}; "
+        f"the chance that a search of this size finds as much in noise: {chance(effect.evidence.p_value)}."
     )
     if effect.equivalent_to:
         text += f" {', '.join(effect.equivalent_to)} would explain the same: they are one class here."
     if effect.rejected:
-        rivals = ", ".join(f"{name} (by {-less:.1f})" for name, less in effect.rejected[:5])
+        rivals = ", ".join(
+            f"{other.name} (by {other.log_likelihood_less:.1f})" for other in effect.rejected[:5]
+        )
         text += f" Rejected, as they explain the recordings worse (log-likelihood less): {rivals}."
     elif not effect.equivalent_to and not effects()[effect.name].from_digits:
         text += " No other effect came near enough in the screening to be tried in its place."
@@ -293,7 +296,7 @@ def _places(result: Result) -> Iterator[_Place]:
         yield _Place(sentence=_place_sentence(mismatch), figures=drawn)
     if not diagnosis.mismatch:
         # "Nothing" is believed by whoever sees that the lines lie on each other.
-        for fit in diagnosis.held_out:
+        for fit in diagnosis.fit.held_out:
             in_time = figures.run_in_time(search, fit.channel, after=after, laws=result.laws)
             yield _Place(
                 sentence=f"{fit.channel}: nothing stands out of the noise. The run with the largest error:",
@@ -301,7 +304,7 @@ def _places(result: Result) -> Iterator[_Place]:
             )
 
 
-def _place_sentence(mismatch: Mismatch) -> str:
+def _place_sentence(mismatch: ChannelMismatch) -> str:
     channel, share = mismatch.channel, 100 * mismatch.share_of_variance
     text = f"{channel}: {share:.0f} % of the refitted residual's variance is structure"
     if share < 0.5:
@@ -317,12 +320,12 @@ def _held_out(diagnosis: Diagnosis) -> Table:
     errors = {"as declared": "nominal_rmse", "refitted": "refitted_rmse"}
     if diagnosis.effects:  # without an effect there is no error with it
         errors["with the effects"] = "augmented_rmse"
-    if any(fit.with_laws_rmse is not None for fit in diagnosis.held_out):
+    if any(fit.with_laws_rmse is not None for fit in diagnosis.fit.held_out):
         errors["with the laws"] = "with_laws_rmse"
     errors["noise"] = "noise_floor"
     rows = [
         (fit.channel, fit.unit, *(number(getattr(fit, field), ".4g", "–") for field in errors.values()))
-        for fit in diagnosis.held_out
+        for fit in diagnosis.fit.held_out
     ]
     return table(("output", "unit", *errors), rows, numbers=tuple(range(2, 2 + len(errors))))
 
@@ -344,7 +347,7 @@ def _nominal_parameters(diagnosis: Diagnosis) -> Table:
 
 
 def _remaining(diagnosis: Diagnosis) -> Table:
-    rows = [(channel, " and ".join(names)) for channel, names in diagnosis.depends_on[:8]]
+    rows = [(by.channel, " and ".join(by.variables)) for by in diagnosis.depends_on[:8]]
     return table(("output", "depends on"), rows)
 
 

@@ -18,7 +18,7 @@ from toolkit.units import printed
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.answer.answer import Diagnosis, Mismatch
+    from toolkit.diagnosis.answer.answer import ChannelMismatch, Diagnosis
     from toolkit.diagnosis.search.search import Search
     from toolkit.report.style import Style
 
@@ -42,7 +42,7 @@ def errors_plot(diagnosis: Diagnosis, style: Style) -> Plot:
     names: list[str] = []
     bars: list[tuple[list[float], list[float]]] = [([], []) for _ in steps]
     sentences = []
-    for fit in diagnosis.held_out:
+    for fit in diagnosis.fit.held_out:
         errors = (fit.nominal_rmse, fit.refitted_rmse, fit.augmented_rmse)
         if not all(map(math.isfinite, (*errors, fit.noise_floor))):
             continue
@@ -78,7 +78,7 @@ def errors_plot(diagnosis: Diagnosis, style: Style) -> Plot:
     )
 
 
-def _where(search: Search, mismatch: Mismatch, diagnosis: Diagnosis, style: Style) -> Plot | None:
+def _where(search: Search, mismatch: ChannelMismatch, diagnosis: Diagnosis, style: Style) -> Plot | None:
     """Return an output's residual over the first variable that has numbers, in means of equal counts."""
     problem = search.problem
     mask = problem.kept[mismatch.channel]
