@@ -50,6 +50,7 @@ def command(
     Example: toolkit diagnose case.toml --out answer
     """
     _one_thread()
+    from toolkit.declared import answer
     from toolkit.lab.home import home_template
     from toolkit.lab.studies.diagnosis import diagnose_case, diagnosis_text, write_diagnosis
     from toolkit.report.word.office import find_soffice
@@ -73,7 +74,7 @@ def command(
         warned = bool(document["warnings"])
         text += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"
         text += "".join(f"\n  warning {warning}" for warning in document["warnings"])
-    output.answer(payload, text)
+    output.answer(answer(payload), text)
     return 0 if diagnosed.result.diagnosis.verdict == "nothing" and not warned else 1
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.declared import OrNan
 from toolkit.diagnosis.policy import NOISE
 
 if TYPE_CHECKING:
@@ -31,10 +32,10 @@ _ROBUST = 1.4826  # standard deviation of a normal distribution over its median 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelNoise:
-    """Noise of one output, in its unit: the sensor's, the rest of a residual, and what shows the first."""
+    """The noise of a channel, divided: the sensor's, the rest of a residual, and what shows the first."""
 
-    sensor_sd: float
-    process_sd: float
+    sensor_sd: OrNan
+    process_sd: OrNan
     how: Evidence
 
     @property
