@@ -126,8 +126,8 @@ SETTLED = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """Centre, sigma and control limits in the unit of the points; ``points`` of the baseline."""
+class ControlLimits:
+    """Centre, sigma and control limits, in the load's unit."""
 
     centre: float
     sigma: float

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.common_errors import indication_errors
 from toolkit.calibration.uncertainty.scatter import scatter_of
+from toolkit.declared import Entry, derived
 from toolkit.errors import SessionError
 from toolkit.estimate import last_place
 
@@ -48,13 +49,11 @@ _AT_SOURCE = ("fit", "resolution", "indication")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MonteCarlo:
-    """What the trials gave, in the load's unit.
+class MonteCarloCheck:
+    """The budget, held against a Monte Carlo computation by JCGM 101.
 
-    ``value`` and ``u`` their mean and standard deviation, ``low`` and ``high`` the symmetric coverage
-    interval; ``budget_low`` and ``budget_high`` that of the budget; ``low_difference`` and
-    ``high_difference`` their distances; ``delta`` the tolerance for ``digits`` significant digits of u.
-    ``stable``: adaptive trials settled (always so for a fixed number).
+    In the load's unit; ``value`` and ``u`` are mean and standard deviation of the trials, ``low`` and
+    ``high`` their symmetric coverage interval.
     """
 
     trials: int
@@ -65,21 +64,24 @@ class MonteCarlo:
     high: float
     budget_low: float
     budget_high: float
-    digits: int
-    delta: float
-    stable: bool
+    digits: Annotated[int, Entry("of u that count")]
+    delta: Annotated[float, Entry("numerical tolerance")]
+    stable: Annotated[bool, Entry("whether adaptive trials settled; always so for a fixed number")]
 
     @property
+    @derived(after="budget_high")
     def low_difference(self) -> float:
         """Distance of the lower ends (JCGM 101 eq. 19)."""
         return abs(self.budget_low - self.low)
 
     @property
+    @derived(after="low_difference")
     def high_difference(self) -> float:
         """Distance of the upper ends (JCGM 101 eq. 20)."""
         return abs(self.budget_high - self.high)
 
     @property
+    @derived("whether the budget's interval is that of the trials, within the tolerance")
     def validated(self) -> bool:
         """Whether the budget's interval is that of the trials, within the tolerance."""
         return self.stable and max(self.low_difference, self.high_difference) <= self.delta
@@ -93,7 +95,7 @@ def monte_carlo(
     trials: int | None = 1_000_000,
     seed: int = 0,
     digits: int = 2,
-) -> MonteCarlo:
+) -> MonteCarloCheck:
     """Check a budget of a record by trials.
 
     Parameters
@@ -126,7 +128,7 @@ def monte_carlo(
         sizes = [min(BATCH, trials - start) for start in range(0, trials, BATCH)]
         drawn, stable = np.concatenate([draw(generator, size) for size in sizes]), True
     low, high = coverage_interval(drawn, budget.probability)
-    return MonteCarlo(
+    return MonteCarloCheck(
         trials=len(drawn), seed=seed, value=float(drawn.mean()), u=float(drawn.std(ddof=1)),
         low=low, high=high, budget_low=value - budget.U, budget_high=value + budget.U,
         digits=digits, delta=delta, stable=stable,

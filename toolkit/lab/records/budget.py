@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
+from toolkit.calibration.uncertainty.monte_carlo import MonteCarloCheck
+from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines, table
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
     from toolkit.calibration.uncertainty.model import Budget, Temperature
-    from toolkit.calibration.uncertainty.monte_carlo import MonteCarlo
 
 
 class BudgetComponent(TypedDict):
@@ -43,25 +44,6 @@ class RangePoint(TypedDict):
     u: float
     k: float
     U: float
-
-
-class MonteCarloCheck(TypedDict):
-    """The budget, held against a Monte Carlo computation by JCGM 101."""
-
-    trials: int
-    seed: int
-    value: float
-    u: float
-    low: float
-    high: float
-    budget_low: float
-    budget_high: float
-    low_difference: float
-    high_difference: float
-    digits: Annotated[int, "of u that count"]
-    delta: Annotated[float, "numerical tolerance"]
-    stable: bool
-    validated: bool
 
 
 class LoadBudget(TypedDict):
@@ -207,7 +189,7 @@ def _over_range(
     return tuple(calibration_budget(record, rows, check, name, x, temperature=temperature) for x in steps)
 
 
-def _not_validated(record: CalibrationRecord, budget: Budget, result: MonteCarlo) -> list[Finding]:
+def _not_validated(record: CalibrationRecord, budget: Budget, result: MonteCarloCheck) -> list[Finding]:
     if result.validated:
         return []
     off = max(result.low_difference, result.high_difference)
@@ -217,7 +199,7 @@ def _not_validated(record: CalibrationRecord, budget: Budget, result: MonteCarlo
     return [Finding(rule="monte-carlo", where=f"{record.id}, {budget.load}", message=why)]
 
 
-def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> LoadBudget:
+def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarloCheck | None) -> LoadBudget:
     from toolkit.estimate import round_uncertainty
 
     return {
@@ -225,12 +207,7 @@ def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | Non
         "value": budget.at,
         "indications": list(budget.indications),
         "components": [
-            {
-                "name": component.name, "description": component.description, "type": component.type,
-                "distribution": component.distribution, "u": component.u, "dof": component.dof,
-                "share": budget.share(component),
-                "source": component.source, "stated": component.stated,
-            }
+            entry_of(BudgetComponent, component, share=budget.share(component))
             for component in budget.components
         ],
         "u": budget.u,
@@ -241,17 +218,11 @@ def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | Non
         "probability": budget.probability,
         "not_stated": list(budget.not_stated),
         "range": [{"value": point.at, "u": point.u, "k": point.k, "U": point.U} for point in curve],
-        "monte_carlo": None if result is None else {
-            "trials": result.trials, "seed": result.seed, "value": result.value, "u": result.u,
-            "low": result.low, "high": result.high, "budget_low": result.budget_low,
-            "budget_high": result.budget_high, "low_difference": result.low_difference,
-            "high_difference": result.high_difference, "digits": result.digits, "delta": result.delta,
-            "stable": result.stable, "validated": result.validated,
-        },
+        "monte_carlo": result,
     }  # fmt: skip
 
 
-def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> list[str]:
+def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarloCheck | None) -> list[str]:
     from toolkit.estimate import dof_text, round_to_uncertainty, round_uncertainty
 
     unit = budget.unit

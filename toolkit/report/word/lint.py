@@ -61,16 +61,6 @@ class LintFinding:
     place: str
     message: str
 
-    def as_dict(self) -> dict[str, str]:
-        """Return the finding as a JSON-ready dict."""
-        return {
-            "rule": self.rule,
-            "level": self.level,
-            "part": self.part,
-            "place": self.place,
-            "message": self.message,
-        }
-
 
 # The lint around the tags: tracked changes, comments, fields, styles, and tags where nothing is filled.
 
