@@ -39,7 +39,7 @@ def contents(home: Path) -> dict[str, str]:
 def states(run: Callable[[], tuple[object, str]]) -> dict[str, str]:
     answer, _ = run()
     assert isinstance(answer, dict)
-    return {file["place"]: file["state"] for file in answer["files"]}
+    return {file.place: file.state for file in answer["files"]}
 
 
 def test_a_home_is_checked_converted_left_alone_and_put_back(home: Path) -> None:

@@ -89,7 +89,7 @@ def verify(
 
     payload, text = verified_answer(place.registry(), head)
     output.answer(payload, text)
-    return 0 if all(record["ok"] for record in payload["records"]) else 1
+    return 0 if all(record.ok for record in payload["records"]) else 1
 
 
 @app.command()

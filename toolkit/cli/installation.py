@@ -72,7 +72,7 @@ def migrate(
 
     payload, text = migration.undo(home) if undo else migration.migrate(home, dry_run=dry_run)
     output.answer(payload, text)
-    return int(any(file["state"] == "refused" for file in payload["files"]))
+    return int(any(file.state == "refused" for file in payload["files"]))
 
 
 @answers("toolkit.lab.upkeep.installation:DoctorAnswer")

@@ -88,11 +88,7 @@ def due_soon(registry: Registry, today: dt.date) -> dict[str, Any]:
     from toolkit.lab.records.control_answer import due_answer
 
     payload, _, _ = due_answer(registry, None, today)
-    soon = [
-        row
-        for row in payload["instruments"]
-        if row["days_left"] is not None and row["days_left"] <= SOON_DAYS
-    ]
+    soon = [row for row in payload["instruments"] if row.days_left is not None and row.days_left <= SOON_DAYS]
     return {**payload, "soon": soon}
 
 
