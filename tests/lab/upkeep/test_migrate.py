@@ -88,6 +88,6 @@ def test_the_command_tells_what_a_dry_run_would_do(home: Path, capsys: pytest.Ca
     answer = json.loads(capsys.readouterr().out)
     assert answer["dry_run"]
     assert answer["migration"] is None
-    written_by = {file.kind: file.written_by for file in answer["files"]}
+    written_by = {file["kind"]: file["written_by"] for file in answer["files"]}
     assert written_by["calibration record"] == "0.1.0"
     assert not (home / "migrations").exists()

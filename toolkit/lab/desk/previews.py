@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.declared import json_value
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes, write_atomic
 from toolkit.inputs import PDF_FILE, RESULT_FILE, read_regular
@@ -142,7 +143,8 @@ def template_findings(template: Path) -> list[dict[str, Any]]:
     from toolkit.report.word.package import read_template
 
     findings = check(read_template(template), read_style(style_file(template)))
-    return [finding.as_dict() for finding in findings]
+    rows: list[dict[str, Any]] = json_value(findings)
+    return rows
 
 
 PRINTS = f"{FOLDER}/templates"
