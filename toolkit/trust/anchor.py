@@ -17,7 +17,7 @@ from toolkit.errors import TrustError
 from toolkit.trust.checkpoint import Checkpoint, parse_checkpoint
 from toolkit.trust.merkle import HASH_BYTES, included, inclusion_proof, leaf_hash, root_of
 
-Continuity = Literal["continues", "rolled_back", "forked"]
+Continuity = Literal["continues", "rolled_back", "forked", "unknown"]
 COMPACT = "toolkit-proof@v1"
 MOST_BYTES = 2048
 """Of a compact form."""

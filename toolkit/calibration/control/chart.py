@@ -143,7 +143,7 @@ class ControlLimits:
         return self.points < SETTLED
 
 
-def limits_of(values: NDArray[np.float64]) -> Limits | None:
+def limits_of(values: NDArray[np.float64]) -> ControlLimits | None:
     """Return the limits of a baseline (points,); None where it is too short or does not scatter at all."""
     if len(values) < LEAST_BASELINE:
         return None
@@ -152,7 +152,7 @@ def limits_of(values: NDArray[np.float64]) -> Limits | None:
     # Equal to the last digits: a sigma of rounding would call every later point an alarm.
     if sigma <= 1e-12 * float(np.abs(values).max()):
         return None
-    return Limits(
+    return ControlLimits(
         centre=centre,
         sigma=sigma,
         lower=centre - 3 * sigma,
@@ -163,7 +163,7 @@ def limits_of(values: NDArray[np.float64]) -> Limits | None:
     )
 
 
-def breaks_of(values: NDArray[np.float64], limits: Limits) -> tuple[Break, ...]:
+def breaks_of(values: NDArray[np.float64], limits: ControlLimits) -> tuple[Break, ...]:
     """Return the run rules that the points (points,) break against these limits."""
     return broken_rules((values - limits.centre) / limits.sigma)
 
@@ -208,7 +208,7 @@ class Series:
     tolerance: float
     points: tuple[ChartPoint, ...]
     baseline: int
-    limits: Limits | None
+    limits: ControlLimits | None
     breaks: tuple[Break, ...]
 
     @property

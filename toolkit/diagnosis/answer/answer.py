@@ -41,8 +41,8 @@ class MismatchPlace:
     """
 
     variable: str
-    start: Annotated[float | None | str, Entry(key="from")]
-    end: Annotated[float | None | str, Entry(key="to")]
+    start: Annotated[float | str | None, Entry(key="from")]
+    end: Annotated[float | str | None, Entry(key="to")]
     unit: str
     runs: tuple[str, ...]
     whole: Annotated[bool, Entry(output=False)] = False

@@ -10,7 +10,7 @@ from toolkit.diagnosis.policy import PRIORS, VERDICT
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.answer.answer import FoundEffect
+    from toolkit.diagnosis.answer.answer import DiagnosedEffect
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.search import Search
@@ -24,7 +24,7 @@ def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
 
 
 def confounded_findings(
-    case: Case, search: Search, laws: Laws, effects: tuple[FoundEffect, ...]
+    case: Case, search: Search, laws: Laws, effects: tuple[DiagnosedEffect, ...]
 ) -> tuple[Finding, ...]:
     """Return the effects whose size a law beside them moves by more than its interval.
 

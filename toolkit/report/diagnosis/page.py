@@ -120,7 +120,7 @@ def cause(diagnosis: Diagnosis) -> str | None:
     return f"{listed}: explains {share_text}, on rows that no fit has seen."
 
 
-def is_told_from_none(effect: FoundEffect) -> bool:
+def is_told_from_none(effect: DiagnosedEffect) -> bool:
     """Tell whether the interval of one of an effect's sizes leaves out that there is none."""
     known = effects().get(effect.name)
     off = {parameter.name: parameter.off for parameter in known.parameters} if known else {}
