@@ -119,6 +119,7 @@ def test_a_document_that_is_no_table_is_told() -> None:
 def test_page_and_schema_have_what_is_written() -> None:
     page = answer_reference(Peak)
     assert "| `FY_N` | number or null | lateral force |" in page
+    assert "| `extra` | text | not always:  |" in page
     assert "| `half` | number | force over two |" in page
     assert "| `signs` | by name: whole number | of each channel |" in page
     assert "| `ends` | [number or null, number or null] | lower and upper |" in page

@@ -39,6 +39,7 @@ import dataclasses
 import datetime as dt
 import functools
 import inspect
+import operator
 import pathlib
 import re
 import types
@@ -220,11 +221,20 @@ def _is_table(annotation: Any) -> bool:
 def _entries(cls: Any) -> Iterator[tuple[str, Any, bool]]:
     """Yield key, annotation and whether every answer has it."""
     if not is_typeddict(cls):
-        yield from ((output.key, output.annotation, not output.sparse) for output in outputs_of(cls))
+        for output in outputs_of(cls):
+            held = _but_null(output.annotation) if output.sparse else output.annotation
+            yield output.key, held, not output.sparse
         return
     for key, annotation in typing.get_type_hints(cls, include_extras=True).items():
         # `__required_keys__` does not know the marks of annotations that are kept as texts.
         yield key, annotation, get_origin(annotation) is not typing.NotRequired
+
+
+def _but_null(annotation: Any) -> Any:
+    """Return what a sparse entry holds where it stands: not None."""
+    held, *marks = get_args(annotation)
+    forms = (form for form in get_args(held) if form is not type(None))
+    return Annotated[(functools.reduce(operator.or_, forms), *marks)]
 
 
 def _bare(annotation: Any) -> tuple[Any, str]:

@@ -126,7 +126,7 @@ def outputs_of(cls: type) -> tuple[Output, ...]:
                 entry, after = method.derived
                 held = typing.get_type_hints(method, include_extras=True)["return"]
                 names = [output.name for output in outputs]
-                place = len(names) if after is None else names.index(after) + 1
+                place = len(names) if after is None else names.index(after) + 1 if after else 0
                 outputs.insert(place, _output(name, entry, Annotated[held, entry], _bare(held)[1]))
     return tuple(outputs)
 

@@ -44,7 +44,7 @@ def derived(
 ) -> Callable[[T], T]:
     """Mark a method below ``@property``: an answer has its value too, behind that of the field ``after``.
 
-    Without ``after`` it stands at the end. A document that is read back is not asked for it.
+    With none it stands at the end, with an empty text first. It is not read back.
     """
 
     def mark(method: T) -> T:

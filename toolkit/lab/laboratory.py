@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.verify import VerifyRow
+    from toolkit.calibration.registry.verify import VerifiedRecord
     from toolkit.lab.archives.audit import Audit
     from toolkit.lab.tire_tests.test import ProcessedTest, Report, Test
 
@@ -196,7 +196,7 @@ class Laboratory(Face):
 class Verification(Face):
     """The registry verified: ``rows`` has one entry for every record and every file that belongs to none."""
 
-    rows: tuple[VerifyRow, ...]
+    rows: tuple[VerifiedRecord, ...]
 
     @property
     def ok(self) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from toolkit.calibration.control.as_found import (
 from toolkit.calibration.registry.registry import load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check
+from toolkit.declared import Entry, derived
 from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 from toolkit.units import si_scale
@@ -135,9 +136,10 @@ class ControlLimits:
     upper: float
     mean_range: float
     upper_range: float
-    points: int
+    points: Annotated[int, Entry("that make the limits")]
 
     @property
+    @derived("whether they rest on few points")
     def provisional(self) -> bool:
         """Whether the baseline is too short for settled limits."""
         return self.points < SETTLED
@@ -173,12 +175,12 @@ SAME_PERCENT = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChartPoint:
-    """One session: ``error`` in the unit of the series by ``record``, which was in force before it."""
+    """The error of a session's check load by the record in force before it."""
 
-    session_record: str
+    session_record: Annotated[str, Entry(key="session")]
     date: dt.date
     record: str
-    error: float
+    error: Annotated[float, Entry("in the load's unit")]
     rows: int
 
 

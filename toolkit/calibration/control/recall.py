@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import datetime as dt
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from toolkit.calibration.control.as_found import as_found_history
 from toolkit.calibration.registry.standing import due_date
+from toolkit.declared import Entry, derived
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -30,41 +31,38 @@ STEP = (0.5, 1.5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recommendation:
-    """``days`` until the fastest drift reaches 80 % of the tolerance; None with the ``reason`` why not.
+class RecommendedInterval:
+    """What the history recommends."""
 
-    ``drift_per_year`` is that drift as a share of the tolerance; ``results`` counts the as-found results.
-    """
-
-    days: int | None
-    drift_per_year: float | None
-    results: int
+    days: Annotated[
+        int | None, Entry("until the fastest drift reaches 80 % of the tolerance; null of too few results")
+    ]
+    drift_per_year: Annotated[float | None, Entry("as a share of the tolerance")]
+    results: Annotated[int, Entry("as found")]
     reason: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Due:
-    """An instrument on a day ``on``: record in force, its session's date, recall interval and due date.
-
-    ``due`` and ``days_left`` are None where no interval was set; ``days_left`` is negative when overdue.
-    """
+class DueInstrument:
+    """When an instrument is due."""
 
     instrument: str
-    on: dt.date
+    on: Annotated[dt.date, Entry(output=False)]
     record: str
     session_date: dt.date
-    recall: str | None
-    due: dt.date | None
-    days_left: int | None
-    recommendation: Recommendation
+    recall: Annotated[str | None, Entry("interval, as its approval states it")]
+    due: Annotated[dt.date | None, Entry("null where no interval was set")]
+    days_left: Annotated[int | None, Entry("negative when overdue")]
+    recommended: RecommendedInterval
 
     @property
+    @derived(after="days_left")
     def overdue(self) -> bool:
         """Whether the due date has passed."""
         return self.days_left is not None and self.days_left < 0
 
 
-def due_of(registry: Registry, instrument: str, on: dt.date) -> Due:
+def due_of(registry: Registry, instrument: str, on: dt.date) -> DueInstrument:
     """Return when an instrument is due, as its record in force on a day says.
 
     Raises
@@ -77,7 +75,7 @@ def due_of(registry: Registry, instrument: str, on: dt.date) -> Due:
     day = dt.date.fromisoformat(record.date)
     due = due_date(record, status)
     history = [as_found for as_found in as_found_history(registry, instrument) if as_found.date <= on]
-    return Due(
+    return DueInstrument(
         instrument=instrument,
         on=on,
         record=record.id,
@@ -85,11 +83,11 @@ def due_of(registry: Registry, instrument: str, on: dt.date) -> Due:
         recall=status.recall,
         due=due,
         days_left=None if due is None else (due - on).days,
-        recommendation=recommend(history, present_days=None if due is None else (due - day).days),
+        recommended=recommend(history, present_days=None if due is None else (due - day).days),
     )
 
 
-def recommend(history: list[AsFound], *, present_days: int | None) -> Recommendation:
+def recommend(history: list[AsFound], *, present_days: int | None) -> RecommendedInterval:
     """Recommend an interval from as-found results; ``present_days`` is the interval in use."""
     rates = [
         as_found.worst_share / (as_found.date - as_found.since).days
@@ -100,11 +98,11 @@ def recommend(history: list[AsFound], *, present_days: int | None) -> Recommenda
         reason = (
             f"{len(rates)} as-found results with a record before them, at least {LEAST_RESULTS} are needed"
         )
-        return Recommendation(days=None, drift_per_year=None, results=len(rates), reason=reason)
+        return RecommendedInterval(days=None, drift_per_year=None, results=len(rates), reason=reason)
     worst = max(rates)
     if worst == 0:
         reason = "no drift was seen: nothing speaks for another interval"
-        return Recommendation(days=present_days, drift_per_year=0.0, results=len(rates), reason=reason)
+        return RecommendedInterval(days=present_days, drift_per_year=0.0, results=len(rates), reason=reason)
     free = SHARE / worst
     reason = f"the fastest drift reaches {100 * SHARE:g} % of the tolerance after {free:.0f} days"
     days = free
@@ -112,12 +110,12 @@ def recommend(history: list[AsFound], *, present_days: int | None) -> Recommenda
         days = min(max(free, STEP[0] * present_days), STEP[1] * present_days)
         if days != free:
             reason += f"; a step from the present {present_days} days is kept between -50 and +50 %"
-    return Recommendation(
+    return RecommendedInterval(
         days=max(1, int(days)), drift_per_year=worst * 365.25, results=len(rates), reason=reason
     )
 
 
-def due_findings(due: Due) -> tuple[Finding, ...]:
+def due_findings(due: DueInstrument) -> tuple[Finding, ...]:
     """Return ``overdue``, or a note where no interval was set."""
     if due.recall is None or due.due is None:
         message = "no recall interval was set: nobody can say when it is due"

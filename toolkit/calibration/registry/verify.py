@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
@@ -18,6 +18,7 @@ from toolkit.calibration.registry.people_log import FOLDER
 from toolkit.calibration.registry.registry import ID, load_many
 from toolkit.calibration.registry.settled import is_passing
 from toolkit.calibration.registry.witnessed import attested
+from toolkit.declared import Entry
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
 from toolkit.system import can_fork, processors
@@ -33,25 +34,25 @@ _CHUNK = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VerifyRow:
-    """One row of `verify`: a record, or a file that belongs to none (``id`` is its name)."""
+class VerifiedRecord:
+    """What came of refitting a record from its stored data; ``id`` is the name of a file of no record."""
 
     id: str
-    ok: bool
-    verified: bool
-    reason: str | None
+    ok: Annotated[bool, Entry("whether it reproduces and every file is as it was entered")]
+    verified: Annotated[bool, Entry("false of a legacy import, which has no data")]
+    reason: Annotated[str | None, Entry("why it is not ok")]
 
 
-_Judged = tuple[VerifyRow, tuple[str, ...]]
+_Judged = tuple[VerifiedRecord, tuple[str, ...]]
 
 
-def verify_registry(registry: Registry, head: str | None = None) -> tuple[VerifyRow, ...]:
+def verify_registry(registry: Registry, head: str | None = None) -> tuple[VerifiedRecord, ...]:
     """Return one row for every record and for every stray file; damage never raises.
 
     ``head`` is a ledger hash that was printed earlier: where no instrument's chain holds it, an end was
     cut off, and no record can be trusted.
     """
-    rows: list[VerifyRow] = []
+    rows: list[VerifiedRecord] = []
     if registry.folder.is_dir():
         rows += [
             _stray(path.name)
@@ -72,15 +73,15 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
             for name, ledger in ledgers.items()
         }
         if not ledgers:
-            rows.append(VerifyRow(id=HEAD, ok=False, verified=False, reason=f"ledger: {damage}"))
+            rows.append(VerifiedRecord(id=HEAD, ok=False, verified=False, reason=f"ledger: {damage}"))
     for instrument, ledger in ledgers.items():
         rows += _instrument(registry.folder / instrument, ledger)
         if ledger.damage is None and ledger.doubt is not None:
             reason = f"time: of the ledger of {instrument} {ledger.doubt}"
-            rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=reason))
+            rows.append(VerifiedRecord(id=LEDGER, ok=False, verified=False, reason=reason))
     for instrument in sorted(_attested(registry) - {*ledgers, FOLDER}):
         reason = "missing: people or witnesses have signed entries of its ledger"
-        rows.append(VerifyRow(id=instrument, ok=False, verified=False, reason=reason))
+        rows.append(VerifiedRecord(id=instrument, ok=False, verified=False, reason=reason))
     return tuple(rows)
 
 
@@ -93,7 +94,7 @@ def _attested(registry: Registry) -> set[str]:
     return names
 
 
-def _people(registry: Registry) -> list[VerifyRow]:
+def _people(registry: Registry) -> list[VerifiedRecord]:
     """Return a row where the people's file of the home is not what the log of people says."""
     try:
         version = registry.people().history.now
@@ -106,11 +107,11 @@ def _people(registry: Registry) -> list[VerifyRow]:
         reason = (
             "people: it is not the newest version of the log of people; what is typed into it decides nothing"
         )
-    return [VerifyRow(id=FILE, ok=False, verified=False, reason=reason)]
+    return [VerifiedRecord(id=FILE, ok=False, verified=False, reason=reason)]
 
 
-def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
-    rows: list[VerifyRow] = []
+def _instrument(folder: Path, ledger: Ledger) -> list[VerifiedRecord]:
+    rows: list[VerifiedRecord] = []
     entered = ledger.entered()
     names = (path for path in folder.glob("*.json") if path.name not in (HEAD, *ledger.hidden))
     on_disk = {path.stem for path in names if ID.match(path.stem)}
@@ -121,12 +122,14 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
         rows.append(row)
         owned |= {f"{row.id}.json", *files}
     if ledger.damage is not None and not rows:
-        rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"ledger: {ledger.damage}"))
+        rows.append(VerifiedRecord(id=LEDGER, ok=False, verified=False, reason=f"ledger: {ledger.damage}"))
     rows += [_stray(name) for name in _files(folder) if name not in owned and not is_passing(name)]
     return rows
 
 
-def _judged(folder: Path, ids: Sequence[str], ledger: Ledger) -> Iterator[tuple[VerifyRow, tuple[str, ...]]]:
+def _judged(
+    folder: Path, ids: Sequence[str], ledger: Ledger
+) -> Iterator[tuple[VerifiedRecord, tuple[str, ...]]]:
     """Yield each record's row and the names of its files, in the order of ``ids``."""
     import functools
     import multiprocessing
@@ -169,9 +172,9 @@ def _row(folder: Path, record_id: str, loaded: CalibrationRecord | ToolkitError)
     if isinstance(loaded, ToolkitError):
         reason = f"{loaded.rule or 'unreadable'}: {loaded.what}"
         reason += f" (got {loaded.got}, expected {loaded.expected})" if loaded.got else ""
-        row = VerifyRow(id=record_id, ok=False, verified=False, reason=reason)
+        row = VerifiedRecord(id=record_id, ok=False, verified=False, reason=reason)
         return row, tuple(_owned_by_bad(folder, record_id))
-    row = VerifyRow(id=record_id, ok=True, verified=loaded.verified, reason=None)
+    row = VerifiedRecord(id=record_id, ok=True, verified=loaded.verified, reason=None)
     return row, tuple(part.file for part in loaded.data)
 
 
@@ -194,5 +197,5 @@ def _owned_by_bad(folder: Path, record_id: str) -> set[str]:
         return {path.name for path in folder.glob(f"{record_id}.*")}
 
 
-def _stray(name: str) -> VerifyRow:
-    return VerifyRow(id=name, ok=False, verified=False, reason="stray: a file that belongs to no record")
+def _stray(name: str) -> VerifiedRecord:
+    return VerifiedRecord(id=name, ok=False, verified=False, reason="stray: a file that belongs to no record")

@@ -145,8 +145,8 @@ def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
     """Return sentences where a law's factor is that of a channel in another unit, within its interval."""
     problem, hints = search.problem, list[str]()
     for law in found_laws(search, laws):
-        scaled = law.acts == "multiplies" or law.variables == (law.channel,)
-        for parameter in law.parameters if scaled and law.kind == "output" else ():
+        scaled = law.acts == "multiplies" or tuple(law.variables) == (law.place.channel,)
+        for parameter in law.parameters if scaled and law.place.kind == "output" else ():
             if parameter.unit != "1" or isinstance(parameter.value, str) or parameter.ci95 is None:
                 continue
             low, high = sorted(1 + end for end in parameter.ci95)
@@ -156,9 +156,9 @@ def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
             low, high = min(low, factor / (1 + UNITS.told)), max(high, factor * (1 + UNITS.told))
             if not low > 0 or high > low * UNITS.vague:
                 continue
-            for name in (law.channel, *(driver.name for driver in problem.case.drivers)):
+            for name in (law.place.channel, *(driver.name for driver in problem.case.drivers)):
                 text = channel_unit(problem.case, problem.model, name)
-                ends = (low, high) if name == law.channel else (1 / high, 1 / low)
+                ends = (low, high) if name == law.place.channel else (1 / high, 1 / low)
                 ratio = near_ratio(*ends, text)
                 if ratio is not None and " read as " in ratio:
                     hints.append(

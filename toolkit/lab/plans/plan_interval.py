@@ -83,7 +83,7 @@ def interval_plan_answer(
     answer = extended(
         PlanIntervalAnswer, plan, instrument=instrument, record=due.record, in_use=due.recall,
         next=(due.session_date + dt.timedelta(days=plan.days)).isoformat(),
-        method_2_days=due.recommendation.days, assumptions=ASSUMPTIONS,
+        method_2_days=due.recommended.days, assumptions=ASSUMPTIONS,
         findings=tuple(finding.as_dict() for finding in findings),
     )  # fmt: skip
     if out is not None:

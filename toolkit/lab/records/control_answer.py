@@ -6,6 +6,8 @@ import datetime as dt
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
+from toolkit.calibration.control.chart import ChartPoint, ControlLimits
+from toolkit.calibration.control.recall import DueInstrument
 from toolkit.calibration.standards.e74 import E74Result
 from toolkit.calibration.standards.iso376 import Iso376Result
 from toolkit.declared.answers import entry_of
@@ -58,29 +60,6 @@ class CheckLoad(TypedDict):
     unit: str
 
 
-class ControlLimits(TypedDict):
-    """Limits of a control chart, in the load's unit."""
-
-    centre: float
-    sigma: float
-    lower: float
-    upper: float
-    mean_range: float
-    upper_range: float
-    points: Annotated[int, "that make the limits"]
-    provisional: Annotated[bool, "whether they rest on few points"]
-
-
-class ChartPoint(TypedDict):
-    """The error of a session's check load by the record in force before it."""
-
-    session: str
-    date: str
-    record: str
-    error: Annotated[float, "in the load's unit"]
-    rows: int
-
-
 class BrokenRule(TypedDict):
     """A rule of the chart that a session breaks."""
 
@@ -117,28 +96,6 @@ class ChartAnswer(TypedDict):
     left_out: list[LeftOutSession]
     findings: list[FindingEntry]
     picture: Path | None
-
-
-class RecommendedInterval(TypedDict):
-    """What the history recommends."""
-
-    days: Annotated[int | None, "null of too few results"]
-    drift_per_year: Annotated[float | None, "as a share of the tolerance"]
-    results: int
-    reason: str
-
-
-class DueInstrument(TypedDict):
-    """When an instrument is due."""
-
-    instrument: str
-    record: str
-    session_date: str
-    recall: Annotated[str | None, "interval, as its approval states it"]
-    due: str | None
-    days_left: int | None
-    overdue: bool | None
-    recommended: RecommendedInterval
 
 
 class DueAnswer(TypedDict):
@@ -236,18 +193,17 @@ def due_answer(
             )
             continue
         findings += due_findings(due)
-        advice = entry_of(RecommendedInterval, due.recommendation)
-        rows.append(entry_of(DueInstrument, due, instrument=name, recommended=advice))
+        rows.append(due)
     lines = [
         table(
             ["instrument", "in force", "session", "recall", "due", "days left", "recommended"],
-            [[r["instrument"], r["record"], r["session_date"], r["recall"] or "-", r["due"] or "-",
-              "-" if r["days_left"] is None else str(r["days_left"]),
-              "-" if r["recommended"]["days"] is None else f"{r['recommended']['days']} days"] for r in rows],
+            [[r.instrument, r.record, str(r.session_date), r.recall or "-", str(r.due or "-"),
+              "-" if r.days_left is None else str(r.days_left),
+              "-" if r.recommended.days is None else f"{r.recommended.days} days"] for r in rows],
             align="<<<<<><",
         ) or "no instrument has a record in force"
     ]  # fmt: skip
-    lines += [f"{r['instrument']}: {r['recommended']['reason']}" for r in rows]
+    lines += [f"{r.instrument}: {r.recommended.reason}" for r in rows]
     lines += ["findings:", *finding_lines(findings)] if findings else []
     payload: DueAnswer = {
         "on": date.isoformat(),
@@ -272,7 +228,6 @@ def _series(series: Series) -> ChartSeries:
     return entry_of(
         ChartSeries, series,
         check_load=[{"load": n, "value": v, "unit": u} for n, v, u in series.check_load.loads],
-        points=[entry_of(ChartPoint, point, session=point.session_record) for point in series.points],
         moving_ranges=series.ranges,
         breaks=[
             {"rule": b.rule.number, "text": b.rule.text, "session": series.points[b.index].session_record}

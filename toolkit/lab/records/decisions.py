@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
+from toolkit.calibration.registry.verify import VerifiedRecord, verify_registry
 from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines, table
@@ -18,15 +19,6 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.candidate import Candidate
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.status import RecordStatus
-
-
-class VerifiedRecord(TypedDict):
-    """What came of refitting a record from its stored data."""
-
-    id: str
-    ok: Annotated[bool, "whether it reproduces and every file is as it was entered"]
-    verified: Annotated[bool, "false of a legacy import, which has no data"]
-    reason: Annotated[str | None, "why it is not ok"]
 
 
 class VerifyRegistryAnswer(TypedDict):
@@ -150,11 +142,9 @@ def carry_out(registry: Registry, order: Order) -> Candidate | Decision | Record
 
 def verified_answer(registry: Registry, head: str | None) -> tuple[VerifyRegistryAnswer, str]:
     """Return what came of refitting every record, as JSON and text; ``head`` is an earlier ledger's hash."""
-    from toolkit.calibration.registry.verify import verify_registry
-
-    rows = [entry_of(VerifiedRecord, row) for row in verify_registry(registry, head)]
+    rows = list(verify_registry(registry, head))
     cells = [
-        [row["id"], "ok" if row["ok"] else "NOT OK", "yes" if row["verified"] else "no", row["reason"] or ""]
+        [row.id, "ok" if row.ok else "NOT OK", "yes" if row.verified else "no", row.reason or ""]
         for row in rows
     ]
     text = table(["id", "result", "verified", "reason"], cells, align="<<<<")

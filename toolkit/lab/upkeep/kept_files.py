@@ -17,9 +17,9 @@ from fnmatch import fnmatchcase
 from functools import cache, partial
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from toolkit.declared import read_text
+from toolkit.declared import Entry, read_text
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import RESULT_FILE, SETTINGS_FILE, TEMPLATE_FILE, Form, read_input
@@ -72,18 +72,15 @@ class Kind:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptFile:
-    """A file of a home: its kind, its version, who wrote it, and what becomes of it.
+    """A file of a home that the toolkit reads again."""
 
-    ``content`` is what a migration writes in its place.
-    """
-
-    place: str
+    place: Annotated[str, Entry("in the home")]
     kind: str
-    version: Version
-    written_by: str | None
-    state: FileState
-    reason: str | None = None
-    content: bytes | None = None
+    version: Annotated[Version, Entry("schema of the file, or release that shipped it; null where neither")]
+    written_by: Annotated[str | None, Entry("version of the toolkit; null where the file does not say")]
+    state: Annotated[FileState, Entry("own: the laboratory's; a home with newer files is refused as a whole")]
+    reason: Annotated[str | None, Entry("why it is refused")] = None
+    content: Annotated[bytes | None, Entry("what a migration writes in its place", output=False)] = None
 
 
 def kept_files(home: Path) -> Iterator[KeptFile]:

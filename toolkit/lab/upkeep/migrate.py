@@ -20,7 +20,7 @@ from toolkit.files import sha256_bytes
 from toolkit.inputs import SETTINGS_FILE, TEMPLATE_FILE, is_regular, read_input
 from toolkit.lab.answers import table
 from toolkit.lab.home import find_home
-from toolkit.lab.upkeep.kept_files import MIGRATIONS, FileState, KeptFile, kept_files
+from toolkit.lab.upkeep.kept_files import MIGRATIONS, KeptFile, kept_files
 from toolkit.publication import publication, settle
 from toolkit.version import __version__
 
@@ -48,23 +48,12 @@ class Migration:
     file: Annotated[tuple[Replaced, ...], Entry("each file that was replaced")] = ()
 
 
-class KeptFileEntry(TypedDict):
-    """A file of a home that the toolkit reads again."""
-
-    place: Annotated[str, "in the home"]
-    kind: str
-    version: Annotated[int | str | None, "schema of the file, or release that shipped it; null where neither"]
-    written_by: Annotated[str | None, "version of the toolkit; null where the file does not say"]
-    state: Annotated[FileState, "own: the laboratory's; a home with newer files is refused as a whole"]
-    reason: Annotated[str | None, "why it is refused"]
-
-
 class MigrateAnswer(TypedDict):
     """A home, checked whole and brought to this version."""
 
     home: Path
     dry_run: Annotated[bool, "nothing was written"]
-    files: Annotated[list[KeptFileEntry], "empty with --undo"]
+    files: Annotated[Sequence[KeptFile], "empty with --undo"]
     migration: Annotated[str | None, "folder of what was replaced; null where nothing was"]
     undone: Annotated[list[str], "places that --undo put back"]
 
@@ -175,13 +164,7 @@ def _answer(home: Path, files: Sequence[KeptFile], name: str | None, *, dry_run:
     return {
         "home": home,
         "dry_run": dry_run,
-        "files": [
-            {
-                "place": file.place, "kind": file.kind, "version": file.version,
-                "written_by": file.written_by, "state": file.state, "reason": file.reason,
-            }
-            for file in files
-        ],
+        "files": files,
         "migration": None if name is None else f"{MIGRATIONS}/{name}",
         "undone": [],
     }  # fmt: skip
