@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TypeVar
-
-T = TypeVar("T")
+from typing import Any
 
 
-def _set(value: T, unit: str, why: str) -> T:
+def _set(value: Any, unit: str, why: str) -> Any:
     return dataclasses.field(default=value, metadata={"unit": unit, "why": why})
 
 
@@ -493,24 +491,10 @@ class _Location:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Surface:
-    """Whether simulated columns are known well enough at other slip angles and loads."""
-
-    missed: float = _set(0.02, "of the output's spread", "a surface that misses more is none of a tire")
-    closer: float = _set(
-        8.0, "times", "a left-out angle has neighbours twice as far away; of third order that is off by 2^3"
-    )
-    cell_rows: int = _set(20, "rows of a run", "fewer do not tell what its cells carried from its loads")
-
-
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 PAST, RATES, SCATTER, AVERAGES = _Past(), _Rates(), _Scatter(), _Averages()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
 UNITS = _Units()
 DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
-STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE = _Structure(), _Laws(), _Verdict(), _Location(), _Surface()
-SECTIONS = (
-    BUDGET, WORKER, ROWS, DRIFT, PRIORS, NOISE, AVERAGES, RATES, PAST, SCATTER, SCREENING, STARTS, STEP,
-    UNITS, PAIRS, UNSEEN, FOLLOWING, LATTICE, STRUCTURE, LAWS, VERDICT, LOCATION, SURFACE,
-)  # fmt: skip
+STRUCTURE, LAWS, VERDICT, LOCATION = _Structure(), _Laws(), _Verdict(), _Location()
+SECTIONS = tuple(value for value in list(globals().values()) if type(value).__module__ == __name__)

@@ -35,7 +35,7 @@ from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.findings import Finding
-from toolkit.units import near_ratio
+from toolkit.diagnosis.simulators.unit_ratios import near_ratio
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem

@@ -25,7 +25,7 @@ from toolkit.diagnosis.simulators.parameter_units import channel_unit
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError, UnitError
-from toolkit.units import unit_ratios
+from toolkit.diagnosis.simulators.unit_ratios import unit_ratios
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

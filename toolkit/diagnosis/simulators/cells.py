@@ -10,7 +10,6 @@ import numpy as np
 from toolkit.calibration.apply import apply_record
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.registry import Registry
-from toolkit.diagnosis.policy import SURFACE
 from toolkit.diagnosis.simulators.channels import channel_places
 from toolkit.diagnosis.simulators.simulator import Output
 from toolkit.effects.applied import AppliedEffect
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
+
+_LEAST_ROWS = 20  # of a run: fewer do not tell what its cells carried from its loads
 
 
 class CaseCells:
@@ -115,7 +116,7 @@ class CaseCells:
         columns += [run.columns[name] for name in ("FZ",) if np.isfinite(run.columns.get(name, np.nan)).all()]
         there = np.column_stack([*columns, np.ones(len(shown))])
         good = np.isfinite(there).all(axis=1) & np.isfinite(shown)
-        if int(good.sum()) < SURFACE.cell_rows:
+        if int(good.sum()) < _LEAST_ROWS:
             return shown
         return np.asarray(there @ np.linalg.lstsq(there[good], shown[good], rcond=None)[0])
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.policy import SURFACE
 from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.diagnosis.simulators.tire import base_drive, rotation
 from toolkit.effects.signals import Drive
@@ -174,6 +173,8 @@ def _told(shape: Shape) -> dict[str, float]:
 
 
 _OUTPUTS = ("FY", "MZ")
+_MISSED = 0.02  # of the output's spread: a surface that misses more is none of a tire
+_CLOSER = 8.0  # a left-out angle has neighbours twice as far away; of third order that is off by 2^3
 _POINTS, _TRIED = 400, 130  # through which it goes, and by which its shape is chosen
 _FINE, _LOADS = 121, 17  # of the table that stands for it in simulations
 _LEAST = 0.05  # nominal loads, below which a force is no longer counted to its load
@@ -224,10 +225,10 @@ class Surface:
         process = Process(shape, points[many], y[many] / over[many])
         self._fits[name, way] = _FineGrid(process, self._slips, self._loads)
         missed = float(np.sqrt(np.mean((over * self._fits[name, way].at(points) - y) ** 2)))
-        if missed > SURFACE.missed * max(float(np.std(y)), 1e-300):
+        if missed > _MISSED * max(float(np.std(y)), 1e-300):
             self.good = False
         left_out = over[many] * process.left_out()
-        between = float(np.sqrt(np.mean(left_out**2))) / SURFACE.closer
+        between = float(np.sqrt(np.mean(left_out**2))) / _CLOSER
         self.between[name] = max(between, self.between.get(name, 0.0))
 
     def too_coarse(self) -> tuple[Finding, ...]:
