@@ -33,9 +33,9 @@ from toolkit.diagnosis.policy import PRIORS, SCREENING, UNITS, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
+from toolkit.diagnosis.simulators.unit_ratios import near_ratio
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.findings import Finding
-from toolkit.diagnosis.simulators.unit_ratios import near_ratio
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem

@@ -22,10 +22,10 @@ from toolkit.diagnosis.search.candidates import CandidateEffect, Start
 from toolkit.diagnosis.search.forward_step import Rival, Step, joint_fit, shows_signal
 from toolkit.diagnosis.search.unseen_runs import gains_of, takes_most
 from toolkit.diagnosis.simulators.parameter_units import channel_unit
+from toolkit.diagnosis.simulators.unit_ratios import unit_ratios
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError, UnitError
-from toolkit.diagnosis.simulators.unit_ratios import unit_ratios
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
