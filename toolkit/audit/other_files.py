@@ -4,7 +4,7 @@ What a file leaves open, its test may know. Its force over load lies on the surf
 (`toolkit.reduction.strays`) by its recorded values or by its cells, and not by both; and where most files
 of a test disagree in the same way, one of them that is decided by itself decides for all: a wrong equation
 computes every file of a day, a changed file stands alone. Where no file decides, the slopes of the whole
-test do.
+test do; and where all of its files disagree in one way, that is an equation.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from toolkit.audit.resume import Files
     from toolkit.channels import Rotation
 
+_ALL = 3  # files that agree to the last: a program computes them, nobody changes a column in each
 _MOST = 4  # one open file in so many is asked of the others; where there are more, they are no witnesses
 _NEEDED = ("SA_deg", "FY_N", "MZ_Nm", "FY_change_N", "MZ_change_Nm", "step_FZ_N")
 _RECORDED, _COMPUTED = False, True
@@ -125,7 +126,7 @@ def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
             judged |= {
                 line["path"]: Sides(side=side, reason=reason, grade=line["sides"]["grade"]) for line in alike
             }
-    return judged
+    return _by_folders([line for line in lines if line["path"] not in judged]) | judged
 
 
 def _side(line: Mapping[str, Any]) -> Which | None:
@@ -173,10 +174,34 @@ def _by_company(
     kind: tuple[str, str | None, str | None] | None, count: int, lines: Sequence[Mapping[str, Any]]
 ) -> tuple[Which, str] | None:
     decided = [line for line in lines if _kind(line) == kind and _side(line) in ("forces", "cells")]
-    if kind is None or {_side(line) for line in decided} != {"forces"}:
+    if kind is None or "cells" in map(_side, decided):
+        return None
+    if not decided:
         return None
     others = f"{count} of {len(lines)} files of the test disagree in the same way"
     return "forces", f"{others}, and {decided[0]['path']} shows that Fy and Mz are wrong"
+
+
+def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
+    """Return the files of folders in which all agree on one change of all their rows, and none decides."""
+    folders: dict[str, list[Mapping[str, Any]]] = {}
+    for line in lines:
+        if line["segments"]:
+            folders.setdefault(line["path"].rpartition("/")[0], []).append(line)
+    judged: dict[str, Sides] = {}
+    for beside in folders.values():
+        kinds = {_kind(line) for line in beside}
+        kind = next(iter(kinds))
+        if len(beside) < _ALL or len(kinds) > 1 or kind is None or kind[0] == "unknown":
+            continue
+        if {_side(line) for line in beside} != {"open"}:
+            continue
+        reason = (
+            f"all {len(beside)} files of the folder disagree in the same way, as one wrong equation "
+            "computes them: by hand a column would have been changed in each"
+        )
+        judged |= {line["path"]: Sides(side="forces", reason=reason, grade=kind[0]) for line in beside}
+    return judged
 
 
 def _by_slopes(lines: Sequence[Mapping[str, Any]]) -> tuple[Which, str] | None:

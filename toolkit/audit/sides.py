@@ -104,10 +104,11 @@ def decided(identification: Identification, sides: Sides) -> Identification:
 
 
 def grade_of(sides: Sides) -> Grade:
-    """Return the grade of a file by what is known of the side that is wrong."""
-    if sides.side == "forces":
-        return sides.grade
-    return "altered_cells" if sides.side == "cells" else "ambiguous"
+    """Return the grade of a file by what is known of the side that is wrong.
+
+    What explains the rows stays told where nothing says on which side it lies.
+    """
+    return "altered_cells" if sides.side == "cells" else sides.grade
 
 
 def disputed(line: Mapping[str, Any]) -> bool:
