@@ -6,6 +6,7 @@ import dataclasses
 import math
 
 import numpy as np
+import pytest
 
 from tests.characteristics.tire_factory import (
     CONICITY,
@@ -24,6 +25,7 @@ TRIALS = 160
 U_ROWS = (6.0, 0.15)  # N, N·m
 
 
+@pytest.mark.campaign("160 tests: how often intervals hold; `make coverage` prints the table")
 def test_ninety_five_per_cent_of_the_intervals_hold_the_truth() -> None:
     """At the middle load, where three loads give the tire's own slope over the load.
 

@@ -45,6 +45,7 @@ def test_holm_against_the_published_rule() -> None:
     assert holm([0.04, 0.001, 0.03]) == pytest.approx((0.06, 0.003, 0.06))
 
 
+@pytest.mark.campaign("200 sessions: how often sound data get advice")
 def test_clean_linear_sessions_are_recommended_nothing(make_session: Make) -> None:
     seeds = 200
     session = read_session(make_session(hub_data(40, 1)))
