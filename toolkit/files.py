@@ -275,7 +275,7 @@ def check_keys(table: Mapping[str, Any], known: Iterable[str], *, where: object)
                 f"unknown key {key!r}",
                 where=where,
                 got=key,
-                expected=near[0] if near else ", ".join(names),
+                expected=near or ", ".join(names),
                 next_step=f"did you mean {near!r}?" if near else "remove it or use one of those expected",
                 rule="unknown-key",
             )

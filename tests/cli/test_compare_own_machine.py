@@ -11,7 +11,7 @@ import pytest
 
 from tests.cli.test_compare import maker
 from toolkit.cli.main import run
-from toolkit.lab.desk.holdings import holdings_of, rows_of_tests
+from toolkit.lab.desk.holdings import Reported, holdings_of, rows_of_tests
 from toolkit.lab.home import packaged_home
 from toolkit.machine.definition import machine_file
 
@@ -71,5 +71,5 @@ def test_a_test_by_a_path_is_planned_by(
 
 def test_the_workbench_names_the_machine_and_no_path(home: Path) -> None:
     holdings = holdings_of(home)
-    rows = list(rows_of_tests(holdings, holdings.places["test"], frozenset()))
+    rows = list(rows_of_tests(holdings, holdings.places["test"], Reported()))
     assert [row["machine"] for row in rows] == ["m15-virtual"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import toolkit
-from toolkit.audit.model import Grade
+from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED
 from toolkit.cli.main import run
 from toolkit.effects.catalogue import effects
 from toolkit.lab.rules import rules_catalogue
@@ -41,7 +41,7 @@ def test_every_rule_of_a_module_is_explained() -> None:
 
 def test_the_template_lint_and_the_grades_are_explained() -> None:
     assert RULES.keys() <= rules_catalogue().keys()
-    assert {f"identified-{g}" for g in Grade.__args__ if g not in ("exact", "rounding", "unreadable")} <= (
+    assert {f"identified-{g}" for g in GRADES if g not in (*CLEAN, *NOT_IDENTIFIED)} <= (
         rules_catalogue().keys()
     )
 

@@ -5,7 +5,6 @@ import pytest
 from tests.diagnosis.tire_case import SIGNS, python_tire
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 
@@ -26,7 +25,7 @@ def value(effect, name):
 def test_an_angle_is_compared_with_the_recorded_slip_angle(axes):
     # alpha = SA - offset, and alpha = SA + pseudo_slip_angle, both with the case's own SA
     for name, parameter in (("steer_offset", "offset"), ("plysteer", "pseudo_slip_angle")):
-        assert AppliedEffect(effect=effects()[name]).sign(parameter, axes) == SIGNS[axes][0]
+        assert effects()[name].parameter(parameter).sign_in(axes) == SIGNS[axes][0]
 
 
 @pytest.mark.parametrize("axes", SIGNS)
@@ -36,7 +35,7 @@ def test_a_pull_is_compared_with_the_recorded_force(axes):
         ("conicity", "force_at_nominal_load", SIGNS[axes][1]), ("crosstalk", "coefficient", 1),
         ("channel_delay", "delay", 1),
     ):  # fmt: skip
-        assert AppliedEffect(effect=effects()[name]).sign(parameter, axes) == sign
+        assert effects()[name].parameter(parameter).sign_in(axes) == sign
 
 
 @pytest.mark.parametrize("axes", ["adapted-SAE", "ISO-W"])

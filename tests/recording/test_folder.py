@@ -193,7 +193,7 @@ def test_a_marked_workbook_is_known_again(tmp_path):
         ('unit = "psi"', "unit = 5", '{ value = NUMBER, unit = "kPa" } above 0 kPa'),
         ('"second person"', "true", "a text"),
         ('"second person"', '["second person"]', "a text"),
-        ("E5 = -2", "E6 = -2", "E5"),
+        ("E5 = -2", "E6 = -2", "D52, D51, E5"),
         ("E5 = -2", 'E5 = "x"', '{ value = NUMBER, unit = "..." }, or a number'),
         ("values =", 'file = "x"\nvalues =', "one of the two"),
         ('machine = "m15"', "", 'machine = "m15", or the path of a machine definition'),

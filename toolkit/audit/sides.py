@@ -70,7 +70,7 @@ def judge(
     by_columns : whether a changed column of cells could be what explains the rows of a segment
     """
     segments = identification.segments
-    # The record of another day may be what turned cells look like: m15-r1 is m15-r2 with E5 turned.
+    # The record of another day may be what turned cells look like: two records may differ in one sign alone.
     odd = [s for s in segments if s.grade in _ODD or s.grade == "stale"]
     if not odd or computed is None or (len(odd) == len(segments) and _unexplained(odd)):
         return identification

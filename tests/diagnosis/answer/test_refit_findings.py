@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import CELL, cell_case, write_case
-from toolkit.diagnosis.answer.answer import FoundParameter
+from toolkit.diagnosis.answer.answer import EffectEstimate
 from toolkit.diagnosis.answer.refit_findings import confounded_findings
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -69,7 +69,7 @@ def test_a_size_that_a_law_moves_by_more_than_its_interval_is_confounded(beside,
         return AppliedEffect(effect=effect("coulomb_friction"), channel="F", values={"coulomb": size})
 
     law = AppliedEffect(effect=law_effect("law adds: a*[v]"), channel="F", values={"a": 1.0})
-    size = FoundParameter(name="coulomb", value=5.9, unit="N", ci95=(5.4, 6.4), runs=None)
+    size = EffectEstimate(name="coulomb", value=5.9, unit="N", ci95=(5.4, 6.4), runs=None)
     findings = confounded_findings(
         Of(path=Path("CASE.toml")),
         Of(augmented=Of(active=(friction(5.9),))),

@@ -51,6 +51,7 @@ def past_gain(problem: Problem, made: Fit) -> float:
 def past_responses(problem: Problem, made: Fit) -> dict[str, NDArray[np.float64]]:
     """Return how every output answers to states at the first rows, (rows, states); {} without a memory."""
     listed = [_responses(problem, made, applied) for applied in made.active if applied.effect.remembers]
+    listed = [each for each in listed if each]
     return {name: np.hstack([each[name] for each in listed]) for name in problem.names} if listed else {}
 
 
@@ -61,7 +62,11 @@ def taken_by_past(response: NDArray[np.float64], values: NDArray[np.float64]) ->
 
 
 def _responses(problem: Problem, made: Fit, applied: AppliedEffect) -> dict[str, NDArray[np.float64]]:
-    """Return how every output answers to a state at the first row of each run, (rows, runs)."""
+    """Return how every output answers to a state at the first row of each run, (rows, runs); {} of none.
+
+    A past that would do more than the effect does itself is another effect: a load that nobody saw, of which
+    a cell still creeps, is a zero.
+    """
     moved = tuple(
         replace(each, values={**each.values, filters.PAST: _STEP}) if each.key == applied.key else each
         for each in made.active
@@ -69,10 +74,14 @@ def _responses(problem: Problem, made: Fit, applied: AppliedEffect) -> dict[str,
     responses = {name: np.zeros((problem.rows, len(problem.slices))) for name in problem.names}
     try:
         simulated = problem.simulate(made.p, moved)
+        bare = problem.simulate(made.p, [each for each in made.active if each.key != applied.key])
     except FitError:
-        return responses
+        return {}
+    changes = {name: made.simulated[name] - bare[name] for name in problem.names}
+    pasts = {name: (simulated[name] - made.simulated[name]) / _STEP for name in problem.names}
+    if all(np.nansum(pasts[name] ** 2) > np.nansum(changes[name] ** 2) for name in problem.names):
+        return {}
     for name, response in responses.items():
-        change = (simulated[name] - made.simulated[name]) / _STEP
         for k, rows in enumerate(problem.slices):
-            response[rows, k] = np.nan_to_num(change[rows])
+            response[rows, k] = np.nan_to_num(pasts[name][rows])
     return responses

@@ -93,9 +93,11 @@ def _reaches(x: Array, _: Array) -> list[dict[str, float]]:
 
 
 def _static(text: str, starts: Starts | None = None, *, about_zero: bool = True, **units: str) -> Shape:
+    # A place c on the signal's own scale moves with its zero.
     return Shape(
-        form="static", text=text, units=units, starts=starts or (lambda _, __: [{}]), about_zero=about_zero
-    )
+        form="static", text=text, units=units, starts=starts or (lambda _, __: [{}]),
+        about_zero=about_zero and "c" not in units,
+    )  # fmt: skip
 
 
 _TURN = "2*pi"

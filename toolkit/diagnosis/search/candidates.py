@@ -136,7 +136,8 @@ def candidates(
             continue
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
-            if channel in inputs and effect.channel is not None:
+            on_inputs = effect.on_channel is not None and "input" in effect.on_channel.where
+            if on_inputs and channel in inputs and channel not in problem.model.capability.cells:
                 continue  # asked where the declared simulation is grossly wrong: `wrong_units`
             case = view(problem, channel, source)
             confined = effect.in_case(case)

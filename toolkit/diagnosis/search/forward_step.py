@@ -214,7 +214,8 @@ def shows_signal(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> 
     """Tell whether an output has the simulated signal in it, and is not only made small by a factor."""
     names = [str(effect.channel)]
     if effect.channel in {driver.name for driver in problem.case.drivers}:
-        names = list(problem.names)  # of an input's unit some output tells
+        # A factor may make an input vanish, of which some output tells; a sign does not.
+        names = [] if effect.effect.discrete else list(problem.names)
     view = CaseView(problem, effect.channel)
 
     def has_signal(name: str) -> bool:
@@ -224,7 +225,7 @@ def shows_signal(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> 
         simulated = simulated - (view.origin(name) or 0.0)
         return float(np.mean(residual**2)) < STEP.signal**2 * float(np.mean(simulated**2))
 
-    return any(has_signal(name) if name in problem.names else True for name in names)
+    return not names or any(has_signal(name) if name in problem.names else True for name in names)
 
 
 def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Rival, ...]:

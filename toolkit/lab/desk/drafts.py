@@ -26,8 +26,16 @@ from toolkit.calibration.session.settings import INSTRUMENT, INSTRUMENT_FORM
 from toolkit.days import parse_day
 from toolkit.declared import attempt, toml_text
 from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError
-from toolkit.files import write_atomic
-from toolkit.inputs import DATA_FILE, SETTINGS_FILE, check_size, is_regular, read_input, read_regular
+from toolkit.files import real_path, write_atomic
+from toolkit.inputs import (
+    DATA_FILE,
+    SETTINGS_FILE,
+    check_size,
+    is_regular,
+    open_regular,
+    read_input,
+    read_regular,
+)
 from toolkit.lab.desk.uploads import FILE_NAME, claimed_folder
 from toolkit.lab.desk.versions import version_of
 from toolkit.publication import publication, settle
@@ -174,11 +182,12 @@ def copied_draft(home: Path, draft_id: str) -> Iterator[Path]:
     """Yield the session file of a copy of a draft: who only tries it writes nothing of it."""
     source = home / DRAFTS / draft_id
     with tempfile.TemporaryDirectory() as place:
-        copy = Path(place).resolve() / draft_id
+        copy = real_path(Path(place)) / draft_id
         copy.mkdir()
         for path in source.iterdir():
             if is_regular(path) and not path.name.startswith("."):
-                shutil.copy2(path, copy / path.name)
+                with open_regular(path) as stream, (copy / path.name).open("wb") as copied:
+                    shutil.copyfileobj(stream, copied)
         yield copy / SESSION
 
 

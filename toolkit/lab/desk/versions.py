@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolkit.errors import ConfigError
+from toolkit.files import sha256_file
 from toolkit.inputs import is_regular
 from toolkit.staging import locked
 
@@ -64,9 +65,7 @@ def version_of(folder: Path, names: Iterable[str] | None = None) -> str:
             with contextlib.suppress(FileNotFoundError):
                 state = path.stat()
                 content = (
-                    hashlib.sha256(path.read_bytes()).hexdigest()
-                    if state.st_size <= _WHOLE
-                    else f"{state.st_size} {state.st_mtime_ns}"
+                    sha256_file(path) if state.st_size <= _WHOLE else f"{state.st_size} {state.st_mtime_ns}"
                 )
                 total.update(f"{path.name}\0{content}\0".encode(errors="surrogateescape"))
     return total.hexdigest()[:16]
