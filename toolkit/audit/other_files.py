@@ -109,15 +109,10 @@ def _points(line: Mapping[str, Any], *, computed: bool) -> list[OnCurve]:
 def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
     judged: dict[str, Sides] = {}
     open_lines = [line for line in lines if _side(line) == "open"]
-    if len(open_lines) * _MOST <= len(lines):
-        for line in open_lines:
-            verdict = _by_curve(line, lines)
-            if verdict is not None:
-                judged[line["path"]] = verdict
-    left = [line for line in open_lines if line["path"] not in judged]
     kinds = Counter(_kind(line) for line in lines if line["sides"] is not None)
+    # What most files of a test agree on takes no curve: a fit of the others for each side of each file.
     for kind, count in kinds.items():
-        alike = [line for line in left if _kind(line) == kind]
+        alike = [line for line in open_lines if _kind(line) == kind]
         if not alike or 2 * count < len(lines) or count < 2:
             continue
         told = _by_company(kind, count, lines) or _by_slopes(lines)
@@ -126,6 +121,12 @@ def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
             judged |= {
                 line["path"]: Sides(side=side, reason=reason, grade=line["sides"]["grade"]) for line in alike
             }
+    left = [line for line in open_lines if line["path"] not in judged]
+    if len(left) * _MOST <= len(lines):
+        for line in left:
+            verdict = _by_curve(line, lines)
+            if verdict is not None:
+                judged[line["path"]] = verdict
     return _by_folders([line for line in lines if line["path"] not in judged]) | judged
 
 
