@@ -201,7 +201,9 @@ def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
             f"all {len(beside)} files of the folder disagree in the same way, as one wrong equation "
             "computes them: by hand a column would have been changed in each"
         )
-        judged |= {line["path"]: Sides(side="forces", reason=reason, grade=kind[0]) for line in beside}
+        judged |= {
+            line["path"]: Sides(side="forces", reason=reason, grade=line["sides"]["grade"]) for line in beside
+        }
     return judged
 
 
