@@ -112,8 +112,10 @@ def audit_plots(audit: ArchiveAudit) -> dict[str, Plot]:
 
 
 def _conclusion(summary: Summary, _style: Style) -> str:
-    if summary.right + summary.wrong == 0:
+    if summary.right + summary.wrong + summary.disputed == 0:
         text = "The archive has no file that could be read as a recording."
+    elif summary.wrong == 0 and summary.disputed:
+        text = ""  # what is right stands in the table of grades
     elif summary.wrong == 0:
         text = f"All {summary.right} files that could be read carry the values of the record in force."
     else:
@@ -135,7 +137,7 @@ def _conclusion(summary: Summary, _style: Style) -> str:
             "files could not be read and are" if summary.unreadable > 1 else "file could not be read and is"
         )
         text += f" {summary.unreadable} {many} set aside."
-    return text
+    return text.strip()
 
 
 def _reports_text(summary: Summary, _style: Style) -> str | None:
@@ -207,7 +209,7 @@ VALUES = (
     AUDIT.condition(
         "all_right",
         "every file is right",
-        lambda summary, _: summary.wrong == 0 and summary.unreadable == 0,
+        lambda summary, _: summary.wrong + summary.unreadable + summary.disputed == 0,
     ),
 )
 
