@@ -21,6 +21,7 @@ from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab.desk import drafts
 from toolkit.lab.desk.pending import decide
 from toolkit.lab.desk.statements import statement_groups, with_statement
+from toolkit.lab.desk.tried_drafts import copied_draft
 from toolkit.lab.desk.versions import Origin, StaleError
 from toolkit.lab.records.decisions import Order
 from toolkit.trust.requested import Requested
@@ -156,7 +157,7 @@ def rehearse(request: Request) -> Response:
     with ExitStack() as stack:
         with bench.versions.held(_folder(bench, draft_id)):
             draft = drafts.open_draft(bench.home, draft_id)
-            path = stack.enter_context(drafts.copied_draft(bench.home, draft_id))
+            path = stack.enter_context(copied_draft(bench.home, draft_id))
         try:
             with rehearsed(path, bench.registry, standards=standards_of(bench.home)) as (copy, candidate):
                 state = copy.status(candidate.record.id).state if candidate.existing else NOT_ENTERED

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.effects.applied import AppliedEffect
 
+_FADED = 0.5  # of its largest: what is left of a past at a run's end is a zero, and no past, where it is more
 _STEP = 1e-3  # of the range of what a state follows: a difference of simulations in proportion
 
 
@@ -51,7 +52,6 @@ def past_gain(problem: Problem, made: Fit) -> float:
 def past_responses(problem: Problem, made: Fit) -> dict[str, NDArray[np.float64]]:
     """Return how every output answers to states at the first rows, (rows, states); {} without a memory."""
     listed = [_responses(problem, made, applied) for applied in made.active if applied.effect.remembers]
-    listed = [each for each in listed if each]
     return {name: np.hstack([each[name] for each in listed]) for name in problem.names} if listed else {}
 
 
@@ -62,11 +62,7 @@ def taken_by_past(response: NDArray[np.float64], values: NDArray[np.float64]) ->
 
 
 def _responses(problem: Problem, made: Fit, applied: AppliedEffect) -> dict[str, NDArray[np.float64]]:
-    """Return how every output answers to a state at the first row of each run, (rows, runs); {} of none.
-
-    A past that would do more than the effect does itself is another effect: a load that nobody saw, of which
-    a cell still creeps, is a zero.
-    """
+    """Return how every output answers to a state at the first row of each run, (rows, runs)."""
     moved = tuple(
         replace(each, values={**each.values, filters.PAST: _STEP}) if each.key == applied.key else each
         for each in made.active
@@ -74,14 +70,12 @@ def _responses(problem: Problem, made: Fit, applied: AppliedEffect) -> dict[str,
     responses = {name: np.zeros((problem.rows, len(problem.slices))) for name in problem.names}
     try:
         simulated = problem.simulate(made.p, moved)
-        bare = problem.simulate(made.p, [each for each in made.active if each.key != applied.key])
     except FitError:
-        return {}
-    changes = {name: made.simulated[name] - bare[name] for name in problem.names}
-    pasts = {name: (simulated[name] - made.simulated[name]) / _STEP for name in problem.names}
-    if all(np.nansum(pasts[name] ** 2) > np.nansum(changes[name] ** 2) for name in problem.names):
-        return {}
+        return responses
     for name, response in responses.items():
+        change = (simulated[name] - made.simulated[name]) / _STEP
         for k, rows in enumerate(problem.slices):
-            response[rows, k] = np.nan_to_num(pasts[name][rows])
+            past = np.nan_to_num(change[rows])
+            if len(past) and abs(past[-1]) < _FADED * np.abs(past).max():
+                response[rows, k] = past
     return responses

@@ -12,9 +12,8 @@ import datetime as dt
 import os
 import re
 import shutil
-import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC
 from pathlib import Path
@@ -26,13 +25,12 @@ from toolkit.calibration.session.settings import INSTRUMENT, INSTRUMENT_FORM
 from toolkit.days import parse_day
 from toolkit.declared import attempt, toml_text
 from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError
-from toolkit.files import real_path, write_atomic
+from toolkit.files import write_atomic
 from toolkit.inputs import (
     DATA_FILE,
     SETTINGS_FILE,
     check_size,
     is_regular,
-    open_regular,
     read_input,
     read_regular,
 )
@@ -175,20 +173,6 @@ def _write_down(home: Path, draft_id: str, record: str | None) -> None:
     time = dt.datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     stated = {} if record is None else {"record": record}
     write_atomic(_note(home, draft_id), toml_text({"schema": 1, **stated, "time": time}))
-
-
-@contextlib.contextmanager
-def copied_draft(home: Path, draft_id: str) -> Iterator[Path]:
-    """Yield the session file of a copy of a draft: who only tries it writes nothing of it."""
-    source = home / DRAFTS / draft_id
-    with tempfile.TemporaryDirectory() as place:
-        copy = real_path(Path(place)) / draft_id
-        copy.mkdir()
-        for path in source.iterdir():
-            if is_regular(path) and not path.name.startswith("."):
-                with open_regular(path) as stream, (copy / path.name).open("wb") as copied:
-                    shutil.copyfileobj(stream, copied)
-        yield copy / SESSION
 
 
 def as_of_draft(error: ToolkitError, copy: Path, home: Path, draft_id: str) -> None:
