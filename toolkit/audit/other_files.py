@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.audit.model import Sides, Which
+from toolkit.audit.model import DisagreeingSides, Which
 from toolkit.reduction.physics import RULES, Readings, departures
 from toolkit.reduction.strays import off_curve
 
@@ -46,7 +46,7 @@ class OnCurve:
     MZ: float
 
 
-def by_other_files(files: Files) -> dict[str, Sides]:
+def by_other_files(files: Files) -> dict[str, DisagreeingSides]:
     """Return the side of every file that its own rows leave open and the other files of its test decide."""
     places: dict[str, list[int]] = {}
     asked: set[str] = set()
@@ -55,7 +55,7 @@ def by_other_files(files: Files) -> dict[str, Sides]:
         places.setdefault(key, []).append(place)
         if line["sides"] is not None and line["sides"]["side"] == "open":
             asked.add(key)
-    answers: dict[str, Sides] = {}
+    answers: dict[str, DisagreeingSides] = {}
     for key in sorted(asked):
         answers |= _of_test([files.line(place) for place in places[key]])
     return answers
@@ -106,8 +106,8 @@ def _points(line: Mapping[str, Any], *, computed: bool) -> list[OnCurve]:
     return points
 
 
-def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
-    judged: dict[str, Sides] = {}
+def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, DisagreeingSides]:
+    judged: dict[str, DisagreeingSides] = {}
     open_lines = [line for line in lines if _side(line) == "open"]
     kinds = Counter(_kind(line) for line in lines if line["sides"] is not None)
     # What most files of a test agree on takes no curve: a fit of the others for each side of each file.
@@ -119,7 +119,8 @@ def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
         if told is not None:
             side, reason = told
             judged |= {
-                line["path"]: Sides(side=side, reason=reason, grade=line["sides"]["grade"]) for line in alike
+                line["path"]: DisagreeingSides(side=side, reason=reason, grade=line["sides"]["grade"])
+                for line in alike
             }
     left = [line for line in open_lines if line["path"] not in judged]
     if len(left) * _MOST <= len(lines):
@@ -142,7 +143,7 @@ def _kind(line: Mapping[str, Any]) -> tuple[str, str | None, str | None] | None:
     return line["sides"]["grade"], line["record"], line["variant"]
 
 
-def _by_curve(line: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> Sides | None:
+def _by_curve(line: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> DisagreeingSides | None:
     # In every world, whatever the other open files hold.
     answers: set[Which] = set()
     messages: list[str] = []
@@ -168,7 +169,7 @@ def _by_curve(line: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> Si
         return None
     side = answers.pop()
     of = "by the cells" if side == "cells" else "as recorded"
-    return Sides(side=side, reason=f"{of}, {messages[0]}", grade=line["sides"]["grade"])
+    return DisagreeingSides(side=side, reason=f"{of}, {messages[0]}", grade=line["sides"]["grade"])
 
 
 def _by_company(
@@ -183,13 +184,13 @@ def _by_company(
     return "forces", f"{others}, and {decided[0]['path']} shows that Fy and Mz are wrong"
 
 
-def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
+def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, DisagreeingSides]:
     """Return the files of folders in which all agree on one change of all their rows, and none decides."""
     folders: dict[str, list[Mapping[str, Any]]] = {}
     for line in lines:
         if line["segments"]:
             folders.setdefault(line["path"].rpartition("/")[0], []).append(line)
-    judged: dict[str, Sides] = {}
+    judged: dict[str, DisagreeingSides] = {}
     for beside in folders.values():
         kinds = {_kind(line) for line in beside}
         kind = next(iter(kinds))
@@ -202,7 +203,8 @@ def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
             "computes them: by hand a column would have been changed in each"
         )
         judged |= {
-            line["path"]: Sides(side="forces", reason=reason, grade=line["sides"]["grade"]) for line in beside
+            line["path"]: DisagreeingSides(side="forces", reason=reason, grade=line["sides"]["grade"])
+            for line in beside
         }
     return judged
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from toolkit.audit.linked import Linked, PastReport
+    from toolkit.audit.linked import Linked, RestingReport
     from toolkit.errors import ToolkitError
     from toolkit.lab.tire_tests.resolve import Resolved
     from toolkit.report.deliver import Delivered, Job
@@ -89,13 +89,13 @@ def amend(
     )
 
 
-def _wanted(linked: Linked) -> Iterator[tuple[PastReport, str]]:
+def _wanted(linked: Linked) -> Iterator[tuple[RestingReport, str]]:
     for past in linked.reports:
         if past.id is not None and past.to_amend:
             yield from ((past, test) for test in sorted(past.tests))
 
 
-def _job(past: PastReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
+def _job(past: RestingReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
     from toolkit.lab.tire_tests.handover import details_of, provenance
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
