@@ -68,12 +68,11 @@ def test_of(line: Mapping[str, Any]) -> str:
 
 def off_the_curve(lines: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """Return the files of a test whose corrected values lie off the curve of the others: path to message."""
-    told: dict[str, str] = {}
-    points = [p for line in lines for p in _points(line, computed=not _keeps_recorded(line))]
-    for channel in ("FY", "MZ"):
-        for path, message in off_curve(points, channel).items():
-            told.setdefault(path, message)
-    return told
+    return _off_curve([p for line in lines for p in _points(line, computed=not _keeps_recorded(line))])
+
+
+def _off_curve(points: Sequence[OnCurve]) -> dict[str, str]:
+    return off_curve(points, "MZ") | off_curve(points, "FY")
 
 
 def _keeps_recorded(line: Mapping[str, Any]) -> bool:
@@ -124,8 +123,9 @@ def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, DisagreeingSides]:
             }
     left = [line for line in open_lines if line["path"] not in judged]
     if len(left) * _MOST <= len(lines):
+        curves: dict[tuple[bool, ...], dict[str, str]] = {}
         for line in left:
-            verdict = _by_curve(line, lines)
+            verdict = _by_curve(line, lines, curves)
             if verdict is not None:
                 judged[line["path"]] = verdict
     return _by_folders([line for line in lines if line["path"] not in judged]) | judged
@@ -143,24 +143,26 @@ def _kind(line: Mapping[str, Any]) -> tuple[str, str | None, str | None] | None:
     return line["sides"]["grade"], line["record"], line["variant"]
 
 
-def _by_curve(line: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> DisagreeingSides | None:
-    # In every world, whatever the other open files hold.
+def _by_curve(
+    line: Mapping[str, Any],
+    lines: Sequence[Mapping[str, Any]],
+    curves: dict[tuple[bool, ...], dict[str, str]],
+) -> DisagreeingSides | None:
+    # In every world, whatever the other open files hold; ``curves`` are those that were asked already.
     answers: set[Which] = set()
     messages: list[str] = []
     for world in (_COMPUTED, _RECORDED):
-        others = [
-            p
-            for other in lines
-            if other["path"] != line["path"]
-            for p in _points(other, computed=world if _side(other) == "open" else _side(other) != "cells")
-        ]
         stray: dict[bool, str] = {}
         for mine in (_COMPUTED, _RECORDED):
-            points = [*others, *_points(line, computed=mine)]
-            for channel in ("FY", "MZ"):
-                message = off_curve(points, channel).get(line["path"])
-                if message is not None:
-                    stray.setdefault(mine, message)
+            sides = tuple(
+                mine if other is line else world if _side(other) == "open" else _side(other) != "cells"
+                for other in lines
+            )
+            if sides not in curves:
+                of_each = zip(lines, sides, strict=True)
+                curves[sides] = _off_curve([p for one, side in of_each for p in _points(one, computed=side)])
+            if line["path"] in curves[sides]:
+                stray[mine] = curves[sides][line["path"]]
         if len(stray) != 1:
             return None
         answers.add("cells" if _COMPUTED in stray else "forces")
