@@ -266,7 +266,7 @@ def test_the_protocol_of_a_file_is_what_the_test_is_read_by(tmp_path: Path, monk
     asked: list[object] = []
 
     def read(_test: Path, **options: object) -> object:
-        asked.append(options["protocol"])
+        asked.append(options["basis"].protocol)  # type: ignore[attr-defined]
         raise ConfigError("enough was asked", rule="enough")
 
     monkeypatch.setattr(resolve, "resolve_test", read)
