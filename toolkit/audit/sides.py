@@ -8,7 +8,7 @@ give the same numbers. What needs no record can, and each side is held against i
 - continuity: where the explanation changes in mid-block, load and slip angle stand still, so that whatever
   steps there was changed there;
 - the curve over load, which the blocks of sound rows make and the others must lie on;
-- the other files of the test (`toolkit.audit.tests_sides`).
+- the other files of the test (`toolkit.audit.other_files`).
 
 What both sides pass, or both fail, is open, and stays so.
 """
