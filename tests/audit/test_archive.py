@@ -57,21 +57,19 @@ def test_the_recording_of_figure_4_4_was_computed_by_the_withdrawn_record(audite
     dated = [one for one in audited.files if one.path.startswith("2019/")]
     assert dated
     for one in dated:
-        assert (one.grade, one.identification.record, one.identification.in_force) == (
+        assert (one.grade, one.record, one.in_force) == (
             "stale",
             "m15-r1",
             "m15-r2",
         )
         # the largest change is 2 |E5 coefficient| times the largest |E5| of the ten printed rows, in N
         E5 = 497.59  # lbf, printed in Figure 4.4
-        assert one.identification.repair.FY_max_abs_N == pytest.approx(
-            2 * 1.0228 * E5 * 4.4482216152605, rel=1e-3
-        )
+        assert one.repair.FY_max_abs_N == pytest.approx(2 * 1.0228 * E5 * 4.4482216152605, rel=1e-3)
 
 
 def test_a_void_record_is_stale_without_a_date_too(audited):
     (loose,) = [one for one in audited.files if one.path.startswith("loose/")]
-    assert (loose.grade, loose.date, loose.identification.in_force, loose.identification.repair) == (
+    assert (loose.grade, loose.date, loose.in_force, loose.repair) == (
         "stale",
         None,
         None,

@@ -141,12 +141,12 @@ class TestEffects:
         one = next(f for f in wrong_sign.files if f.path.endswith("run 3"))
         table = recording(angle=2, seed=3, FY=WRONG)
         E5 = table["E5"].reshape(5, 10).mean(axis=1)
-        assert [(c.first_row, c.last_row) for c in one.changes] == [
+        assert [(c.first_row, c.last_row) for c in one.conditions] == [
             (i * 10 + 1, i * 10 + 10) for i in range(5)
         ]
-        np.testing.assert_allclose([c.FY_change_N for c in one.changes], 2 * FY[2] * E5 * LBF, rtol=1e-5)
-        np.testing.assert_allclose([c.MZ_change_Nm for c in one.changes], 0.0, atol=1e-3)
-        assert [c.step_SA_deg for c in one.changes] == pytest.approx([2.0] * 5)
+        np.testing.assert_allclose([c.FY_change_N for c in one.conditions], 2 * FY[2] * E5 * LBF, rtol=1e-5)
+        np.testing.assert_allclose([c.MZ_change_Nm for c in one.conditions], 0.0, atol=1e-3)
+        assert [c.step_SA_deg for c in one.conditions] == pytest.approx([2.0] * 5)
 
     def test_the_secant_through_one_degree(self, wrong_sign):
         (test,) = wrong_sign.tests
@@ -219,5 +219,5 @@ def test_what_will_be_in_force_cannot_be_known(tmp_path):
     made = audit(tmp_path)
     (file,) = made.files
     assert (file.grade, file.date) == ("undated", None)
-    assert (file.identification.in_force, file.identification.repair) == (None, None)
+    assert (file.in_force, file.repair) == (None, None)
     assert "2190-01-01, in the future" in rules(made, "test-toml")["later/a.xlsx"]

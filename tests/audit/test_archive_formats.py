@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime as dt
 import json
 from pathlib import Path
@@ -17,7 +18,7 @@ from toolkit.audit import resume
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.corrected import write_copies
 from toolkit.audit.identify import identify_columns
-from toolkit.audit.model import columns_of
+from toolkit.audit.model import Identification, columns_of
 from toolkit.audit.one_file import unreadable
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app
@@ -25,6 +26,7 @@ from toolkit.files import sha256_file
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
 
+IDENTIFIED = [field.name for field in dataclasses.fields(Identification)]
 HOME = Path(__file__).resolve().parents[2]
 REGISTRY = Registry(HOME / "calibrations")
 KNOWN = dt.date(2026, 1, 1)
@@ -64,7 +66,9 @@ def test_every_format_has_the_grade_of_the_same_rows_in_csv(audited):
         assert len(files) == 7
         for one in files.values():
             assert one.grade == GRADES[name], one.path
-            assert one.identification == files["run.csv"].identification
+            assert [getattr(one, key) for key in IDENTIFIED] == [
+                getattr(files["run.csv"], key) for key in IDENTIFIED
+            ]
             assert one.rows == 50
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from tests.audit.archive_made import FY, dated, recording, write
 from toolkit.audit.archive import audit_archive
-from toolkit.audit.linked import PastReport, link, read_reports
+from toolkit.audit.linked import RestingReport, link, read_reports
 from toolkit.calibration.registry.registry import Registry
+from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 from toolkit.files import sha256_file
 
@@ -35,7 +36,7 @@ def made(archive):
 
 
 def by_name(linked):
-    return {one.report: one.as_dict() for one in linked.reports}
+    return {one.report: json_value(one) for one in linked.reports}
 
 
 def test_documents_are_linked_where_their_name_has_the_tests_as_whole_words(made, tmp_path):
@@ -141,7 +142,7 @@ def test_there_is_no_such_list(tmp_path):
     ],
 )
 def test_what_is_to_be_amended(identity, calibrations, not_clean, amend):
-    one = PastReport(
+    one = RestingReport(
         report="R", id=identity, calibrations=calibrations, not_clean=not_clean, in_force={"m15-r2"}
     )
     assert one.to_amend is amend

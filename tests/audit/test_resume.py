@@ -12,9 +12,10 @@ from tests.recording.fig4_4 import write_fig4_4
 from toolkit import machine as machine_module
 from toolkit.audit import archive as archive_module
 from toolkit.audit.archive import audit_archive
+from toolkit.audit.one_file import ArchivedFile
 from toolkit.audit.resume import RESULTS, Results
-from toolkit.audit.serial import from_plain, to_plain
 from toolkit.calibration.registry.registry import Registry
+from toolkit.declared import json_value, object_of
 from toolkit.errors import OutputError
 
 HOME = Path(__file__).resolve().parents[2]
@@ -51,7 +52,7 @@ def registry(folder=HOME / "calibrations"):
 
 def test_results_survive_the_way_through_the_file(archive):
     for one in audit_archive(archive, registry()).files:
-        assert from_plain(json.loads(json.dumps(to_plain(one)))) == one
+        assert object_of(ArchivedFile, json.loads(json.dumps(json_value(one)))) == one
 
 
 def test_a_second_run_reads_nothing_and_answers_the_same(archive, tmp_path, asked):

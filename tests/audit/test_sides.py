@@ -52,9 +52,9 @@ MIDDLE = slice(90, ROWS)  # from the middle of a load block on
 def test_a_cell_turned_in_mid_block_is_not_blamed_on_the_force(tmp_path):
     made, file = one(tmp_path, with_turned_cell(recording(rows=ROWS), MIDDLE))
     assert file.grade == "altered_cells"
-    assert file.identification.sides.side == "cells"
-    assert file.identification.sides.grade == "stale"
-    assert "row 91" in file.identification.sides.reason
+    assert file.sides.side == "cells"
+    assert file.sides.grade == "stale"
+    assert "row 91" in file.sides.reason
     assert headline(made).wrong == 0
     assert headline(made).altered == 1
     (copy,) = write_copies(made, REGISTRY, tmp_path / "fixed")
@@ -66,7 +66,7 @@ def test_a_cell_turned_in_mid_block_is_not_blamed_on_the_force(tmp_path):
 def test_a_force_of_a_wrong_sign_in_mid_block_is_repaired(tmp_path):
     made, file = one(tmp_path, with_wrong_force(MIDDLE))
     assert file.grade == "sign_variant"
-    assert file.identification.sides.side == "forces"
+    assert file.sides.side == "forces"
     (copy,) = write_copies(made, REGISTRY, tmp_path / "fixed")
     assert copy.reason is None
 
@@ -74,7 +74,7 @@ def test_a_force_of_a_wrong_sign_in_mid_block_is_repaired(tmp_path):
 def test_a_whole_load_block_is_told_by_the_curve_over_load(tmp_path):
     _, file = one(tmp_path, with_turned_cell(recording(rows=ROWS), slice(80, 120)))
     assert file.grade == "altered_cells"
-    assert "curve over load" in file.identification.sides.reason
+    assert "curve over load" in file.sides.reason
     _, file = one(tmp_path, with_wrong_force(slice(80, 120)))
     assert file.grade == "sign_variant"
 
@@ -89,14 +89,14 @@ def test_one_changed_reading_is_the_cells_and_one_changed_force_the_forces(tmp_p
     force[99] += 30.0
     _, file = one(tmp_path, table | {"FY": force})
     assert file.grade == "unknown"
-    assert file.identification.sides.side == "forces"
+    assert file.sides.side == "forces"
 
 
 def test_what_a_tire_cannot_do_decides_a_whole_file(tmp_path):
     _, file = one(tmp_path, recording(rows=ROWS, FY=WRONG))  # 0.75 of the load at zero slip
-    assert (file.grade, file.identification.sides.side) == ("sign_variant", "forces")
+    assert (file.grade, file.sides.side) == ("sign_variant", "forces")
     _, file = one(tmp_path, with_turned_cell(recording(rows=ROWS), slice(None)))
-    assert (file.grade, file.identification.sides.side) == ("altered_cells", "cells")
+    assert (file.grade, file.sides.side) == ("altered_cells", "cells")
 
 
 # Cells of a wheel: side force and aligning moment over the slip angle [deg], shared by D51, D52 and E5.
@@ -143,7 +143,7 @@ def test_a_file_whose_cells_were_exchanged_is_told_by_the_other_files(tmp_path):
 def test_alone_such_a_file_is_open_and_says_what_would_decide(tmp_path):
     made, file = one(tmp_path, exchanged(rolling(-4.0, seed=3)))
     assert file.grade == "column_swap"  # what explains the rows; on which side, nothing says
-    assert file.identification.sides.side == "open"
+    assert file.sides.side == "open"
     assert any("would decide" in finding.message for finding in made.findings)
     assert headline(made).wrong == 0
     assert headline(made).disputed == 1

@@ -18,6 +18,7 @@ from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app
+from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 
 LBF = 4.4482216152605
@@ -69,9 +70,9 @@ def home(tmp_path_factory):
 def test_the_stretch_is_that_between_the_two_sessions(home):
     drift = drift_since(home[1], "m15-r2")
     assert (drift.good_date, drift.failed.session_record) == (dt.date(2019, 1, 1), "m15-r3")
-    told = drift.as_dict()
-    assert (told["failed_date"], told["record_in_use"], told["later_good"]) == ("2021-01-01", "m15-r1", [])
-    assert {one["load"] for one in told["loads"]} == {"FY", "MZ"}
+    assert (drift.failed.date, drift.failed.record) == (dt.date(2021, 1, 1), "m15-r1")
+    assert drift.later_good == ()
+    assert {one.load for one in drift.failed.loads} == {"FY", "MZ"}
 
 
 def test_it_tells_what_the_failing_session_found(home):
@@ -106,7 +107,7 @@ def test_each_test_has_the_share_of_its_days(home, made, workers):
     assert one.FY_N == pytest.approx(share * GROWTH * np.abs(FY_N).max(), rel=1e-4)
     assert one.MZ_Nm == pytest.approx(0.0, abs=1e-3)
     means = FY_N.reshape(5, 10).mean(axis=1)
-    np.testing.assert_allclose([c[2] for c in one.conditions], share * GROWTH * means, rtol=1e-3)
+    np.testing.assert_allclose([c.FY_N for c in one.conditions], share * GROWTH * means, rtol=1e-3)
     assert files["2021-01-01/run"].share == 1.0
 
 
@@ -126,7 +127,7 @@ def test_a_test_has_the_largest_of_its_files(home, made):
     first = drifted_tests(view, (*files, more, none))[0]
     assert (first.files, first.left_out, first.FY_N, first.MZ_Nm) == (3, 1, 1e6, files[0].MZ_Nm)
     alone = drifted_tests(view, (none,))[0]
-    assert alone.as_dict() == {
+    assert json_value(alone) == {
         "test": "2020-01-01", "date": "2020-01-01", "share": none.share, "files": 1, "left_out": 1,
         "FY_max_abs_N": None, "MZ_max_abs_Nm": None,
     }  # fmt: skip

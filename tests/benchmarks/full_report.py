@@ -20,12 +20,12 @@ TEMPLATES = Path(__file__).resolve().parents[2] / "report_templates"
 
 def content(test: Path, home: Path) -> Any:
     """Return the content of a test with its figures and tables repeated."""
-    from toolkit.lab.tire_tests.resolve import resolve_test
+    from toolkit.lab.tire_tests.resolve import Basis, resolve_test
     from toolkit.report.style import Style
     from toolkit.report.test.content import REPORT, build_content
     from toolkit.report.vocabulary import TableEntry
 
-    resolved = resolve_test(test, home=home)
+    resolved = resolve_test(test, Basis(home=home))
     made = build_content(
         resolved.result, resolved.record, findings=resolved.findings, style=Style(laboratory="Bench")
     )

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from tests.recording.fig4_4 import write_fig4_4
 from toolkit.cli.main import _register, app
+from toolkit.declared import json_value
 from toolkit.lab.archives.audit_headline import headline_of
 
 HOME = Path(__file__).resolve().parents[2]
@@ -177,7 +178,7 @@ def test_the_first_line_answers_in_console_page_and_json_and_tables_fit_80_colum
     monkeypatch.setenv("COLUMNS", "80")
     answer = json.loads(run(archive, "--out", tmp_path / "out", "--json").stdout)
     sentence = answer["headline"]["sentence"]
-    assert answer["headline"] == headline_of(answer["files"]).as_dict()
+    assert answer["headline"] == json_value(headline_of(answer["files"]))
     page = (tmp_path / "out" / "audit.html").read_text(encoding="utf-8")
     assert f'<p class="headline">{html.escape(sentence)}.</p>' in page
     lines = run(archive).stdout.splitlines()

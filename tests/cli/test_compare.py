@@ -14,6 +14,7 @@ import pytest
 
 from toolkit.cli.main import run
 from toolkit.lab.home import packaged_home
+from toolkit.lab.tire_tests.resolve import Basis
 
 CALIBRATIONS = packaged_home() / "calibrations"
 
@@ -48,11 +49,10 @@ def reader() -> Callable[..., Any]:
 
     read_test, known = reading._test, {}
 
-    def read(path: Path, *, step: Callable[[str], None], **options: Any) -> Any:
-        key = (path, *options.items())
-        if key not in known:
-            known[key] = read_test(path, step=step, **options)
-        return known[key]
+    def read(path: Path, basis: Basis, step: Callable[[str], None]) -> Any:
+        if (path, basis) not in known:
+            known[path, basis] = read_test(path, basis, step)
+        return known[path, basis]
 
     return read
 

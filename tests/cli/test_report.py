@@ -39,7 +39,7 @@ office_needed = pytest.mark.skipif(
 def resolved(monkeypatch):
     """Make every TEST the synthetic one; the test may change what comes out."""
     made = SimpleNamespace(result=make_result(), record=make_record(), findings=())
-    monkeypatch.setattr(resolve, "resolve_test", lambda _test, **_options: made)
+    monkeypatch.setattr(resolve, "resolve_test", lambda _test, *_basis, **_options: made)
     return made
 
 
@@ -175,7 +175,7 @@ def test_the_hand_over_has_one_manifest_and_the_content_hash_is_the_same_twice(
 ) -> None:
     shown = named("altimax-89", special="=1+1")
     made = resolve.Resolved(result=shown.result, record=shown.record, findings=shown.findings)
-    monkeypatch.setattr(resolve, "resolve_test", lambda _test, **_options: made)
+    monkeypatch.setattr(resolve, "resolve_test", lambda _test, *_basis, **_options: made)
     template = make(tmp_path, p("{{tk:report.date}} {{tk:test.special}}") + p("{{tk:figure.gough}}"))
     out = tmp_path / "out"
     told = []
@@ -229,7 +229,7 @@ def test_the_content_hash_follows_the_content(tmp_path: Path, monkeypatch, capsy
     told = set()
     for operator in ("A. Operator", "B. Operator"):
         made = named("altimax-89", operator=operator)
-        monkeypatch.setattr(resolve, "resolve_test", lambda _test, made=made, **_options: made)
+        monkeypatch.setattr(resolve, "resolve_test", lambda _test, *_basis, made=made, **_options: made)
         command([Path("any")], template=template, out=tmp_path / "out", json=True)
         told.add(answer(capsys)["content_sha256"])
     assert len(told) == 2
@@ -266,7 +266,7 @@ def test_the_protocol_of_a_file_is_what_the_test_is_read_by(tmp_path: Path, monk
     asked: list[object] = []
 
     def read(_test: Path, **options: object) -> object:
-        asked.append(options["protocol"])
+        asked.append(options["basis"].protocol)  # type: ignore[attr-defined]
         raise ConfigError("enough was asked", rule="enough")
 
     monkeypatch.setattr(resolve, "resolve_test", read)

@@ -70,7 +70,7 @@ def test_tables_made_for_a_case_and_answers_of_old_cannot_be_compared() -> None:
 @office_needed
 def test_the_command_refuses_the_one_and_says_the_other(tmp_path: Path, monkeypatch, capsys) -> None:
     resolved = Resolved(result=RESULT, record=make_record(), findings=())
-    monkeypatch.setattr(resolve, "resolve_test", lambda _test, **_options: resolved)
+    monkeypatch.setattr(resolve, "resolve_test", lambda _test, *_basis, **_options: resolved)
     template = make(tmp_path, p("{{tk:diagnosis.verdict}}"))
     out = tmp_path / "out"
 

@@ -11,7 +11,7 @@ import pytest
 from toolkit.cli.main import run
 from toolkit.errors import ToolkitError
 from toolkit.lab.home import packaged_home
-from toolkit.lab.tire_tests.resolve import Resolved, resolve_test
+from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
 from toolkit.simulation.plan import read_plan
 from toolkit.simulation.run import simulate
 from toolkit.simulation.write import write_test
@@ -50,7 +50,7 @@ def made(folder: Path, *speeds: float) -> Path:
 
 
 def resolved(folder: Path) -> Resolved:
-    return resolve_test(folder, calibrations=packaged_home() / "calibrations")
+    return resolve_test(folder, Basis(calibrations=packaged_home() / "calibrations"))
 
 
 @pytest.fixture(scope="module")

@@ -16,13 +16,13 @@ from typing import Any
 
 from toolkit.audit.archive_findings import Across, Lines
 from toolkit.audit.cluster import run_on_cluster
-from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED, TELLS, Grade, Sides
+from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED, TELLS, DisagreeingSides, Grade
 from toolkit.audit.one_file import Auditor, unreadable
 from toolkit.audit.other_files import by_other_files
 from toolkit.audit.resume import Done, Files, Results, done
 from toolkit.audit.sides import statement
 from toolkit.audit.workers import Lost, run_isolated, time_limit
-from toolkit.calibration.registry.registry import Refused, Registry
+from toolkit.calibration.registry.registry import RefusedRecord, Registry
 from toolkit.errors import ConfigError, RegistryError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
@@ -130,7 +130,7 @@ def read_sums(folder: Path, key: str) -> Sums | None:
 def sentence(line: Mapping[str, Any]) -> str:
     """Return in one sentence what computed a file, from its plain answer."""
     if line["sides"] is not None and line["sides"]["side"] != "forces":
-        return statement(Sides(**line["sides"]), line["variant"])
+        return statement(DisagreeingSides(**line["sides"]), line["variant"])
     grade: Grade = line["grade"]
     who = ""
     if line["record"]:
@@ -235,7 +235,7 @@ class ArchiveAudit:
     grades: Mapping[str, int]
     undated: int
     tests: Lines
-    refused: tuple[Refused, ...]
+    refused: tuple[RefusedRecord, ...]
     heads: tuple[tuple[str, str], ...]
     findings: tuple[Finding, ...]
     reused: int = field(compare=False)
@@ -360,7 +360,7 @@ def _same(archive: Path, registry: Registry, day: dt.date, digest: str, version:
 def _judged(
     archive: Path, registry: Registry, day: dt.date, files: Files, sums: Sums, *, reused: int
 ) -> ArchiveAudit:
-    refused: list[Refused] = []
+    refused: list[RefusedRecord] = []
     heads: list[tuple[str, str]] = []
     troubles: list[Finding] = []
     for instrument in sums.instruments:
@@ -402,7 +402,7 @@ def _hash(registry: Registry, day: dt.date) -> str:
     return sha256_bytes("|".join([day.isoformat(), *parts]).encode())
 
 
-def _refusals(refused: list[Refused]) -> list[Finding]:
+def _refusals(refused: list[RefusedRecord]) -> list[Finding]:
     return [
         Finding(rule="refused-record", where=record.id, message=f"left out as a candidate: {record.reason}")
         for record in refused

@@ -13,18 +13,19 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import recompute
-from toolkit.audit.model import CLEAN, INDEX, Sides, columns_of
+from toolkit.audit.model import CLEAN, INDEX, DisagreeingSides, columns_of
 from toolkit.audit.other_files import off_the_curve, test_of
 from toolkit.audit.sides import disputed, statement
 from toolkit.audit.weigh import step_findings
 from toolkit.calibration.registry.registry import instrument_of
 from toolkit.calibration.registry.standing import standing
+from toolkit.declared import Entry, json_value
 from toolkit.errors import OutputError, ToolkitError
 from toolkit.files import real_path, sha256_file
 from toolkit.inputs import RECORDING_FILE, SETTINGS_FILE, read_input
@@ -55,30 +56,18 @@ _DISPUTED = "cells-disagree"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Copy:
-    """One corrected copy; ``reason`` tells why there is none, and then ``sha256`` is None."""
+class CorrectedCopy:
+    """A corrected copy of a file."""
 
     path: str
-    replaces: str
+    replaces_sha256: str
+    sha256: Annotated[str | None, Entry("null where there is none")]
     record: str
     record_sha256: str
-    sha256: str | None
-    reason: str | None = None
-    use: CalibrationUse | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the copy under the keys of the answer."""
-        return {
-            "path": self.path,
-            "replaces_sha256": self.replaces,
-            "sha256": self.sha256,
-            "record": self.record,
-            "record_sha256": self.record_sha256,
-            "reason": self.reason,
-            "unverified": self.use is not None and self.use.unverified,
-            "draft": self.use is not None and self.use.draft,
-            "draft_reasons": list(self.use.draft_reasons) if self.use else [],
-        }
+    reason: Annotated[str | None, Entry("why there is none")]
+    unverified: bool
+    draft: bool
+    draft_reasons: tuple[str, ...]
 
 
 def check_target(archive: Path, target: Path) -> None:
@@ -113,7 +102,7 @@ def write_copies(
     *,
     draft: bool = False,
     step: Callable[[str], None] = lambda _: None,
-) -> tuple[Copy, ...]:
+) -> tuple[CorrectedCopy, ...]:
     """Write the corrected copies of an audited archive and their index, together; return all of them.
 
     Files without a record in force, and those that are right, have no copy; where the record in force may
@@ -127,7 +116,7 @@ def write_copies(
     check_target(audit.archive, target)
     standings: dict[tuple[str, str], Standing] = {}
     strays = _strays(audit)
-    copies: list[Copy] = []
+    copies: list[CorrectedCopy] = []
     with publication(target) as stage:
         for plain in audit.files.plain():
             if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
@@ -153,7 +142,7 @@ def write_copies(
             "schema": 1,
             "known_at": audit.known_at.isoformat(),
             "heads": dict(audit.heads),
-            "files": [copy.as_dict() for copy in copies],
+            "files": json_value(copies),
         }
         (stage / INDEX).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
     return tuple(copies)
@@ -176,7 +165,7 @@ def _strays(audit: ArchiveAudit) -> dict[str, str]:
 def _refusal(plain: Mapping[str, Any], strays: Mapping[str, str]) -> str | None:
     """Return why a file must not be corrected by its cells, None where nothing speaks against it."""
     if disputed(plain):
-        return f"{_DISPUTED}: {statement(Sides(**plain['sides']), plain['variant'])}"
+        return f"{_DISPUTED}: {statement(DisagreeingSides(**plain['sides']), plain['variant'])}"
     stray = strays.get(plain["path"])
     return None if stray is None else f"stray-file: corrected, {stray}"
 
@@ -199,7 +188,7 @@ def _copy(
     *,
     draft: bool,
     refusal: str | None,
-) -> Copy:
+) -> CorrectedCopy:
     record = standing.record
     path, place = archive / plain["path"], stage / plain["path"]
     failed: str | None = None
@@ -223,14 +212,16 @@ def _copy(
         raise
     except ToolkitError as error:
         failed = f"{error.rule}: {error.what}" + (f": {error.got}" if use is None else "")
-    return Copy(
+    return CorrectedCopy(
         path=plain["path"],
-        replaces=plain["sha256"],
+        replaces_sha256=plain["sha256"],
+        sha256=sha256,
         record=record.id,
         record_sha256=record.sha256,
-        sha256=sha256,
         reason=failed,
-        use=use,
+        unverified=use is not None and use.unverified,
+        draft=use is not None and use.draft,
+        draft_reasons=() if use is None else use.draft_reasons,
     )
 
 

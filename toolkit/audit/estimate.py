@@ -15,10 +15,11 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.declared import Entry, Keyed, OrNan
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
@@ -276,50 +277,45 @@ class _Polytope:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Coefficient:
-    """One estimated coefficient, in the file's units; ``low`` and ``high`` None where nothing bounds it."""
+class EstimatedCoefficient:
+    """An estimated coefficient, in the file's units, and what the printed digits allow."""
 
-    name: str
-    value: float
-    low: float | None
-    high: float | None
+    value: OrNan
+    low: Annotated[float | None, Entry("null where nothing bounds it")]
+    high: Annotated[float | None, Entry("null where nothing bounds it")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Equation:
-    """One load as the file has it. ``linear`` tells whether any linear equation gives every row.
+class EstimatedEquation:
+    """The linear equation of a load as the file has it."""
 
-    ``rms`` and ``max_abs`` of the residuals of the least squares, in ``unit``.
-    """
-
-    load: str
     unit: str
-    coefficients: tuple[Coefficient, ...]
-    linear: bool
-    rms: float
-    max_abs: float
+    linear: Annotated[bool, Entry("whether any linear equation gives every row")]
+    rms: Annotated[OrNan, Entry("of the residuals of the least squares")]
+    max_abs: Annotated[OrNan, Entry("of the residuals of the least squares")]
+    coefficients: Annotated[tuple[tuple[str, EstimatedCoefficient], ...], Keyed(), Entry("and the constant")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Nearest:
-    """The record, as it is, whose values come nearest, and how far its worst row lies off [N, N·m]."""
+class NearestRecord:
+    """The record, as it is, whose values come nearest."""
 
     record: str
-    FY_max_abs_N: float | None
-    MZ_max_abs_Nm: float | None
+    FY_max_abs_N: Annotated[float | None, Entry("by which its worst row lies off")]
+    MZ_max_abs_Nm: Annotated[float | None, Entry("by which its worst row lies off")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
-    """``first_row`` to ``last_row`` (from 1): the longest stretch of rows that no candidate explains."""
+class EstimatedCalibration:
+    """What computed the longest stretch of rows that no candidate explains."""
 
-    first_row: int
+    first_row: Annotated[int, Entry("from 1")]
     last_row: int
-    equations: tuple[Equation, ...]
-    nearest: Nearest | None
+    equations: Annotated[tuple[tuple[str, EstimatedEquation], ...], Keyed(), Entry("of each load")]
+    nearest: NearestRecord | None
 
 
-def estimate(columns: Columns, segments: Sequence[Segment], screen: Screen) -> Estimate | None:
+def estimate(columns: Columns, segments: Sequence[Segment], screen: Screen) -> EstimatedCalibration | None:
     """Return the equation of a file's unknown rows; None where there are too few of them."""
     unknown = [segment for segment in segments if segment.grade == "unknown"]
     if not unknown or not columns.loads or not columns.names:
@@ -329,15 +325,15 @@ def estimate(columns: Columns, segments: Sequence[Segment], screen: Screen) -> E
     part = columns.part(rows)
     if part.rows < len(columns.names) + 1 + _MARGIN:
         return None
-    return Estimate(
+    return EstimatedCalibration(
         first_row=longest.first_row,
         last_row=longest.last_row,
-        equations=tuple(_equation(part, load) for load in part.loads),
+        equations=tuple((load, _equation(part, load)) for load in part.loads),
         nearest=_nearest(part, screen),
     )
 
 
-def _equation(part: Columns, load: str) -> Equation:
+def _equation(part: Columns, load: str) -> EstimatedEquation:
     # In parts of a power of two: what a broken channel holds may have no square in double precision.
     largest = math.ldexp(1.0, math.frexp(float(np.abs(part.y[load]).max()))[1] - 1)
     design = np.column_stack([part.x, np.ones(part.rows)])
@@ -346,15 +342,16 @@ def _equation(part: Columns, load: str) -> Equation:
     residual = part.y[load] - design @ solved
     bounds = {interval.name: interval for interval in coefficient_intervals(part, load)}
     names = (*part.names, "constant")
-    return Equation(
-        load=load,
+    return EstimatedEquation(
         unit=part.y_units[load],
         coefficients=tuple(
-            Coefficient(
-                name=name,
-                value=float(value),
-                low=_finite(bounds[name].low) if name in bounds else None,
-                high=_finite(bounds[name].high) if name in bounds else None,
+            (
+                name,
+                EstimatedCoefficient(
+                    value=float(value),
+                    low=_finite(bounds[name].low) if name in bounds else None,
+                    high=_finite(bounds[name].high) if name in bounds else None,
+                ),
             )
             for name, value in zip(names, solved, strict=True)
         ),
@@ -368,10 +365,10 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _nearest(part: Columns, screen: Screen) -> Nearest | None:
+def _nearest(part: Columns, screen: Screen) -> NearestRecord | None:
     from toolkit.audit.identify import recompute
 
-    best: tuple[float, Nearest] | None = None
+    best: tuple[float, NearestRecord] | None = None
     for record in screen.records:
         new = recompute(part, record)
         off = {load: _off(part, load, new[load]) for load in part.loads}
@@ -383,7 +380,7 @@ def _nearest(part: Columns, screen: Screen) -> Nearest | None:
         if best is None or total < best[0]:
             best = (
                 total,
-                Nearest(record=record.id, FY_max_abs_N=off.get("FY"), MZ_max_abs_Nm=off.get("MZ")),
+                NearestRecord(record=record.id, FY_max_abs_N=off.get("FY"), MZ_max_abs_Nm=off.get("MZ")),
             )
     return None if best is None else best[1]
 

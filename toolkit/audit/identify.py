@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.audit.candidates import Group, cannot_correct, describe, group_of
-from toolkit.audit.model import Columns, Grade, Identification, Repair, Segment, Skipped, worst
+from toolkit.audit.model import Columns, Grade, Identification, Repair, Segment, SkippedRecord, worst
 from toolkit.audit.runs import Hit, Partition, Reach, Runs, products, reach_of, without_chance
 from toolkit.audit.screen import Key, Screen, probe_rows, screen_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
@@ -85,7 +85,7 @@ def identify_columns(
         segments=segments,
         in_force=None if judge.in_force is None else judge.in_force.id,
         repair=None if judge.in_force is None else repair(columns, judge.in_force, new),
-        skipped=tuple(Skipped(id=i, reason=r) for i, r in judge.screen.reasons if r is not None),
+        skipped=tuple(SkippedRecord(id=i, reason=r) for i, r in judge.screen.reasons if r is not None),
     )
 
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.registry import Refused, Registry
+    from toolkit.calibration.registry.registry import RefusedRecord, Registry
     from toolkit.calibration.registry.status import RecordStatus
     from toolkit.recording.model import Recording
 
@@ -67,7 +67,7 @@ class Choice:
     """What the registry offers for an instrument and a day."""
 
     records: tuple[CalibrationRecord, ...]
-    refused: tuple[Refused, ...]
+    refused: tuple[RefusedRecord, ...]
     statuses: tuple[RecordStatus, ...]
     in_force: CalibrationRecord | None
     today: CalibrationRecord | None

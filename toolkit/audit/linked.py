@@ -13,10 +13,11 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
 from toolkit.audit.sides import disputed
+from toolkit.declared import Entry, derived
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.files import check_keys, parse_json, real_path
 from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
@@ -34,43 +35,31 @@ _SHA = re.compile(r"[0-9a-fA-F]{64}")
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class PastReport:
-    """A report and what it says of its origin; ``words`` are those in which a test's name may stand.
+class RestingReport:
+    """A report that rests on files of the archive.
 
-    ``id`` is that of its manifest; ``tests``, ``files``, ``not_clean``, ``disputed`` and ``in_force``, the
-    records in force on the days of its tests, are filled when it is linked.
+    ``words`` are those in which a test's name may stand, of a document at ``path`` in a folder; ``names`` of
+    tests and ``hashes`` of recordings are what it says of its origin. The rest is filled when it is linked.
     """
 
     report: str
-    id: str | None = None
-    path: Path | None = None  # of a document that was found in a folder
-    words: str | None = None
-    names: set[str] = field(default_factory=set)
-    hashes: set[str] = field(default_factory=set)
-    calibrations: tuple[str, ...] = ()
+    id: Annotated[str | None, Entry("of its manifest")] = None
+    path: Annotated[Path | None, Entry(output=False)] = None
+    words: Annotated[str | None, Entry(output=False)] = None
+    names: Annotated[set[str], Entry(output=False)] = field(default_factory=set)
+    hashes: Annotated[set[str], Entry(output=False)] = field(default_factory=set)
     linked_by: set[str] = field(default_factory=set)
+    calibrations: Annotated[tuple[str, ...], Entry("that it names")] = ()
     tests: set[str] = field(default_factory=set)
     files: int = 0
     not_clean: int = 0
-    disputed: int = 0
-    in_force: set[str] = field(default_factory=set)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the report under the keys of the answer."""
-        return {
-            "report": self.report,
-            "id": self.id,
-            "linked_by": sorted(self.linked_by),
-            "calibrations": list(self.calibrations),
-            "tests": sorted(self.tests),
-            "files": self.files,
-            "not_clean": self.not_clean,
-            "disputed": self.disputed,
-            "in_force": sorted(self.in_force),
-            "to_amend": self.to_amend,
-        }
+    disputed: Annotated[int, Entry("files whose cells were changed, or may have been")] = 0
+    in_force: Annotated[set[str], Entry("records in force on the days of its tests")] = field(
+        default_factory=set
+    )
 
     @property
+    @derived()
     def to_amend(self) -> bool:
         """Whether it rests on values that are not those of the records in force.
 
@@ -86,7 +75,7 @@ class PastReport:
 class Linked:
     """Every report, and the tests of the archive that no report rests on (*report unknown*)."""
 
-    reports: tuple[PastReport, ...]
+    reports: tuple[RestingReport, ...]
     unknown: tuple[str, ...]
 
     def of_test(self, test: str | None) -> list[str]:
@@ -94,7 +83,7 @@ class Linked:
         return [report.report for report in self.reports if test in report.tests]
 
 
-def read_reports(source: Path) -> tuple[PastReport, ...]:
+def read_reports(source: Path) -> tuple[RestingReport, ...]:
     """Return the reports that a folder holds, or a CSV file names; no link is followed.
 
     Raises
@@ -107,10 +96,10 @@ def read_reports(source: Path) -> tuple[PastReport, ...]:
     return tuple(_of_csv(source))
 
 
-def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
+def link(audit: ArchiveAudit, reports: tuple[RestingReport, ...]) -> Linked:
     """Link reports to the tests of an audited archive, each report by all that it says."""
     reports = _but_recordings(audit, reports)
-    by_hash: dict[str, list[PastReport]] = {}
+    by_hash: dict[str, list[RestingReport]] = {}
     for report in reports:
         for sha256 in report.hashes:
             by_hash.setdefault(sha256, []).append(report)
@@ -147,7 +136,7 @@ def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
     return Linked(reports=reports, unknown=tuple(sorted(set(tests) - with_report)))
 
 
-def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tuple[PastReport, ...]:
+def _but_recordings(audit: ArchiveAudit, reports: tuple[RestingReport, ...]) -> tuple[RestingReport, ...]:
     """Return the reports without the archive's own recordings, which may stand in the same folder."""
     if all(report.path is None for report in reports):
         return reports
@@ -158,7 +147,7 @@ def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tup
     return tuple(report for report in reports if report.path is None or report.path not in recordings)
 
 
-def _by_name(past_report: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
+def _by_name(past_report: RestingReport, names: Mapping[str, list[str]]) -> Iterator[str]:
     if past_report.linked_by & {"manifest", "sha256"}:
         return  # what a report says of its files is better than what it is called
     texts = [_words(name) for name in past_report.names] if past_report.names else [past_report.words or ""]
@@ -179,7 +168,7 @@ def _words(text: str) -> str:
     return " ".join(re.findall(r"[^\W_]+", text.casefold()))
 
 
-def _of_csv(source: Path) -> Iterator[PastReport]:
+def _of_csv(source: Path) -> Iterator[RestingReport]:
     try:
         lines, _ = read_lines(read_input(source, LIST_FILE), _COLUMNS.__contains__, where=source)
     except UnreadableError as error:
@@ -188,7 +177,7 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
     check_keys(dict.fromkeys(header), _COLUMNS, where=source)
     if "report" not in header or len(header) < 2:
         raise _bad(source, ", ".join(header) or "nothing", "the columns report and test, sha256, or both")
-    past_reports: dict[str, PastReport] = {}
+    past_reports: dict[str, RestingReport] = {}
     for number, cells in lines[1:]:
         row = dict(zip(header, cells, strict=False))
         name = (row.get("report") or "").strip()
@@ -197,13 +186,13 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
             raise _bad(source, f"row {number}: no report, or neither test nor sha256", "both in every row")
         if sha256 and not _SHA.fullmatch(sha256):
             raise _bad(source, f"row {number}: {sha256[:80]!r}", "64 hexadecimal digits")
-        report = past_reports.setdefault(name, PastReport(report=name))
+        report = past_reports.setdefault(name, RestingReport(report=name))
         report.names |= {test} - {""}
         report.hashes |= {sha256.lower()} - {""}
     yield from past_reports.values()
 
 
-def _of_folder(folder: Path) -> Iterator[PastReport]:
+def _of_folder(folder: Path) -> Iterator[RestingReport]:
     for place, folders, names in os.walk(folder):
         if {PENDING, ENTERING} & {*folders}:
             settle(Path(place))
@@ -220,14 +209,14 @@ def _of_folder(folder: Path) -> Iterator[PastReport]:
             path = Path(place) / name
             if path.suffix.lower() in DOCUMENTS and name not in output_names and not path.is_symlink():
                 shown = path.relative_to(folder)
-                yield PastReport(
+                yield RestingReport(
                     report=shown.as_posix(),
                     path=real_path(path),
                     words=_words(shown.with_suffix("").as_posix()),
                 )
 
 
-def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
+def _manifest(path: Path, folder: Path) -> tuple[RestingReport, set[str]] | None:
     if path.is_symlink():
         return None
     try:
@@ -237,7 +226,7 @@ def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
     if not isinstance(manifest, dict) or manifest.get("generator") != GENERATOR or "inputs" not in manifest:
         return None
     outputs = {output.get("name") for output in _dicts(manifest.get("outputs"))}
-    past_report = PastReport(
+    past_report = RestingReport(
         report=path.parent.relative_to(folder).as_posix(),
         id=str(manifest.get("report")),
         hashes={

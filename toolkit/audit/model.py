@@ -5,10 +5,11 @@ MZ.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import numpy as np
 
+from toolkit.declared import Entry
 from toolkit.recording.digits import roundings
 
 if TYPE_CHECKING:
@@ -115,33 +116,27 @@ def columns_of(recording: Recording) -> Columns:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
-    """Rows that one calibration computed; rows count from 1 at the first data row.
+    """Rows that one record computed."""
 
-    ``record`` is None where unknown or ambiguous; ``candidates`` lists the ids of an ambiguous segment.
-    """
-
-    first_row: int
+    first_row: Annotated[int, Entry("from 1 at the first row of data")]
     last_row: int
-    record: str | None
-    variant: str | None
+    record: Annotated[str | None, Entry("null where it is unknown or ambiguous")]
+    variant: Annotated[str | None, Entry("how the record was changed: E5 negative in FY, MZ")]
     grade: Grade
-    candidates: tuple[str, ...] = ()
+    candidates: Annotated[tuple[str, ...], Entry("of an ambiguous segment")] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repair:
-    """Largest |recomputed by the record in force - value in the file| of FY [N] and MZ [N·m].
+    """The largest difference between the file and the record in force."""
 
-    None where the file has no such column.
-    """
-
-    FY_max_abs_N: float | None
-    MZ_max_abs_Nm: float | None
+    FY_max_abs_N: Annotated[float | None, Entry("null where the file has no such column")]
+    MZ_max_abs_Nm: Annotated[float | None, Entry("null where the file has no such column")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Skipped:
-    """A record that is no candidate for this file, and why."""
+class SkippedRecord:
+    """A record that could not be a candidate."""
 
     id: str
     reason: str
@@ -151,12 +146,12 @@ Which = Literal["forces", "cells", "open"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sides:
-    """Which side of a disagreement is wrong, why, and the grade of the file if it is Fy and Mz."""
+class DisagreeingSides:
+    """Which side is wrong where Fy and Mz disagree with the cells beside them."""
 
     side: Which
     reason: str
-    grade: Grade
+    grade: Annotated[Grade, Entry("of the file if Fy and Mz are the wrong side")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,8 +173,8 @@ class Identification:
     segments: tuple[Segment, ...]
     in_force: str | None
     repair: Repair | None
-    skipped: tuple[Skipped, ...] = ()
-    sides: Sides | None = None
+    skipped: tuple[SkippedRecord, ...] = ()
+    sides: DisagreeingSides | None = None
 
 
 def worst(grades: tuple[Grade, ...]) -> Grade:

@@ -9,22 +9,23 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 
 from toolkit.audit.candidates import cannot_correct
 from toolkit.audit.context import Context, MachineSource, context_of
-from toolkit.audit.estimate import Estimate, estimate
+from toolkit.audit.estimate import EstimatedCalibration, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.inspection import Choices
-from toolkit.audit.model import INDEX, Grade, Identification, columns_of
+from toolkit.audit.model import INDEX, DisagreeingSides, Grade, Repair, Segment, SkippedRecord, columns_of
 from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.structure import structure_findings
 from toolkit.audit.weigh import steps, weighed
 from toolkit.calibration.registry.clock import in_future
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
+from toolkit.declared import Entry, Keyed, OrNan
 from toolkit.errors import ToolkitError
 from toolkit.files import parse_json, read_toml, sha256_bytes, sha256_file
 from toolkit.findings import Finding
@@ -51,24 +52,22 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
-    """One load block: its rows (from 1), its means as the file has them, and new minus old [N, N·m].
+class ArchivedCondition:
+    """The mean of a load block of a file, and what the record in force changes.
 
-    In the machine's axes. ``SA_deg`` is None without that channel; ``FY_N`` and ``MZ_Nm`` without the
-    file's own; the changes without a record in force. ``step_SA_deg`` and ``step_FZ_N`` are the nominal
-    condition of the machine's protocol, None where it has none so near.
+    In the machine's axes; what it changes is new minus old.
     """
 
-    first_row: int
+    first_row: Annotated[int, Entry("from 1")]
     last_row: int
-    SA_deg: float | None
-    FZ_N: float
-    FY_N: float | None
-    MZ_Nm: float | None
-    FY_change_N: float | None
-    MZ_change_Nm: float | None
-    step_SA_deg: float | None
-    step_FZ_N: float | None
+    SA_deg: Annotated[float | None, Entry("null without that channel")]
+    FZ_N: OrNan
+    FY_N: Annotated[float | None, Entry("null where the file has none of its own")]
+    MZ_Nm: Annotated[float | None, Entry("null where the file has none of its own")]
+    FY_change_N: Annotated[float | None, Entry("null without a record in force")]
+    MZ_change_Nm: Annotated[float | None, Entry("null without a record in force")]
+    step_SA_deg: Annotated[float | None, Entry("slip angle of the protocol's step; null where none is near")]
+    step_FZ_N: Annotated[float | None, Entry("load of the protocol's step; null where none is near")]
 
 
 def changes(
@@ -76,7 +75,7 @@ def changes(
     columns: Columns,
     blocks: Sequence[Block],
     new: Mapping[str, NDArray[np.float64]] | None,
-) -> tuple[Change, ...]:
+) -> tuple[ArchivedCondition, ...]:
     """Return what the record in force would change in a recording's load blocks.
 
     ``new`` are FY [N] and MZ [N·m] by that record (`toolkit.audit.identify.recompute`), None without one.
@@ -96,7 +95,7 @@ def changes(
     means = dict(zip(rows, table.T.tolist(), strict=True))
     nothing = [None] * len(blocks)
     return tuple(
-        Change(
+        ArchivedCondition(
             first_row=block.start + 1,
             last_row=block.stop,
             SA_deg=None if SA is None else math.degrees(SA),
@@ -115,46 +114,52 @@ def changes(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FileAudit:
-    """What is known of one file. ``path`` is relative to the archive, with ``/``.
+class ArchivedNote:
+    """What a person should know of a file."""
 
-    ``identification`` is None where the file is unreadable; ``reason`` then begins with the rule that
-    refused it.
-    ``context`` tells why its test.toml could not be used, None where it could or there is none. ``test`` is
-    the folder of its test.toml, relative to the archive (``.``: at or above it); ``to_SAE`` the sign that
-    each channel has in SAE axes, ``own_protocol`` whether the test declares another than the machine's.
-    ``units`` are those of its columns by symbol, ``values_sha256`` the hash of its numbers whatever the file
-    around them. ``modified`` is the day on which the file, by its own properties, was last saved.
-    ``changes`` are its load blocks, ``estimate`` its own equation where no record explains it, ``notes``
-    what else its rows show.
-    """
+    rule: str
+    message: str
 
-    path: str
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArchivedFile:
+    """A file of an archive: which calibration computed it, and what the right one changes."""
+
+    path: Annotated[str, Entry("relative to the archive, with /")]
     sha256: str | None
     size: int | None
-    instrument: str | None
-    date: dt.date | None
-    rows: int | None
-    identification: Identification | None
-    reason: str | None
-    context: str | None = None
-    test: str | None = None
+    instrument: str | None = None
+    date: dt.date | None = None
+    test: Annotated[str | None, Entry("folder of its test.toml; . at or above the archive")] = None
     rotation: Rotation = "forward"
-    to_SAE: tuple[tuple[str, int], ...] = ()
-    own_protocol: bool = False
-    units: tuple[tuple[str, str], ...] = ()
-    values_sha256: str | None = None
-    modified: dt.date | None = None
-    changes: tuple[Change, ...] = ()
-    estimate: Estimate | None = None
-    notes: tuple[Finding, ...] = ()
-
-    @property
-    def grade(self) -> Grade:
-        """The file's grade."""
-        if self.identification is not None:
-            return self.identification.grade
-        return "no_recording" if (self.reason or "").startswith(f"{NO_RECORDING}:") else "unreadable"
+    to_SAE: Annotated[
+        tuple[tuple[str, int], ...], Keyed(), Entry("sign of each channel on the way to SAE axes")
+    ] = ()
+    own_protocol: Annotated[bool, Entry("whether its test declares another than the machine's")] = False
+    rows: int | None = None
+    grade: Grade
+    record: str | None = None
+    variant: Annotated[str | None, Entry("how the record was changed: E5 negative in FY, MZ")] = None
+    issued: Annotated[bool | None, Entry("whether the coefficients were those of the certificate")] = None
+    candidates: Annotated[tuple[str, ...], Entry("of an ambiguous file")] = ()
+    segments: tuple[Segment, ...] = ()
+    sides: Annotated[
+        DisagreeingSides | None, Entry("where rows disagree with their cells: which side is wrong")
+    ] = None
+    in_force: Annotated[str | None, Entry("the record in force on the date of the test")] = None
+    repair: Repair | None = None
+    conditions: tuple[ArchivedCondition, ...] = ()
+    estimate: Annotated[
+        EstimatedCalibration | None, Entry("of an unknown calibration: what the digits prove of it")
+    ] = None
+    skipped: tuple[SkippedRecord, ...] = ()
+    reason: Annotated[str | None, Entry("why it cannot be read or judged; it may begin with a rule")]
+    test_toml: Annotated[str | None, Entry("what is wrong with its test.toml")] = None
+    units: Annotated[tuple[tuple[str, str], ...], Keyed(), Entry("of its channels")] = ()
+    values_sha256: Annotated[str | None, Entry("of its numbers, whatever the file around them")] = None
+    modified: Annotated[dt.date | None, Entry("day on which it was last saved, by its own properties")] = None
+    notes: tuple[ArchivedNote, ...] = ()
+    reports: Annotated[tuple[str, ...] | None, Entry("that rest on its test", sparse=True)] = None
 
 
 NO_RECORDING = "no-recording"
@@ -202,7 +207,7 @@ class Auditor:
         self._copies = functools.lru_cache(maxsize=256)(_copies_of)
         self._find = lambda path: nearest(path.parent)  # what is no folder holds no test.toml
 
-    def __call__(self, name: str) -> FileAudit | OwnOutput:
+    def __call__(self, name: str) -> ArchivedFile | OwnOutput:
         """Audit one file by its path in the archive; what it holds never raises."""
         path = self.archive / name
         try:
@@ -254,16 +259,25 @@ class Auditor:
         direction = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
         sae = signs(context.machine.axes, "SAE", direction)
         changed = changes(loaded, columns, blocks, new)
-        return FileAudit(
+        return ArchivedFile(
             path=name,
             sha256=recording.sha256,
             size=size,
             instrument=instrument,
             date=context.date,
             rows=recording.rows,
-            identification=identification,
+            grade=identification.grade,
+            record=identification.record,
+            variant=identification.variant,
+            issued=identification.issued,
+            candidates=identification.candidates,
+            segments=identification.segments,
+            sides=identification.sides,
+            in_force=identification.in_force,
+            repair=identification.repair,
+            skipped=identification.skipped,
             reason=None if columns.loads else "no-own-values: the file has no FY and no MZ of its own",
-            context=trouble,
+            test_toml=trouble,
             test=None if context.test_toml is None else self._test(context.test_toml),
             rotation=rotation,
             to_SAE=tuple(sae.items()),
@@ -271,20 +285,23 @@ class Auditor:
             units=tuple((channel.symbol, channel.unit) for channel in recording.series),
             values_sha256=sha256_bytes(b"".join(channel.values.tobytes() for channel in recording.series)),
             modified=recording.saved,
-            changes=changed,
+            conditions=changed,
             estimate=estimate(columns, identification.segments, screen)
             if identification.grade == "unknown"
             else None,
-            notes=(
-                *_impossible(name, recording, changed, in_force.id if in_force is not None else None),
-                *quality(recording, name),
-                *_tare(loaded, context, name),
-                *steps(loaded, columns, blocks, name),
-                *structure_findings(
-                    [asdict(change) for change in changed], context.machine.protocol.load_tolerance, name
-                ),
-                *self._copied(path, data or b"", recording.sha256, name),
-                *hidden_findings(recording.hidden, name),
+            notes=tuple(
+                ArchivedNote(rule=finding.rule, message=finding.message)
+                for finding in (
+                    *_impossible(name, recording, changed, in_force.id if in_force is not None else None),
+                    *quality(recording, name),
+                    *_tare(loaded, context, name),
+                    *steps(loaded, columns, blocks, name),
+                    *structure_findings(
+                        [asdict(change) for change in changed], context.machine.protocol.load_tolerance, name
+                    ),
+                    *self._copied(path, data or b"", recording.sha256, name),
+                    *hidden_findings(recording.hidden, name),
+                )
             ),
         )
 
@@ -345,7 +362,7 @@ def _tare(recording: Recording, context: Context, name: str) -> tuple[Finding, .
 
 
 def _impossible(
-    name: str, recording: Recording, blocks: tuple[Change, ...], in_force: str | None
+    name: str, recording: Recording, blocks: tuple[ArchivedCondition, ...], in_force: str | None
 ) -> tuple[Finding, ...]:
     rows = [f"rows {b.first_row}-{b.last_row}" for b in blocks]
     IA = inclinations(recording, [(b.first_row - 1, b.last_row) for b in blocks])
@@ -375,9 +392,7 @@ def unreadable(
     sha256: str | None = None,
     size: int | None = None,
     context: str | None = None,
-) -> FileAudit:
+) -> ArchivedFile:
     """Return the row of a file that cannot be read; ``reason`` begins with a rule id."""
-    return FileAudit(
-        path=name, sha256=sha256, size=size, instrument=None, date=None, rows=None, identification=None,
-        reason=reason, context=context,
-    )  # fmt: skip
+    grade: Grade = "no_recording" if reason.startswith(f"{NO_RECORDING}:") else "unreadable"
+    return ArchivedFile(path=name, sha256=sha256, size=size, grade=grade, reason=reason, test_toml=context)

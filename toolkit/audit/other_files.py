@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.audit.model import Sides, Which
+from toolkit.audit.model import DisagreeingSides, Which
 from toolkit.reduction.physics import RULES, Readings, departures
 from toolkit.reduction.strays import off_curve
 
@@ -46,7 +46,7 @@ class OnCurve:
     MZ: float
 
 
-def by_other_files(files: Files) -> dict[str, Sides]:
+def by_other_files(files: Files) -> dict[str, DisagreeingSides]:
     """Return the side of every file that its own rows leave open and the other files of its test decide."""
     places: dict[str, list[int]] = {}
     asked: set[str] = set()
@@ -55,7 +55,7 @@ def by_other_files(files: Files) -> dict[str, Sides]:
         places.setdefault(key, []).append(place)
         if line["sides"] is not None and line["sides"]["side"] == "open":
             asked.add(key)
-    answers: dict[str, Sides] = {}
+    answers: dict[str, DisagreeingSides] = {}
     for key in sorted(asked):
         answers |= _of_test([files.line(place) for place in places[key]])
     return answers
@@ -68,12 +68,11 @@ def test_of(line: Mapping[str, Any]) -> str:
 
 def off_the_curve(lines: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """Return the files of a test whose corrected values lie off the curve of the others: path to message."""
-    told: dict[str, str] = {}
-    points = [p for line in lines for p in _points(line, computed=not _keeps_recorded(line))]
-    for channel in ("FY", "MZ"):
-        for path, message in off_curve(points, channel).items():
-            told.setdefault(path, message)
-    return told
+    return _off_curve([p for line in lines for p in _points(line, computed=not _keeps_recorded(line))])
+
+
+def _off_curve(points: Sequence[OnCurve]) -> dict[str, str]:
+    return off_curve(points, "MZ") | off_curve(points, "FY")
 
 
 def _keeps_recorded(line: Mapping[str, Any]) -> bool:
@@ -106,8 +105,8 @@ def _points(line: Mapping[str, Any], *, computed: bool) -> list[OnCurve]:
     return points
 
 
-def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
-    judged: dict[str, Sides] = {}
+def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, DisagreeingSides]:
+    judged: dict[str, DisagreeingSides] = {}
     open_lines = [line for line in lines if _side(line) == "open"]
     kinds = Counter(_kind(line) for line in lines if line["sides"] is not None)
     # What most files of a test agree on takes no curve: a fit of the others for each side of each file.
@@ -119,12 +118,14 @@ def _of_test(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
         if told is not None:
             side, reason = told
             judged |= {
-                line["path"]: Sides(side=side, reason=reason, grade=line["sides"]["grade"]) for line in alike
+                line["path"]: DisagreeingSides(side=side, reason=reason, grade=line["sides"]["grade"])
+                for line in alike
             }
     left = [line for line in open_lines if line["path"] not in judged]
     if len(left) * _MOST <= len(lines):
+        curves: dict[tuple[bool, ...], dict[str, str]] = {}
         for line in left:
-            verdict = _by_curve(line, lines)
+            verdict = _by_curve(line, lines, curves)
             if verdict is not None:
                 judged[line["path"]] = verdict
     return _by_folders([line for line in lines if line["path"] not in judged]) | judged
@@ -142,24 +143,26 @@ def _kind(line: Mapping[str, Any]) -> tuple[str, str | None, str | None] | None:
     return line["sides"]["grade"], line["record"], line["variant"]
 
 
-def _by_curve(line: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> Sides | None:
-    # In every world, whatever the other open files hold.
+def _by_curve(
+    line: Mapping[str, Any],
+    lines: Sequence[Mapping[str, Any]],
+    curves: dict[tuple[bool, ...], dict[str, str]],
+) -> DisagreeingSides | None:
+    # In every world, whatever the other open files hold; ``curves`` are those that were asked already.
     answers: set[Which] = set()
     messages: list[str] = []
     for world in (_COMPUTED, _RECORDED):
-        others = [
-            p
-            for other in lines
-            if other["path"] != line["path"]
-            for p in _points(other, computed=world if _side(other) == "open" else _side(other) != "cells")
-        ]
         stray: dict[bool, str] = {}
         for mine in (_COMPUTED, _RECORDED):
-            points = [*others, *_points(line, computed=mine)]
-            for channel in ("FY", "MZ"):
-                message = off_curve(points, channel).get(line["path"])
-                if message is not None:
-                    stray.setdefault(mine, message)
+            sides = tuple(
+                mine if other is line else world if _side(other) == "open" else _side(other) != "cells"
+                for other in lines
+            )
+            if sides not in curves:
+                of_each = zip(lines, sides, strict=True)
+                curves[sides] = _off_curve([p for one, side in of_each for p in _points(one, computed=side)])
+            if line["path"] in curves[sides]:
+                stray[mine] = curves[sides][line["path"]]
         if len(stray) != 1:
             return None
         answers.add("cells" if _COMPUTED in stray else "forces")
@@ -168,7 +171,7 @@ def _by_curve(line: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> Si
         return None
     side = answers.pop()
     of = "by the cells" if side == "cells" else "as recorded"
-    return Sides(side=side, reason=f"{of}, {messages[0]}", grade=line["sides"]["grade"])
+    return DisagreeingSides(side=side, reason=f"{of}, {messages[0]}", grade=line["sides"]["grade"])
 
 
 def _by_company(
@@ -183,13 +186,13 @@ def _by_company(
     return "forces", f"{others}, and {decided[0]['path']} shows that Fy and Mz are wrong"
 
 
-def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
+def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, DisagreeingSides]:
     """Return the files of folders in which all agree on one change of all their rows, and none decides."""
     folders: dict[str, list[Mapping[str, Any]]] = {}
     for line in lines:
         if line["segments"]:
             folders.setdefault(line["path"].rpartition("/")[0], []).append(line)
-    judged: dict[str, Sides] = {}
+    judged: dict[str, DisagreeingSides] = {}
     for beside in folders.values():
         kinds = {_kind(line) for line in beside}
         kind = next(iter(kinds))
@@ -202,7 +205,8 @@ def _by_folders(lines: Sequence[Mapping[str, Any]]) -> dict[str, Sides]:
             "computes them: by hand a column would have been changed in each"
         )
         judged |= {
-            line["path"]: Sides(side="forces", reason=reason, grade=line["sides"]["grade"]) for line in beside
+            line["path"]: DisagreeingSides(side="forces", reason=reason, grade=line["sides"]["grade"])
+            for line in beside
         }
     return judged
 

@@ -24,10 +24,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, overload
 
-from toolkit.audit.model import Sides
-from toolkit.audit.one_file import FileAudit, OwnOutput
-from toolkit.audit.serial import SHAPE, from_plain, to_plain
+from toolkit.audit.model import DisagreeingSides
+from toolkit.audit.one_file import ArchivedFile, OwnOutput
 from toolkit.audit.sides import grade_of
+from toolkit.declared import json_value, object_of
 from toolkit.errors import OutputError
 from toolkit.files import sha256_bytes, sha256_file
 from toolkit.inputs import SETTINGS_FILE, open_regular_to_append, raised_to, read_regular
@@ -37,6 +37,8 @@ from toolkit.system import WITHOUT_WAITING, lock_file
 from toolkit.version import __version__
 
 RESULTS = "results.jsonl"
+SHAPE = 6
+"""Of an `ArchivedFile` as it is kept; results of another one are not used again."""
 _HEADER = (json.dumps({"generator": GENERATOR, "marks": OWN_OUTPUT}) + "\n").encode()
 _REST, _END = b', "result": ', b"}\n"
 _HASHING = 4  # threads; reading and hashing leave the interpreter free
@@ -52,24 +54,24 @@ class Done:
     body: bytes
 
 
-def done(result: FileAudit | OwnOutput) -> Done:
+def done(result: ArchivedFile | OwnOutput) -> Done:
     """Return a result as it is kept."""
     if isinstance(result, OwnOutput):
         return Done(result.sha256, b"null")
     # What a library would have read is asked again: it may be installed by then.
     lacking = result.reason is not None and result.reason.startswith("missing-extra")
-    return Done(None if lacking else result.sha256, json.dumps(to_plain(result)).encode())
+    return Done(None if lacking else result.sha256, json.dumps(json_value(result)).encode())
 
 
-class Files(Sequence[FileAudit]):
+class Files(Sequence[ArchivedFile]):
     """The results of an audit, sorted by path, read from the disk when they are asked for."""
 
     def __init__(self, file: IO[bytes], places: Sequence[int]) -> None:
         self._file, self._places = file, places
-        self._sides: dict[str, Sides] = {}
+        self._sides: dict[str, DisagreeingSides] = {}
         weakref.finalize(self, file.close)
 
-    def decide(self, sides: Mapping[str, Sides]) -> None:
+    def decide(self, sides: Mapping[str, DisagreeingSides]) -> None:
         """Take what the other files of a test say of files that their own rows leave open, by path."""
         self._sides.update(sides)
 
@@ -81,17 +83,17 @@ class Files(Sequence[FileAudit]):
         return len(self._places)
 
     @overload
-    def __getitem__(self, index: int) -> FileAudit: ...
+    def __getitem__(self, index: int) -> ArchivedFile: ...
     @overload
-    def __getitem__(self, index: slice) -> tuple[FileAudit, ...]: ...
-    def __getitem__(self, index: int | slice) -> FileAudit | tuple[FileAudit, ...]:
+    def __getitem__(self, index: slice) -> tuple[ArchivedFile, ...]: ...
+    def __getitem__(self, index: int | slice) -> ArchivedFile | tuple[ArchivedFile, ...]:
         """Return one result, or some."""
         if isinstance(index, slice):
-            return tuple(from_plain(self._plain(place)) for place in self._places[index])
-        return from_plain(self._plain(self._places[index]))
+            return tuple(object_of(ArchivedFile, self._plain(place)) for place in self._places[index])
+        return object_of(ArchivedFile, self._plain(self._places[index]))
 
-    def __iter__(self) -> Iterator[FileAudit]:
-        return (from_plain(line) for line in self.plain())
+    def __iter__(self) -> Iterator[ArchivedFile]:
+        return (object_of(ArchivedFile, line) for line in self.plain())
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Files):

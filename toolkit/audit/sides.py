@@ -8,7 +8,7 @@ give the same numbers. What needs no record can, and each side is held against i
 - continuity: where the explanation changes in mid-block, load and slip angle stand still, so that whatever
   steps there was changed there;
 - the curve over load, which the blocks of sound rows make and the others must lie on;
-- the other files of the test (`toolkit.audit.tests_sides`).
+- the other files of the test (`toolkit.audit.other_files`).
 
 What both sides pass, or both fail, is open, and stays so.
 """
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.audit.model import Grade, Identification, Segment, Sides, Which
+from toolkit.audit.model import DisagreeingSides, Grade, Identification, Segment, Which
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,7 +78,9 @@ def judge(
         if identification.grade == "stale":
             return identification
         reason = "a changed cell column would show in the same way in Fy and Mz"
-        return decided(identification, Sides(side="forces", reason=reason, grade=identification.grade))
+        return decided(
+            identification, DisagreeingSides(side="forces", reason=reason, grade=identification.grade)
+        )
     votes: list[tuple[Which, str]] = []
     if impossible == (True, False):
         votes.append(("forces", "the recorded values are impossible for a tire, those by the cells are not"))
@@ -91,19 +93,21 @@ def judge(
     sides = {side for side, _ in votes}
     reason = "; ".join(dict.fromkeys(text for _, text in votes))
     if len(sides) == 1:
-        return decided(identification, Sides(side=sides.pop(), reason=reason, grade=identification.grade))
+        return decided(
+            identification, DisagreeingSides(side=sides.pop(), reason=reason, grade=identification.grade)
+        )
     if not votes and identification.grade == "stale":
         return identification  # a record that was once in force needs no other explanation
     reason = f"the evidence speaks for both: {reason}" if votes else "both are possible for a tire"
-    return decided(identification, Sides(side="open", reason=reason, grade=identification.grade))
+    return decided(identification, DisagreeingSides(side="open", reason=reason, grade=identification.grade))
 
 
-def decided(identification: Identification, sides: Sides) -> Identification:
+def decided(identification: Identification, sides: DisagreeingSides) -> Identification:
     """Return an identification under the grade that a judgement of the sides gives it."""
     return replace(identification, grade=grade_of(sides), sides=sides)
 
 
-def grade_of(sides: Sides) -> Grade:
+def grade_of(sides: DisagreeingSides) -> Grade:
     """Return the grade of a file by what is known of the side that is wrong.
 
     What explains the rows stays told where nothing says on which side it lies.
@@ -121,7 +125,7 @@ def disputed(line: Mapping[str, Any]) -> bool:
     return sides is not None and sides["side"] != "forces"
 
 
-def statement(sides: Sides, how: str | None) -> str:
+def statement(sides: DisagreeingSides, how: str | None) -> str:
     """Return in words what the side means; ``how`` is the change that explains the rows, if any does."""
     change = f" ({how})" if how else ""
     if sides.side == "cells":

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from toolkit.audit.model import columns_of
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.calibration.control.as_found import AsFound, as_found, as_found_history, phase_of
 from toolkit.calibration.registry.registry import Registry, instrument_of
+from toolkit.declared import Entry, OrNan
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.recording.read import read_recording
 from toolkit.reduction.prepare_rows import split_blocks
@@ -65,81 +66,41 @@ class Drift:
         )
         return f"on {self.failed.date}, {self.failed.session_record} found {self.failed.record}: {off}"
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the stretch under the keys of the answer."""
-        return {
-            "instrument": self.instrument,
-            "good": self.good,
-            "good_date": self.good_date.isoformat(),
-            "failed": self.failed.session_record,
-            "failed_date": self.failed.date.isoformat(),
-            "record_in_use": self.failed.record,
-            "later_good": list(self.later_good),
-            "loads": [
-                {"load": o.load, "unit": o.unit, "max_error": o.max_error, "tolerance": o.tolerance}
-                for o in self.failed.loads
-            ],
-        }
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftedConditions:
+    """The share of the change in a load block."""
+
+    first_row: int
+    last_row: int
+    FY_N: OrNan
+    MZ_Nm: OrNan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftedFile:
-    """A recording of the stretch: its share of the days, and its share of the change.
-
-    ``FY_N`` and ``MZ_Nm`` are the largest of any row, ``conditions`` the means of the load blocks as
-    (first row, last row, FY [N], MZ [N·m]). ``reason`` tells why nothing could be computed.
-    """
+    """A recording since the last good check: its share of the days, and its share of the change."""
 
     path: str
     date: dt.date
     share: float
-    FY_N: float | None = None
-    MZ_Nm: float | None = None
-    conditions: tuple[tuple[int, int, float, float], ...] = ()
-    reason: str | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the file under the keys of the answer."""
-        return {
-            "path": self.path,
-            "date": self.date.isoformat(),
-            "share": self.share,
-            "FY_max_abs_N": self.FY_N,
-            "MZ_max_abs_Nm": self.MZ_Nm,
-            "conditions": [
-                {"first_row": a, "last_row": b, "FY_N": FY, "MZ_Nm": MZ} for a, b, FY, MZ in self.conditions
-            ],
-            "reason": self.reason,
-        }
+    FY_N: Annotated[float | None, Entry("the largest of any row", key="FY_max_abs_N")] = None
+    MZ_Nm: Annotated[float | None, Entry("the largest of any row", key="MZ_max_abs_Nm")] = None
+    conditions: tuple[DriftedConditions, ...] = ()
+    reason: Annotated[str | None, Entry("why nothing could be computed")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftedTest:
-    """A test of the stretch: the largest share of the change of any row of its recordings.
+    """A test since the last good check."""
 
-    ``test`` is the folder of its test.toml, relative to the archive. ``FY_N`` and ``MZ_Nm`` are None where
-    of no recording it could be computed; ``left_out`` counts those.
-    """
-
-    test: str
+    test: Annotated[str, Entry("folder of its test.toml, relative to the archive")]
     date: dt.date
     share: float
     files: int
-    left_out: int
-    FY_N: float | None
-    MZ_Nm: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the test under the keys of the answer."""
-        return {
-            "test": self.test,
-            "date": self.date.isoformat(),
-            "share": self.share,
-            "files": self.files,
-            "left_out": self.left_out,
-            "FY_max_abs_N": self.FY_N,
-            "MZ_max_abs_Nm": self.MZ_Nm,
-        }
+    left_out: Annotated[int, Entry("files of which nothing could be computed")]
+    FY_N: Annotated[float | None, Entry("the largest of any row", key="FY_max_abs_N")]
+    MZ_Nm: Annotated[float | None, Entry("the largest of any row", key="MZ_max_abs_Nm")]
 
 
 def drifted_tests(audit: ArchiveAudit, files: Sequence[DriftedFile]) -> tuple[DriftedTest, ...]:
@@ -263,7 +224,13 @@ class _Drifted:
             FY_N=float(np.abs(FY).max()),
             MZ_Nm=float(np.abs(MZ).max()),
             conditions=tuple(
-                (b.start + 1, b.stop, float(FY[b.rows].mean()), float(MZ[b.rows].mean())) for b in blocks
+                DriftedConditions(
+                    first_row=b.start + 1,
+                    last_row=b.stop,
+                    FY_N=float(FY[b.rows].mean()),
+                    MZ_Nm=float(MZ[b.rows].mean()),
+                )
+                for b in blocks
             ),
         )
 

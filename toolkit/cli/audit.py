@@ -10,7 +10,7 @@ import typer
 
 from toolkit.cli.command import ARGUMENT, answers
 from toolkit.cli.console import progress, say, stream
-from toolkit.cli.options import INTO_FILE, INTO_FOLDER, Draft, KnownAt, Output, RegistryOptions, day
+from toolkit.cli.options import INTO_FILE, INTO_FOLDER, Draft, KnownAt, Output, RegistryOptions
 
 NAME = "audit"
 
@@ -67,9 +67,9 @@ def command(
     if template is not None and out is None:
         raise typer.BadParameter("a summary needs --out, where it is written", param_hint="--template")
     order = AuditOrder(
-        archive=archive, known_at=day(known_at), workers=1 if workers is None else workers,
-        scheduler=scheduler, out=out, reports=reports, since_good=since_good, repair=repair,
-        template=template, parquet=parquet, draft=draft, calibrations=place.calibrations, home=place.home,
+        archive=archive, basis=place.basis(known_at=known_at, draft=draft),
+        workers=1 if workers is None else workers, scheduler=scheduler, out=out, reports=reports,
+        since_good=since_good, repair=repair, template=template, parquet=parquet,
     )  # fmt: skip
     result, written = audit(order, stage=partial(progress, show=not output.silent))
     if output.json:

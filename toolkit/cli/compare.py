@@ -17,7 +17,6 @@ from toolkit.cli.options import (
     RegistryOptions,
     day,
 )
-from toolkit.cli.options import reader as choose_reader
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -120,14 +119,11 @@ def command(
             expected="two tests or more, or --laboratories FILE", next_step="see 'toolkit compare --help'",
             rule="usage",
         )  # fmt: skip
-    engine = choose_reader(reader)
+    basis = place.basis(known_at=known_at, draft=draft, protocol=protocol, reader=reader)
     style = unit_choice(units or "SI")
     opened = document_template(template, out, default="comparison.docx", home=place.home)
     with output.progress("reading") as step:
-        entries, findings = read_entries(
-            sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=place.calibrations,
-            home=place.home, draft=draft, reader=engine, step=step,
-        )  # fmt: skip
+        entries, findings = read_entries(sources, basis, axes=axes, step=step)
     comparison = compare(
         entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility
     )

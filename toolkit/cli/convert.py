@@ -7,7 +7,7 @@ from typing import Annotated, TypedDict
 
 from toolkit.cli.command import ARGUMENT, Mark, answers
 from toolkit.cli.console import exit_code
-from toolkit.cli.options import INTO_FILE, Draft, KnownAt, Output, RegistryOptions, day
+from toolkit.cli.options import INTO_FILE, Draft, KnownAt, Output, RegistryOptions
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import Timing
 
@@ -56,9 +56,7 @@ def command(
     from toolkit.lab.tire_tests.convert import convert
     from toolkit.lab.tire_tests.resolve import resolve_test
 
-    resolve = partial(
-        resolve_test, calibrations=place.calibrations, home=place.home, known_at=day(known_at), draft=draft
-    )
+    resolve = partial(resolve_test, basis=place.basis(known_at=known_at, draft=draft))
     converted = convert(source, target, axes=axes, fmi=fmi, resolve=resolve)
     text = f"{target} written"
     if converted.findings:

@@ -286,9 +286,9 @@ def _told_fit(payload: Payload) -> str:
 
 
 def _resolved(stage: Path) -> Resolved:
-    from toolkit.lab.tire_tests.resolve import resolve_test
+    from toolkit.lab.tire_tests.resolve import Basis, resolve_test
 
-    return resolve_test(stage / "test.xlsx", home=stage / "home")
+    return resolve_test(stage / "test.xlsx", Basis(home=stage / "home"))
 
 
 def _tire_file(resolved: Resolved, path: Path) -> str:

@@ -16,7 +16,6 @@ from toolkit.cli.options import (
     KnownAt,
     Output,
     RegistryOptions,
-    day,
 )
 
 NAME = "fit"
@@ -90,8 +89,7 @@ def command(
         refuse_other_files(source)
         fitted = fit_test_models(
             source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius,
-            calibration=calibration, calibrations=place.calibrations, home=place.home, known_at=day(known_at),
-            draft=draft,
+            basis=place.basis(calibration=calibration, known_at=known_at, draft=draft),
         )  # fmt: skip
     else:
         fitted = fit_table_models(

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.answers import Timing
     from toolkit.lab.signatures.sealing import Sealing
+    from toolkit.lab.tire_tests.resolve import Basis
     from toolkit.trust.keys import Signer
     from toolkit.trust.signing import Travel
     from toolkit.worker.posix import Limits
@@ -157,6 +158,25 @@ class RegistryOptions:
 
         return open_registry(self.calibrations, self.home, signers=open_signers(sign))
 
+    def basis(
+        self,
+        *,
+        calibration: str | None = None,
+        known_at: datetime | None = None,
+        draft: bool = False,
+        protocol: Path | None = None,
+        reader: str = "calamine",
+    ) -> Basis:
+        """Return what results of tests rest on, or refuse the word of ``--reader``."""
+        from toolkit.lab.tire_tests.resolve import Basis
+
+        if reader not in ("calamine", "both"):
+            raise typer.BadParameter("calamine or both", param_hint="--reader")
+        return Basis(
+            calibration=calibration, calibrations=self.calibrations, home=self.home, known_at=day(known_at),
+            draft=draft, protocol=protocol, reader="both" if reader == "both" else "calamine",
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionOptions(RegistryOptions):
@@ -234,13 +254,6 @@ class WorkerOptions:
 def day(moment: datetime | None) -> date | None:
     """Return the day of a date option, None where it was not given."""
     return moment.date() if moment else None
-
-
-def reader(name: str) -> Literal["calamine", "both"]:
-    """Return the reader that ``--reader`` names, or refuse the word."""
-    if name not in ("calamine", "both"):
-        raise typer.BadParameter("calamine or both", param_hint="--reader")
-    return "both" if name == "both" else "calamine"
 
 
 def open_signers(keys: Sequence[Path] | None) -> tuple[Signer, ...]:

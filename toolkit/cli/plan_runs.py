@@ -72,8 +72,7 @@ def protocol(
         like=tuple(like or ()), spread=tuple(spread or ()), demands=tuple(u or ()), loads=tuple(load or ()),
         minutes=minutes,
         between_files_s=between_files, sliding_kJ=sliding, rise_K=rise,
-        calibration=calibration, calibrations=place.calibrations,
-        home=place.home, draft=draft,
+        basis=place.basis(calibration=calibration, draft=draft),
     )  # fmt: skip
     opened = document_template(template, out)
     with output.progress("planning") as step:

@@ -17,9 +17,7 @@ from toolkit.cli.options import (
     Reader,
     RegistryOptions,
     Units,
-    day,
 )
-from toolkit.cli.options import reader as choose_reader
 
 if TYPE_CHECKING:
     from toolkit.lab.tire_tests.process_answer import ProcessAnswer
@@ -55,21 +53,14 @@ def command(
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
-    engine, style = choose_reader(reader), unit_choice(units)
+    basis = place.basis(
+        calibration=calibration, known_at=known_at, draft=draft, protocol=protocol, reader=reader
+    )
+    style = unit_choice(units)
     if out is not None:
         refuse_original(out, suffix=".xlsx")
     with output.progress("reading") as step:
-        resolved = resolve_test(
-            test,
-            calibration=calibration,
-            calibrations=place.calibrations,
-            home=place.home,
-            known_at=day(known_at),
-            draft=draft,
-            reader=engine,
-            protocol=protocol,
-            step=step,
-        )
+        resolved = resolve_test(test, basis, step=step)
     digest = write_test_file(out, resolved.result, dict(resolved.recordings)) if out else None
     payload: ProcessAnswer = {
         **process_payload(resolved),

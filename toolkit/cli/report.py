@@ -17,9 +17,7 @@ from toolkit.cli.options import (
     ProtocolFile,
     Reader,
     ReportTemplate,
-    day,
 )
-from toolkit.cli.options import reader as choose_reader
 
 NAME = "report"
 
@@ -88,7 +86,9 @@ def command(
     from toolkit.report.drawer import Drawer
     from toolkit.report.word.office import Office
 
-    engine = choose_reader(reader)
+    basis = issuing.basis(
+        calibration=calibration, known_at=known_at, draft=draft, protocol=protocol, reader=reader
+    )
     issued = None
     if issue or issuing.asked:
         from toolkit.lab.signatures.issuing import open_issuing
@@ -121,17 +121,7 @@ def command(
         opened = read_template(template or home_template("org.docx", issuing.home))
         options = Options(
             template=opened,
-            resolve=partial(
-                resolve_test,
-                calibration=calibration,
-                calibrations=issuing.calibrations,
-                home=issuing.home,
-                known_at=day(known_at),
-                draft=draft,
-                reader=engine,
-                protocol=protocol,
-                step=step,
-            ),
+            resolve=partial(resolve_test, basis=basis, step=step),
             details=details,
             xlsx=xlsx or hand_over,
             tydex=tydex or hand_over,

@@ -147,9 +147,7 @@ def tags(
     if test is not None:
         from toolkit.lab.tire_tests.resolve import resolve_test
 
-        resolved = resolve_test(
-            test, calibration=calibration, calibrations=place.calibrations, home=place.home, draft=draft
-        )
+        resolved = resolve_test(test, place.basis(calibration=calibration, draft=draft))
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
     listed = list_tags(content, style, VOCABULARIES[kind])
     if for_print is not None:

@@ -74,7 +74,7 @@ def command(
     find_soffice()
     options = Options(
         template=read_template(template or home_template("org.docx", place.home)),
-        resolve=partial(resolve_test, calibrations=place.calibrations, home=place.home),
+        resolve=partial(resolve_test, basis=place.basis()),
         units=style,
         allow_missing=allow_missing,
     )

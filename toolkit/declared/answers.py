@@ -44,7 +44,7 @@ import pathlib
 import re
 import types
 import typing
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence, Set
 from typing import (
     Annotated,
     Any,
@@ -262,7 +262,7 @@ def _is_mapping(origin: Any) -> bool:
 
 
 def _is_list(origin: Any) -> bool:
-    return isinstance(origin, type) and issubclass(origin, Sequence | Iterator | frozenset)
+    return isinstance(origin, type) and issubclass(origin, Sequence | Iterator | Set)
 
 
 def words_of(annotation: Any) -> str:

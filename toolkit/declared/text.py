@@ -193,8 +193,10 @@ def json_value(value: Any) -> Any:
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {str(key): json_value(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple | set | frozenset):
+    if isinstance(value, list | tuple):
         return [json_value(entry) for entry in value]
+    if isinstance(value, set | frozenset):  # without an order of its own
+        return sorted(map(json_value, value), key=str)
     if isinstance(value, dt.date | dt.time):
         return value.isoformat()
     if isinstance(value, Path):

@@ -167,10 +167,11 @@ class Laboratory(Face):
             the archive, the registry or a folder cannot be used
         """
         from toolkit.lab.archives.audit import Audit, AuditOrder, audit
+        from toolkit.lab.tire_tests.resolve import Basis
 
         order = AuditOrder(
-            archive=Path(archive), known_at=known_at, workers=workers, out=as_path(out),
-            repair=as_path(repair), reports=as_path(reports), calibrations=self.calibrations,
+            archive=Path(archive), basis=Basis(known_at=known_at, calibrations=self.calibrations),
+            workers=workers, out=as_path(out), repair=as_path(repair), reports=as_path(reports),
         )  # fmt: skip
         answer, written = audit(order)
         return Audit(result=answer, written=written)

@@ -118,7 +118,7 @@ def _strays(used: Sequence[OnCurve], channel: str) -> list[_Stray]:
     usual = _usual(surface.misses(y, core, k))
 
     def of(group: NDArray[np.intp]) -> _Miss:
-        return surface.misses(y, [*core, group], k)[-1]
+        return surface.misses(y, [*core, group], k, asked=slice(-1, None))[0]
 
     # What the core foretells comes back to it, the nearest first; the strays are left.
     largest = float(np.max(np.abs(y[np.concatenate(core)])))
@@ -218,23 +218,31 @@ class _Surface:
         """Return the k [1/rad] by which the groups foretell one another best."""
         return min(_SLOPES, key=lambda k: _usual(self.misses(y, groups, k)))
 
-    def misses(self, y: Array, groups: Sequence[NDArray[np.intp]], k: float) -> list[_Miss]:
-        """Return what each group misses of the surface of all others."""
+    def misses(
+        self, y: Array, groups: Sequence[NDArray[np.intp]], k: float, *, asked: slice = slice(None)
+    ) -> list[_Miss]:
+        """Return what each group that is asked misses of the surface of all others."""
         rows = np.concatenate(groups)
         ends = np.cumsum([len(group) for group in groups])
-        parts = [slice(int(end) - len(group), int(end)) for group, end in zip(groups, ends, strict=True)]
+        parts = [np.arange(end - len(group), end) for group, end in zip(groups, ends, strict=True)][asked]
         X = self._design(rows, k)
-        Q, size, _ = np.linalg.svd(X / np.linalg.norm(X, axis=0), full_matrices=False)
-        Q = Q[:, size > _NO_SIGNAL * size[0]]
+        Q, singular, _ = np.linalg.svd(X / np.linalg.norm(X, axis=0), full_matrices=False)
+        Q = Q[:, singular > _NO_SIGNAL * singular[0]]
         residual = y[rows] - Q @ (Q.T @ y[rows])
-        misses = []
-        for part in parts:
+        misses: dict[int, _Miss] = {}
+        for size in {len(part) for part in parts}:  # of one size together: they are many, and small
+            places = [place for place, part in enumerate(parts) if len(part) == size]
+            at = np.stack([parts[place] for place in places])
             # (I - H)^-1 r of the rows left out is what a fit without them misses there.
-            spread = np.linalg.pinv(np.eye(part.stop - part.start) - Q[part] @ Q[part].T, rcond=1e-6)
-            off = spread @ residual[part]
-            rms, leverage = (float(np.sqrt(np.mean(v))) for v in (off**2, np.diag(spread)))
-            misses.append(_Miss(off=off, size=rms, freed=rms / max(leverage, 1.0)))
-        return misses
+            spread = np.linalg.pinv(np.eye(size) - Q[at] @ Q[at].transpose(0, 2, 1), rcond=1e-6)
+            off = (spread @ residual[at][..., None])[..., 0]
+            rms = np.sqrt(np.mean(off**2, axis=1))
+            freed = rms / np.maximum(np.sqrt(np.mean(spread.diagonal(axis1=1, axis2=2), axis=1)), 1.0)
+            misses |= {
+                place: _Miss(off=off[i], size=float(rms[i]), freed=float(freed[i]))
+                for i, place in enumerate(places)
+            }
+        return [misses[place] for place in range(len(parts))]
 
 
 def _usual(misses: Sequence[_Miss]) -> float:

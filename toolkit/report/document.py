@@ -304,9 +304,9 @@ class Document(Generic[Source]):
         source: Source,
         style: Style,
         *,
-        calibrations: Sequence[CalibrationUse],
+        calibrations: Sequence[CalibrationUse] = (),
         title: str,
-        author: str,
+        author: str | None = None,
         identity: str,
         subject: str,
         issued: dt.date,
@@ -314,7 +314,8 @@ class Document(Generic[Source]):
     ) -> ReportContent:
         """Return the content of declared document: everything that a template of the kind can ask for.
 
-        It is in the language and the words of the style, but for what ``people`` wrote.
+        It is in the language and the words of the style, but for what ``people`` wrote; without an ``author``
+        it is the style's laboratory's.
         """
         plots = self.plots(source, style)
         tables = {
@@ -346,7 +347,7 @@ class Document(Generic[Source]):
             conditions=conditions,
             calibrations=tuple(calibrations),
             title=title,
-            author=author,
+            author=author or style.laboratory or "toolkit",
             identity=identity,
             subject=subject,
             issued=issued.isoformat(),

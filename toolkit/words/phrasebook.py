@@ -44,7 +44,10 @@ def phrases(language: str, folder: Path = DOCUMENTS) -> dict[str, str]:
 
 @cache
 def translations(language: str, folder: Path) -> NullTranslations:
-    """Return a catalogue for gettext; that of the source's own language is empty."""
+    """Return a catalogue for gettext, which lacks what documents say in the same words.
+
+    That of the source's own language is empty.
+    """
     from babel.messages.mofile import write_mo
     from babel.messages.pofile import read_po
 
@@ -54,7 +57,10 @@ def translations(language: str, folder: Path) -> NullTranslations:
     compiled = io.BytesIO()
     write_mo(compiled, catalogue)
     compiled.seek(0)
-    return GNUTranslations(compiled)
+    compiled_catalogue = GNUTranslations(compiled)
+    if folder != DOCUMENTS:
+        compiled_catalogue.add_fallback(translations(language, DOCUMENTS))
+    return compiled_catalogue
 
 
 def locale_of(language: str) -> str:

@@ -194,12 +194,11 @@ def _remembered_results(bench: Bench, test_id: str, folder: Path, record: str | 
 
 
 def _resolve(bench: Bench, folder: Path, record: str | None) -> Resolved:
-    from toolkit.lab.tire_tests.resolve import resolve_test
+    from toolkit.lab.tire_tests.resolve import Basis, resolve_test
 
     # A record that somebody chose to look at may not be in force: the result then says that it is a draft.
-    return resolve_test(
-        folder, calibrations=bench.registry.folder, calibration=record, draft=record is not None
-    )
+    basis = Basis(calibrations=bench.registry.folder, calibration=record, draft=record is not None)
+    return resolve_test(folder, basis)
 
 
 def _reduced(resolved: Resolved) -> Response:

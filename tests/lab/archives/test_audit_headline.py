@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from toolkit.declared import json_value
 from toolkit.lab.answers import table
 from toolkit.lab.archives.audit_headline import headline_of
 
@@ -30,7 +31,7 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
     assert found.sentence.replace("\N{NARROW NO-BREAK SPACE}", " ") == (
         "2 files carry a wrong Fy, up to 18 886 N; cause: E5 negative; from 2014-03 to 2019-06"
     )
-    assert found.as_dict() == {
+    assert json_value(found) == {
         "sentence": found.sentence, "files": 4, "wrong": 2, "FY_max_abs_N": 18885.7, "MZ_max_abs_Nm": 0.0,
         "causes": [{"cause": "E5 negative", "files": 2}], "from": "2014-03", "to": "2019-06", "unjudged": 0,
         "unreadable": 0, "impossible": 0, "altered_cells": 0, "undecided": 0, "small": 0, "stepping": 0,

@@ -16,7 +16,7 @@ import pytest
 from tests.audit.archive_made import factory
 from tests.conftest import EXAMPLES
 from toolkit.audit.archive import audit_archive
-from toolkit.audit.linked import PastReport, link
+from toolkit.audit.linked import RestingReport, link
 from toolkit.audit.timeline import timelines, traces, worst_files
 from toolkit.calibration.registry.registry import Registry
 from toolkit.lab.rules import rules_catalogue
@@ -50,8 +50,8 @@ def view(tmp_path_factory):
     audited = audit_archive(made.folder, registry, known_at=factory.KNOWN_AT)
     first = next(one for one in audited.tests if one["not_clean"])["test"]
     reports = (
-        PastReport(report="R <1>", words=factory_words(first)),
-        PastReport(report="other", words="none"),
+        RestingReport(report="R <1>", words=factory_words(first)),
+        RestingReport(report="other", words="none"),
     )
     return AuditView(
         made=audited,

@@ -89,7 +89,7 @@ def test_a_report_can_ask_for_them_and_the_catalogue_lists_them() -> None:
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> None:
     made = Resolved(result=make_result(), record=make_record(), findings=())
-    monkeypatch.setattr(resolve, "resolve_test", lambda _test, **_options: made)
+    monkeypatch.setattr(resolve, "resolve_test", lambda _test, *_basis, **_options: made)
 
 
 @office_needed

@@ -13,12 +13,12 @@ from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry import gates
 from toolkit.calibration.registry.clock import now, today
 from toolkit.calibration.registry.judgement import judge_stored, machine_of, read_polarity_file
-from toolkit.calibration.registry.life import check_line
+from toolkit.calibration.registry.life import check_line, refusal
 from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.calibration.registry.status import RecordStatus, parse_interval
 from toolkit.calibration.registry.store import Change
 from toolkit.calibration.registry.stored import stored_check, stored_loads
-from toolkit.errors import RegistryError, ToolkitError
+from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 from toolkit.inputs import read_regular
 
@@ -179,7 +179,7 @@ def withdraw(
         return Change(files={}, event=event)
 
     if not folder.is_dir():
-        raise _refused(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
+        raise refusal(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
     registry.commit(folder.name, build)
     return registry.status(record_id, known_at=max(on, today()))
 
@@ -195,13 +195,6 @@ def _read(folder: Path, record_id: str) -> CalibrationRecord | None:
 
 def _days(count: int) -> str:
     return f"{count} day{'' if count == 1 else 's'}"
-
-
-def _refused(record_id: str, problem: str, actual: str, expected: str, rule: str) -> RegistryError:
-    return RegistryError(
-        problem, where=record_id, got=actual, expected=expected,
-        next_step="nothing was changed; see 'toolkit calibration show " + record_id + "'", rule=rule,
-    )  # fmt: skip
 
 
 # The end of a candidate: a line in the ledger. The record stays, and is known for ever.
@@ -235,6 +228,6 @@ def discard(registry: Registry, record_id: str, *, reason: str, by: str) -> Reco
 
     if not folder.is_dir():
         instruments = ", ".join(registry.instruments()) or "a record"
-        raise _refused(record_id, "no such record", record_id, instruments, "missing")
+        raise refusal(record_id, "no such record", record_id, instruments, "missing")
     registry.commit(folder.name, build)
     return registry.status(record_id)

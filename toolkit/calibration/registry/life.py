@@ -77,17 +77,17 @@ def objections(
     if entry.event == "entered":
         yield from _entered(entry, before, record)
     elif not any(line.event == "entered" for line in before):
-        yield _refused(entry.id, "no such record", entry.id, "a record that was entered before", "missing")
+        yield refusal(entry.id, "no such record", entry.id, "a record that was entered before", "missing")
     elif entry.event == "issued":
         if entry.document is None:
-            yield _refused(entry.id, "an issue names its document", "nothing", "a document", "ledger")
+            yield refusal(entry.id, "an issue names its document", "nothing", "a document", "ledger")
     elif entry.event in _DECISIONS:
         if entry.known_on is None:
-            yield _refused(entry.id, "a decision needs its day", "nothing", "the day of the decision", "time")
+            yield refusal(entry.id, "a decision needs its day", "nothing", "the day of the decision", "time")
             return
         yield from _DECISIONS[entry.event](entry, before, record, today)
     else:
-        yield _refused(
+        yield refusal(
             entry.id, "an instrument's ledger has no such event", entry.event,
             ", ".join(("entered", "issued", *_DECISIONS)), "ledger",
         )  # fmt: skip
@@ -149,11 +149,11 @@ def _entered(
     entry: Entry, before: Sequence[Entry], record: CalibrationRecord | None
 ) -> Iterator[RegistryError]:
     if before:
-        yield _refused(entry.id, "a record is entered once", f"{entry.id} again", "a new id", "ledger")
+        yield refusal(entry.id, "a record is entered once", f"{entry.id} again", "a new id", "ledger")
     if record is None:
         return
     if entry.by != record.entered_by:
-        yield _refused(
+        yield refusal(
             entry.id, "a record is entered by its session's operator", entry.by, record.entered_by, "names"
         )
     if not begun(date.fromisoformat(record.date), moment(entry.time)):
@@ -171,13 +171,13 @@ def _approved(
 ) -> Iterator[RegistryError]:
     day, since = entry.known_on, entry.since
     if day is None or since is None:
-        yield _refused(entry.id, "an approval needs an in-force date", "nothing", "a date", "approval")
+        yield refusal(entry.id, "an approval needs an in-force date", "nothing", "a date", "approval")
         return
     yield from _same_names(entry, before)
     session = None if record is None else date.fromisoformat(record.date)
     reason = (entry.reason or "").strip()
     if session is not None and since < day and since < session and not reason:
-        yield _refused(
+        yield refusal(
             entry.id, "an in-force date before the session's own date needs a reason",
             f"in force from {since.isoformat()}, session of {session.isoformat()}",
             f"a date from {session.isoformat()} on, or --reason TEXT, which the ledger keeps", "approval",
@@ -187,7 +187,7 @@ def _approved(
     # Lines of before the clock was stated were written when no reason was asked for.
     asked = today is not None or entry.clock is not None
     if asked and day < entered_on and not reason:
-        yield _refused(
+        yield refusal(
             entry.id, "a decision that is dated back needs a reason",
             f"decided on {day.isoformat()}, entered on {entered_on.isoformat()}",
             "--reason TEXT, which says why it was not entered on its day; the ledger keeps both days", "time",
@@ -196,21 +196,21 @@ def _approved(
         yield from _recall(entry.recall)
     status = status_of(entry.id, before, date.max)
     if status.ended:
-        yield _refused(
+        yield refusal(
             entry.id, f"a {status.state} record cannot be approved",
             f"{status.state}: {status.reason or 'no reason stated'}", "a new session", "approval",
         )  # fmt: skip
     if status.in_force_from is None:
         return
     if not reason or (status.in_force_from == since and entry.recall in (None, status.recall)):
-        yield _refused(
+        yield refusal(
             entry.id, "the record is approved already",
             f"in force from {status.in_force_from.isoformat()}",
             "another in-force date or recall interval, with --reason TEXT", "approval",
         )  # fmt: skip
     if since > status.in_force_from:
         # The first approval stands: the days between would stay in force, whatever was answered.
-        yield _refused(
+        yield refusal(
             entry.id, "an approved record cannot come into force later than it did", since.isoformat(),
             f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void", "approval",
         )  # fmt: skip
@@ -226,7 +226,7 @@ def _withdrawn(
     yield from _untimely(entry, record, "the day on which the fault became known", today)
     status = status_of(entry.id, before, date.max)
     if status.ended:
-        yield _refused(
+        yield refusal(
             entry.id, f"the record is {status.state} already",
             f"{status.state}: {status.reason or 'no reason stated'}", "a record that stands", "withdrawal",
         )  # fmt: skip
@@ -249,7 +249,7 @@ def _discarded(
     yield from _untimely(entry, record, "the day of the decision", today)
     status = status_of(entry.id, before, date.max)
     if status.state != "candidate":
-        yield _refused(
+        yield refusal(
             entry.id, f"the record is {status.state}, and only a candidate can be discarded",
             f"{status.state}: {status.reason}" if status.reason else status.state,
             "a candidate that was never approved; an approved record is withdrawn", "discard",
@@ -284,9 +284,9 @@ def _same_names(entry: Entry, before: Sequence[Entry]) -> Iterator[RegistryError
 
 def _stated(entry: Entry, what: str, rule: str, does: str) -> Iterator[RegistryError]:
     if not (entry.reason or "").strip():
-        yield _refused(entry.id, f"{what} needs a reason", "nothing", "--reason TEXT", rule)
+        yield refusal(entry.id, f"{what} needs a reason", "nothing", "--reason TEXT", rule)
     if not name_key(entry.by):
-        yield _refused(entry.id, f"{what} needs a name", "nothing", f"--by NAME: who {does}", "names")
+        yield refusal(entry.id, f"{what} needs a name", "nothing", f"--by NAME: who {does}", "names")
 
 
 def _untimely(
@@ -327,7 +327,8 @@ def _recall(text: str) -> Iterator[RegistryError]:
         yield error
 
 
-def _refused(record_id: str, problem: str, actual: str, expected: str, rule: str) -> RegistryError:
+def refusal(record_id: str, problem: str, actual: str, expected: str, rule: str) -> RegistryError:
+    """Return the error of a decision that a record's life does not allow."""
     return RegistryError(
         problem, where=record_id, got=actual, expected=expected,
         next_step=f"nothing was changed; see 'toolkit calibration show {record_id}'", rule=rule,

@@ -34,7 +34,7 @@ ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Refused:
+class RefusedRecord:
     """A record that may not be used, and why."""
 
     id: str
@@ -218,10 +218,10 @@ class Registry:
         """Return a record as `load` does, by a ledger that was read before."""
         return load_checked(self.folder / instrument_of(record_id), record_id, ledger)
 
-    def usable(self, instrument: str) -> tuple[tuple[CalibrationRecord, ...], tuple[Refused, ...]]:
+    def usable(self, instrument: str) -> tuple[tuple[CalibrationRecord, ...], tuple[RefusedRecord, ...]]:
         """Return the records that pass every gate, and those that do not with the reason."""
         good: list[CalibrationRecord] = []
-        bad: list[Refused] = []
+        bad: list[RefusedRecord] = []
         ledger = self.ledger(instrument)
         folder = self.folder / instrument
         ids = record_ids(folder, ledger)
@@ -229,7 +229,9 @@ class Registry:
             if isinstance(loaded, CalibrationRecord):
                 good.append(loaded)
                 continue
-            bad.append(Refused(id=record_id, rule=loaded.rule or "unreadable", reason=reason_of(loaded)))
+            bad.append(
+                RefusedRecord(id=record_id, rule=loaded.rule or "unreadable", reason=reason_of(loaded))
+            )
         return tuple(good), tuple(bad)
 
     def status(self, record_id: str, *, known_at: date | None = None) -> RecordStatus:
@@ -382,4 +384,4 @@ def _number(record_id: str) -> tuple[str, int]:
     return ("", 0) if match is None else (match["instrument"], int(match["number"]))
 
 
-__all__ = ["ID", "LEDGER", "Refused", "Registry", "instrument_of", "load_checked", "today"]
+__all__ = ["ID", "LEDGER", "RefusedRecord", "Registry", "instrument_of", "load_checked", "today"]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from toolkit.audit.linked import Linked, PastReport
+    from toolkit.audit.linked import Linked, RestingReport
     from toolkit.errors import ToolkitError
-    from toolkit.lab.tire_tests.resolve import Resolved
+    from toolkit.lab.tire_tests.resolve import Basis, Resolved
     from toolkit.report.deliver import Delivered, Job
 
 FOLDER = "reports"
@@ -40,11 +39,8 @@ def amend(
     linked: Linked,
     archive: Path,
     target: Path,
+    basis: Basis,
     *,
-    calibrations: Path | None,
-    home: Path | None,
-    known_at: date | None,
-    draft: bool = False,
     step: Callable[[str], None],
 ) -> tuple[Amended, ...]:
     """Make the amended report of each report with a manifest that rests on another record than that in force.
@@ -66,14 +62,12 @@ def amend(
     pairs = list(_wanted(linked))
     if not pairs:
         return ()
-    template = read_template(home_template("org.docx", home))
+    template = read_template(home_template("org.docx", basis.home))
     jobs: list[Job] = []
     failed: dict[int, ToolkitError] = {}
     for index, (past, test) in enumerate(pairs):
         try:
-            resolved = resolve_test(
-                archive / test, calibrations=calibrations, home=home, known_at=known_at, draft=draft
-            )
+            resolved = resolve_test(archive / test, basis)
             out = target / FOLDER / file_name(f"{past.id}-{test}", otherwise=f"report-{index + 1}")
             jobs.append(_job(past, resolved, archive / test, template, out))
         except ToolkitError as error:
@@ -89,13 +83,13 @@ def amend(
     )
 
 
-def _wanted(linked: Linked) -> Iterator[tuple[PastReport, str]]:
+def _wanted(linked: Linked) -> Iterator[tuple[RestingReport, str]]:
     for past in linked.reports:
         if past.id is not None and past.to_amend:
             yield from ((past, test) for test in sorted(past.tests))
 
 
-def _job(past: PastReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
+def _job(past: RestingReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
     from toolkit.lab.tire_tests.handover import details_of, provenance
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file

@@ -10,7 +10,6 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.findings import Finding
     from toolkit.lab.archives.amended import Amended
+    from toolkit.lab.tire_tests.resolve import Basis
     from toolkit.report.content import Plot
     from toolkit.report.word.package import Template
 
@@ -44,7 +44,7 @@ class AuditOrder:
     """
 
     archive: Path
-    known_at: date | None = None
+    basis: Basis
     workers: int = 1
     scheduler: str | None = None
     out: Path | None = None
@@ -53,9 +53,6 @@ class AuditOrder:
     repair: Path | None = None
     template: Path | None = None
     parquet: Path | None = None
-    draft: bool = False
-    calibrations: Path | None = None
-    home: Path | None = None
 
 
 def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcome, tuple[Path, ...]]:
@@ -75,7 +72,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
     from toolkit.lab.home import open_registry
 
     stage = stage or _silent
-    registry = open_registry(order.calibrations, order.home)
+    registry = open_registry(order.basis.calibrations, order.basis.home)
     names = inventory(order.archive)
     past = None if order.reports is None else read_reports(order.reports)
     drift = None if order.since_good is None else drift_since(registry, order.since_good)
@@ -90,7 +87,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
         opened = read_template(order.template)
     with stage(len(names), "audit") as step:
         results = audit_archive(
-            order.archive, registry, known_at=order.known_at, workers=order.workers,
+            order.archive, registry, known_at=order.basis.known_at, workers=order.workers,
             scheduler=order.scheduler, step=step, names=names, out=order.out,
         )  # fmt: skip
     drifted: tuple[DriftedFile, ...] = ()
@@ -103,15 +100,12 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
     copies = None
     if order.repair is not None:
         with stage(None, "corrected copies") as step:
-            copies = write_copies(results, registry, order.repair, draft=order.draft, step=step)
+            copies = write_copies(results, registry, order.repair, draft=order.basis.draft, step=step)
     linked = None if past is None else link(results, past)
     amended: tuple[Amended, ...] = ()
     if order.repair is not None and linked is not None:
         with stage(None, "amended reports") as step:
-            amended = amend(
-                linked, order.archive, order.repair, calibrations=order.calibrations, home=order.home,
-                known_at=order.known_at, draft=order.draft, step=step,
-            )  # fmt: skip
+            amended = amend(linked, order.archive, order.repair, order.basis, step=step)
     answer = AuditOutcome(
         made=results,
         linked=linked,

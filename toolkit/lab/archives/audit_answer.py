@@ -9,119 +9,26 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from toolkit.audit.corrected import CorrectedCopy
+from toolkit.audit.linked import RestingReport
 from toolkit.audit.model import CLEAN
+from toolkit.audit.one_file import ArchivedFile
+from toolkit.audit.since_good import DriftedFile, DriftedTest
+from toolkit.calibration.registry.registry import RefusedRecord
 from toolkit.calibration.registry.standing import approved_after
+from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import ErrorEntry, one_line, table
-from toolkit.lab.archives.audit_headline import headline
-from toolkit.lab.tire_tests.inspection_answer import (
-    DisagreeingSides,
-    RefusedRecord,
-    Repair,
-    Segment,
-    SkippedRecord,
-)
+from toolkit.lab.archives.audit_headline import Headline, headline
 
 if TYPE_CHECKING:
     import datetime as dt
 
     from toolkit.audit.archive import ArchiveAudit
-    from toolkit.audit.corrected import Copy
     from toolkit.audit.linked import Linked
-    from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+    from toolkit.audit.since_good import Drift
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.archives.amended import Amended
-
-
-class CauseCount(TypedDict):
-    """A cause of wrong values, and in how many files."""
-
-    cause: str
-    files: int
-
-
-Headline = TypedDict(
-    "Headline",
-    {
-        "sentence": str,
-        "files": int,
-        "wrong": Annotated[int, "files with values that the record in force changes"],
-        "FY_max_abs_N": Annotated[float, "largest change"],
-        "MZ_max_abs_Nm": Annotated[float, "largest change"],
-        "causes": list[CauseCount],
-        "from": Annotated[str | None, "first month with a wrong file"],
-        "to": Annotated[str | None, "last one"],
-        "unjudged": Annotated[int, "files whose change cannot be computed"],
-        "without_values": NotRequired[Annotated[int, "files that hold no Fy and no Mz of their own"]],
-        "unreadable": int,
-        "impossible": Annotated[int, "files besides the wrong ones with an Fy or Mz that no tire has"],
-        "altered_cells": Annotated[int, "files with right forces beside changed cells"],
-        "undecided": Annotated[int, "files of which nothing says whether forces or cells are wrong"],
-        "small": Annotated[
-            int, "files by another record that the one in force changes by less than is printed"
-        ],
-        "stepping": Annotated[int, "files with a force or cell that steps where nothing moved"],
-        "corrected_copies": Annotated[int, "files that a repair wrote: their agreement proves nothing"],
-        "no_recording": Annotated[int, "notes, lock files and the like"],
-    },
-)
-Headline.__doc__ = "What an archive holds, in a sentence and in numbers."
-
-
-class ArchivedCondition(TypedDict):
-    """The mean of a load block of a file, and what the record in force changes."""
-
-    first_row: int
-    last_row: int
-    SA_deg: float | None
-    FZ_N: float | None
-    FY_N: float | None
-    MZ_Nm: float | None
-    FY_change_N: float | None
-    MZ_change_Nm: float | None
-    step_SA_deg: Annotated[float | None, "slip angle of the protocol's step"]
-    step_FZ_N: Annotated[float | None, "load of the protocol's step"]
-
-
-class ArchivedNote(TypedDict):
-    """What a person should know of a file."""
-
-    rule: str
-    message: str
-
-
-class ArchivedFile(TypedDict):
-    """A file of an archive: which calibration computed it, and what the right one changes."""
-
-    path: Annotated[str, "relative to the archive"]
-    sha256: str | None
-    size: int | None
-    instrument: str | None
-    date: str | None
-    test: Annotated[str | None, "folder of its test.toml"]
-    rotation: str | None
-    to_SAE: Annotated[Mapping[str, int] | None, "sign of each channel on the way to SAE axes"]
-    own_protocol: bool
-    rows: int | None
-    grade: Annotated[str, "exact, rounding, stale, sign_variant, column_swap, ambiguous, unknown, ..."]
-    record: str | None
-    variant: Annotated[str | None, "how the record was changed: E5 negative in FY, MZ"]
-    issued: Annotated[bool | None, "whether the coefficients were those of the certificate"]
-    candidates: Annotated[list[str], "of an ambiguous file"]
-    segments: list[Segment]
-    sides: Annotated[DisagreeingSides | None, "where rows disagree with their cells: which side is wrong"]
-    in_force: Annotated[str | None, "the record in force on the date of the test"]
-    repair: Repair | None
-    conditions: list[ArchivedCondition]
-    estimate: Annotated[Mapping[str, Any] | None, "of an unknown calibration: what the digits prove of it"]
-    skipped: list[SkippedRecord]
-    reason: Annotated[str | None, "why it cannot be read or judged"]
-    test_toml: Annotated[str | None, "what is wrong with its test.toml"]
-    units: Annotated[Mapping[str, str] | None, "of its channels"]
-    values_sha256: str | None
-    modified: Annotated[str | None, "day on which a file without a date was last written"]
-    notes: list[ArchivedNote]
-    reports: NotRequired[Annotated[list[str], "that rest on its test"]]
 
 
 class Grades(TypedDict):
@@ -158,21 +65,6 @@ class ArchivedTest(TypedDict):
     reports: NotRequired[Annotated[list[str], "that rest on it"]]
 
 
-class RestingReport(TypedDict):
-    """A report that rests on files of the archive."""
-
-    report: str
-    id: Annotated[str | None, "of its manifest"]
-    linked_by: list[str]
-    calibrations: Annotated[list[str], "that it names"]
-    tests: list[str]
-    files: int
-    not_clean: int
-    disputed: Annotated[int, "files whose cells were changed, or may have been"]
-    in_force: Annotated[list[str], "records in force on the days of its tests"]
-    to_amend: bool
-
-
 class FailedLoad(TypedDict):
     """A load that failed its check."""
 
@@ -180,39 +72,6 @@ class FailedLoad(TypedDict):
     unit: str
     max_error: float
     tolerance: float
-
-
-class DriftedConditions(TypedDict):
-    """The share of the change in a load block."""
-
-    first_row: int
-    last_row: int
-    FY_N: float
-    MZ_Nm: float
-
-
-class DriftedFileEntry(TypedDict):
-    """A recording since the last good check: its share of the days, and its share of the change."""
-
-    path: str
-    date: str
-    share: float
-    FY_max_abs_N: float | None
-    MZ_max_abs_Nm: float | None
-    conditions: list[DriftedConditions]
-    reason: Annotated[str | None, "why nothing could be computed"]
-
-
-class DriftedTestEntry(TypedDict):
-    """A test since the last good check."""
-
-    test: str
-    date: str
-    share: float
-    files: int
-    left_out: Annotated[int, "files of which nothing could be computed"]
-    FY_max_abs_N: float | None
-    MZ_max_abs_Nm: float | None
 
 
 class SinceGood(TypedDict):
@@ -226,22 +85,8 @@ class SinceGood(TypedDict):
     record_in_use: str
     later_good: list[str]
     loads: list[FailedLoad]
-    tests: list[DriftedTestEntry]
-    files: list[DriftedFileEntry]
-
-
-class CorrectedCopy(TypedDict):
-    """A corrected copy of a file."""
-
-    path: str
-    replaces_sha256: str
-    sha256: str | None
-    record: str | None
-    record_sha256: str | None
-    reason: Annotated[str | None, "why there is none"]
-    unverified: bool
-    draft: bool
-    draft_reasons: list[str]
+    tests: list[DriftedTest]
+    files: list[DriftedFile]
 
 
 class AmendedReport(TypedDict):
@@ -299,7 +144,7 @@ class AuditOutcome:
     drift: Drift | None
     drifted: tuple[DriftedFile, ...]
     drifted_tests: tuple[DriftedTest, ...]
-    copies: tuple[Copy, ...] | None
+    copies: tuple[CorrectedCopy, ...] | None
     amended: tuple[Amended, ...] = ()
     approved_later: Mapping[str, dt.date] = field(default_factory=dict)
 
@@ -317,26 +162,32 @@ def payload_of(answer: AuditOutcome) -> dict[str, Any]:
     payload: dict[str, Any] = {
         "archive": audit.archive,
         "known_at": audit.known_at.isoformat(),
-        "headline": headline(audit).as_dict(),
+        "headline": headline(audit),
         "files": files_of(answer),
         "summary": {"files": len(audit.files), "grades": dict(audit.grades), "undated": audit.undated},
         "tests": _tests(answer),
-        "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in audit.refused],
+        "refused_records": audit.refused,
         "approved_later": {name: day.isoformat() for name, day in answer.approved_later.items()},
         "heads": dict(audit.heads),
         "findings": (finding.as_dict() for finding in audit.findings),
     }
     if answer.linked is not None:
-        payload["reports"] = [report.as_dict() for report in answer.linked.reports]
+        payload["reports"] = answer.linked.reports
         payload["report_unknown"] = list(answer.linked.unknown)
     if answer.drift is not None:
-        payload["since_good"] = {
-            **answer.drift.as_dict(),
-            "tests": [test.as_dict() for test in answer.drifted_tests],
-            "files": [file.as_dict() for file in answer.drifted],
-        }
+        failed = answer.drift.failed
+        payload["since_good"] = entry_of(
+            SinceGood,
+            answer.drift,
+            failed=failed.session_record,
+            failed_date=failed.date.isoformat(),
+            record_in_use=failed.record,
+            loads=[entry_of(FailedLoad, load) for load in failed.loads],
+            tests=answer.drifted_tests,
+            files=answer.drifted,
+        )
     if answer.copies is not None:
-        payload["repaired"] = [copy.as_dict() for copy in answer.copies]
+        payload["repaired"] = answer.copies
         payload["amended"] = [report.as_dict() for report in answer.amended]
     return payload
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from toolkit.audit.model import CLEAN
 from toolkit.audit.sides import disputed
+from toolkit.declared import Entry, derived
 from toolkit.reduction.physics import RULES
 
 if TYPE_CHECKING:
@@ -21,39 +22,46 @@ _PLACE = "\N{NARROW NO-BREAK SPACE}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Headline:
-    """What an audit found, in numbers.
+class CauseCount:
+    """A cause of wrong values, and in how many files."""
 
-    ``wrong`` files change by the record in force on their day, ``FY_N`` and ``MZ_Nm`` at most; ``causes`` are
-    the reasons with their files, the most frequent first; ``first`` and ``last`` the months of their tests.
-    ``unjudged`` files are not right either, but no record says what they should hold. ``impossible`` files
-    are not among the wrong ones and hold an Fy or Mz that no tire has. ``bare`` files hold neither of
-    their own: nothing in them is right or wrong. ``small`` files are those of another record than that in
-    force that differ from it by less than `SMALL_FY_N` and `SMALL_MZ_Nm`; no wrong ones. ``altered`` files
-    hold right forces beside changed cells, of ``disputed`` ones nobody can say which side is wrong.
-    ``stepping`` files are by the record in force and hold a force or a cell that steps for no reason;
-    ``copies`` are corrected copies among the right ones.
-    """
+    cause: str
+    files: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Headline:
+    """What an archive holds, in a sentence and in numbers."""
 
     files: int
-    wrong: int
-    FY_N: float
-    MZ_Nm: float
-    causes: tuple[tuple[str, int], ...]
-    first: str | None
-    last: str | None
-    unjudged: int
+    wrong: Annotated[int, Entry("files with values that the record in force changes")]
+    FY_N: Annotated[float, Entry("largest change", key="FY_max_abs_N")]
+    MZ_Nm: Annotated[float, Entry("largest change", key="MZ_max_abs_Nm")]
+    causes: Annotated[tuple[CauseCount, ...], Entry("the most frequent first")]
+    first: Annotated[str | None, Entry("first month with a wrong file", key="from")]
+    last: Annotated[str | None, Entry("last one", key="to")]
+    unjudged: Annotated[int, Entry("files whose change cannot be computed")]
     unreadable: int
-    impossible: int = 0
-    bare: int = 0
-    small: int = 0
-    altered: int = 0
-    disputed: int = 0
-    no_recording: int = 0
-    stepping: int = 0
-    copies: int = 0
+    impossible: Annotated[int, Entry("files besides the wrong ones with an Fy or Mz that no tire has")] = 0
+    altered: Annotated[int, Entry("files with right forces beside changed cells", key="altered_cells")] = 0
+    disputed: Annotated[
+        int, Entry("files of which nothing says whether forces or cells are wrong", key="undecided")
+    ] = 0
+    small: Annotated[
+        int, Entry("files by another record that the one in force changes by less than is printed")
+    ] = 0
+    stepping: Annotated[int, Entry("files with a force or cell that steps where nothing moved")] = 0
+    copies: Annotated[
+        int,
+        Entry("files that a repair wrote: their agreement proves nothing", key="corrected_copies"),
+    ] = 0
+    no_recording: Annotated[int, Entry("notes, lock files and the like")] = 0
+    bare: Annotated[
+        int | None, Entry("files that hold no Fy and no Mz of their own", key="without_values", sparse=True)
+    ] = None
 
     @property
+    @derived(after="")
     def sentence(self) -> str:
         """The headline as one sentence."""
         readable = self.files - self.unreadable - self.no_recording
@@ -83,7 +91,7 @@ class Headline:
             parts.append(
                 f"{_files(self.stepping)} {verb} a force or cell that steps while the machine stands still"
             )
-        with_values = readable - self.bare
+        with_values = readable - (self.bare or 0)
         doubts = self.wrong + self.unjudged + self.impossible + self.altered + self.disputed
         if with_values and not (doubts + self.small + self.stepping):
             subject = "The file carries" if with_values == 1 else f"All {with_values} files carry"
@@ -118,38 +126,15 @@ class Headline:
 
     def _cause(self) -> str:
         if len(self.causes) == 1:
-            return self.causes[0][0]
-        counted = [f"{cause} ({count})" for cause, count in self.causes[:_CAUSES]]
-        remaining = sum(count for _, count in self.causes[_CAUSES:])
+            return self.causes[0].cause
+        counted = [f"{count.cause} ({count.files})" for count in self.causes[:_CAUSES]]
+        remaining = sum(count.files for count in self.causes[_CAUSES:])
         return ", ".join(counted) + (f", others ({remaining})" if remaining else "")
 
     def _since(self) -> str:
         if self.first is None:
             return "since when is unknown: no test date"
         return f"from {self.first} to {self.last}" if self.first != self.last else f"in {self.first}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the headline under the keys of the answer."""
-        return {
-            "sentence": self.sentence,
-            "files": self.files,
-            "wrong": self.wrong,
-            "FY_max_abs_N": self.FY_N,
-            "MZ_max_abs_Nm": self.MZ_Nm,
-            "causes": [{"cause": cause, "files": count} for cause, count in self.causes],
-            "from": self.first,
-            "to": self.last,
-            "unjudged": self.unjudged,
-            "unreadable": self.unreadable,
-            "impossible": self.impossible,
-            "altered_cells": self.altered,
-            "undecided": self.disputed,
-            "small": self.small,
-            "stepping": self.stepping,
-            "corrected_copies": self.copies,
-            "no_recording": self.no_recording,
-            **({"without_values": self.bare} if self.bare else {}),
-        }
 
 
 def headline(audit: ArchiveAudit) -> Headline:
@@ -194,10 +179,11 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
             causes[_cause_of(file)] += 1
             if file["date"]:
                 months.add(file["date"][:7])
+    counted = tuple(CauseCount(cause=cause, files=of) for cause, of in causes.most_common())
     return Headline(
-        files=count, wrong=wrong, FY_N=FY, MZ_Nm=MZ, causes=tuple(causes.most_common()),
+        files=count, wrong=wrong, FY_N=FY, MZ_Nm=MZ, causes=counted,
         first=min(months, default=None), last=max(months, default=None), unjudged=unjudged,
-        unreadable=unreadable, impossible=impossible, bare=bare, small=small, altered=altered,
+        unreadable=unreadable, impossible=impossible, bare=bare or None, small=small, altered=altered,
         disputed=open_files, no_recording=no_recording, stepping=stepping, copies=copies,
     )  # fmt: skip
 

@@ -66,11 +66,6 @@ def templates_of(home: Path, kind: str | None = None) -> dict[str, str]:
     }
 
 
-def _kind_now(template: Path) -> str:
-    state = template.stat()
-    return _kind_of(template, state.st_mtime_ns, state.st_size)
-
-
 @lru_cache(maxsize=256)
 def _kind_of(template: Path, _changed: int, _size: int) -> str:
     from toolkit.report.kinds import kind_of

@@ -49,7 +49,7 @@ def recordings_answer(folder: Path, registry: Registry) -> dict[str, Any]:
     from toolkit.audit.identify import recompute
     from toolkit.audit.model import columns_of
     from toolkit.audit.one_file import Auditor, OwnOutput
-    from toolkit.audit.serial import to_plain
+    from toolkit.declared import json_value
     from toolkit.recording.folder import read_test_folder
     from toolkit.recording.read import read_recording
 
@@ -59,7 +59,7 @@ def recordings_answer(folder: Path, registry: Registry) -> dict[str, Any]:
         audited = auditor(path.relative_to(folder).as_posix())
         if isinstance(audited, OwnOutput):
             continue
-        plain = to_plain(audited)
+        plain = json_value(audited)
         charts = {}
         if plain["in_force"] is not None:
             columns = columns_of(recording := read_recording(path, context_of(path).machine))

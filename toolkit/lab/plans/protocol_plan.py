@@ -17,10 +17,10 @@ from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.findings import FindingEntry
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
+from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
 from toolkit.planning.protocol_plan import ProtocolPlan
 
 if TYPE_CHECKING:
-    from toolkit.lab.tire_tests.resolve import Resolved
     from toolkit.machine import Machine
     from toolkit.planning.expectation import EarlierTest
     from toolkit.planning.printed_units import PrintedUnits
@@ -64,10 +64,7 @@ class ProtocolOrder:
     between_files_s: float | None = None
     sliding_kJ: float = math.inf
     rise_K: float = math.inf
-    calibration: str | None = None
-    calibrations: Path | None = None
-    home: Path | None = None
-    draft: bool = False
+    basis: Basis = field(default_factory=Basis)
 
 
 def plan_test(
@@ -175,16 +172,12 @@ def _tires(
 
 def _earlier(order: ProtocolOrder, like: Path | None) -> tuple[EarlierTest, str, Path | None]:
     """Return an earlier test, what it is called, and the tire file that it was simulated from."""
-    from toolkit.lab.tire_tests.resolve import resolve_test
 
     if like is None or like.suffix.lower() in _TIRE_FILES:
         what = "the published passenger tire (SAE 870421)" if like is None else f"the tire {like.name}"
         earlier = dataclasses.replace(_virtual(order, like), tire=what if like is None else str(like))
         return earlier, f"{_SIMULATED} simulated tests of {what} on the virtual machine", like
-    resolved = resolve_test(
-        like, calibration=order.calibration, calibrations=order.calibrations, home=order.home,
-        draft=order.draft,
-    )  # fmt: skip
+    resolved = resolve_test(like, order.basis)
     name = f"the test {resolved.result.reduced.info.name}"
     return dataclasses.replace(_of(resolved, str(like)), tire=str(like)), name, None
 
@@ -207,23 +200,20 @@ def _virtual(order: ProtocolOrder, like: Path | None) -> EarlierTest:
     """Return the virtual machine's protocol on a tire, processed: what is expected of such a tire."""
     from toolkit.lab.home import packaged_home, registry_if_any
     from toolkit.lab.studies.simulate import simulate_plan
-    from toolkit.lab.tire_tests.resolve import resolve_test
     from toolkit.machine.default import SIMULATED_MACHINE
     from toolkit.planning.expectation import pooled
 
-    registry = registry_if_any(order.calibrations, order.home)
+    registry = registry_if_any(order.basis.calibrations, order.basis.home)
     known = registry is not None and (registry.folder / SIMULATED_MACHINE).is_dir()
     calibrations = registry.folder if registry is not None and known else packaged_home() / "calibrations"
+    basis = dataclasses.replace(order.basis, calibrations=calibrations, home=None)
     plan = _virtual_plan(like)
     tests = []
     with tempfile.TemporaryDirectory() as folder:
         for number in range(_SIMULATED):
             test = Path(folder) / str(number)
             simulate_plan(dataclasses.replace(plan, seed=plan.seed + number), test, calibrations=calibrations)
-            resolved = resolve_test(
-                test, calibration=order.calibration, calibrations=calibrations, draft=order.draft
-            )
-            tests.append(_of(resolved, str(like)))
+            tests.append(_of(resolve_test(test, basis), str(like)))
     return pooled(tests)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Entry
     from toolkit.findings import Finding
     from toolkit.lab.tire_tests.compare_answer import LaboratoryKeys
+    from toolkit.lab.tire_tests.resolve import Basis
     from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
     from toolkit.report.word.package import Template
@@ -76,7 +77,9 @@ def _deliver(
     return deliver(opened, content, out, name="comparison", stage=stage)
 
 
-def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple[list[Entry], list[Finding]]:
+def read_entries(
+    sources: Sequence[Path], basis: Basis, *, axes: str, step: Callable[[str], None]
+) -> tuple[list[Entry], list[Finding]]:
     """Return what is compared, tests first read so that tables are read at their slip angles."""
     from toolkit.comparison.compare import DEFAULT_ANGLES
 
@@ -85,7 +88,7 @@ def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple
     tables = [i for i, path in enumerate(sources) if path.suffix.lower() == ".csv" and not path.is_dir()]
     for place, path in enumerate(sources):
         if place not in tables:
-            entries[place], own_findings = _test(path, **options)
+            entries[place], own_findings = _test(path, basis, step)
             findings += own_findings
     angles = sorted(
         {row.SA_rad for entry in entries.values() for row in entry.rows if row.SA_rad is not None}
@@ -96,13 +99,13 @@ def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple
     return [entries[place] for place in range(len(sources))], findings
 
 
-def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
+def _test(path: Path, basis: Basis, step: Callable[[str], None]) -> tuple[Entry, list[Finding]]:
     from dataclasses import replace
 
     from toolkit.comparison.compare import test_entry
     from toolkit.lab.tire_tests.resolve import resolve_test
 
-    resolved = resolve_test(path, **options)
+    resolved = resolve_test(path, basis, step=step)
     reduced = resolved.result.reduced
     entry = test_entry(
         reduced,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,7 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.lab.tire_tests.resolve import Resolved
+    from toolkit.lab.tire_tests.resolve import Basis, Resolved
     from toolkit.machine.definition import Drum
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
@@ -130,11 +129,7 @@ def fit_test_models(
     weights: str,
     rated_load_N: float | None,
     radius_m: float | None,
-    calibration: str | None,
-    calibrations: Path | None,
-    home: Path | None,
-    known_at: date | None,
-    draft: bool = False,
+    basis: Basis,
 ) -> Fitted:
     """Return the fits of a test: single loads in both directions, models over all loads of the forward run.
 
@@ -150,13 +145,9 @@ def fit_test_models(
             "a test is reduced to SAE axes", where="--axes", got=axes, expected="SAE for a test",
             next_step="leave --axes away; it declares the axes of a table", rule="axes-of-test",
         )  # fmt: skip
-    resolved = resolve_test(
-        test, calibration=calibration, calibrations=calibrations, home=home, known_at=known_at,
-        draft=draft,
-    )  # fmt: skip
     return fit_resolved(
-        resolved, names, where=str(test), loss=loss, weights=weights, rated_load_N=rated_load_N,
-        radius_m=radius_m,
+        resolve_test(test, basis), names, where=str(test), loss=loss, weights=weights,
+        rated_load_N=rated_load_N, radius_m=radius_m,
     )  # fmt: skip
 
 

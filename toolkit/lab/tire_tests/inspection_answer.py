@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from toolkit.audit.model import DisagreeingSides, Repair, SkippedRecord
+from toolkit.calibration.registry.registry import RefusedRecord
 from toolkit.declared.answers import entry_of, merged
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines, table
@@ -14,7 +16,8 @@ from toolkit.lab.answers import finding_lines, table
 if TYPE_CHECKING:
     from toolkit.audit.estimate import Interval
     from toolkit.audit.inspection import Inspection, LoadBlock
-    from toolkit.audit.model import Segment as AuditSegment
+    from toolkit.calibration.registry.registry import RefusedRecord
+from toolkit.audit.model import Segment
 
 
 class SeriesEntry(TypedDict):
@@ -53,7 +56,7 @@ class BlockValues(TypedDict):
     MZ_lbf_ft: float | None
 
 
-class Segment(TypedDict):
+class IdentifiedSegment(TypedDict):
     """Rows that one record computed."""
 
     first_row: int
@@ -62,36 +65,6 @@ class Segment(TypedDict):
     variant: Annotated[str | None, "how the record was changed: E5 negative in FY, MZ"]
     grade: str
     candidates: NotRequired[Annotated[Sequence[str], "of an ambiguous segment"]]
-
-
-class Repair(TypedDict):
-    """The largest difference between the file and the record in force."""
-
-    FY_max_abs_N: float | None
-    MZ_max_abs_Nm: float | None
-
-
-class DisagreeingSides(TypedDict):
-    """Which side is wrong where Fy and Mz disagree with the cells beside them."""
-
-    side: Annotated[str, "forces, cells or open"]
-    reason: str
-    grade: Annotated[str, "of the file if Fy and Mz are the wrong side"]
-
-
-class SkippedRecord(TypedDict):
-    """A record that could not be a candidate."""
-
-    id: str
-    reason: str
-
-
-class RefusedRecord(TypedDict):
-    """A record that does not hold what its hash says."""
-
-    id: str
-    rule: str
-    reason: str
 
 
 class Identified(TypedDict):
@@ -105,7 +78,7 @@ class Identified(TypedDict):
     withdrawn: Annotated[str | None, "why the record was withdrawn"]
     against_corrected_by: Annotated[str | None, "signs that differ from the record in force, in words"]
     void_always: bool | None
-    segments: list[Segment]
+    segments: list[IdentifiedSegment]
     sides: Annotated[DisagreeingSides | None, "where rows disagree with their cells: which side is wrong"]
     in_force: Annotated[str | None, "the record in force on the date of the test"]
     repair: Repair | None
@@ -150,7 +123,7 @@ class Inspected(TypedDict):
     corrected: list[BlockValues]
     corrected_first_row: BlockValues
     intervals: list[CoefficientInterval]
-    refused_records: list[RefusedRecord]
+    refused_records: Sequence[RefusedRecord]
     findings: list[FindingEntry]
 
 
@@ -201,10 +174,7 @@ def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) 
         "corrected": [_values(block) for block in inspection.blocks],
         "corrected_first_row": _values(inspection.first_row),
         "intervals": [entry_of(CoefficientInterval, interval) for interval in intervals],
-        "refused_records": [
-            entry_of(RefusedRecord, refusal)
-            for refusal in (inspection.choice.refused if inspection.choice else ())
-        ],
+        "refused_records": inspection.choice.refused if inspection.choice else (),
         "findings": [finding.as_dict() for finding in inspection.findings],
     }
 
@@ -239,7 +209,6 @@ def _calibration(inspection: Inspection) -> Identified | None:
     return entry_of(
         Identified, identified,
         issued_digits=identified.issued,
-        sides=None if identified.sides is None else entry_of(DisagreeingSides, identified.sides),
         withdrawn=None if withdrawn is None else withdrawn.reason,
         against_corrected_by=wrong_signs(inspection),
         void_always=None if withdrawn is None else withdrawn.void_always,
@@ -247,8 +216,8 @@ def _calibration(inspection: Inspection) -> Identified | None:
     )  # fmt: skip
 
 
-def _segment(segment: AuditSegment) -> Segment:
-    entry = entry_of(Segment, segment)
+def _segment(segment: Segment) -> IdentifiedSegment:
+    entry = entry_of(IdentifiedSegment, segment)
     if not segment.candidates:
         del entry["candidates"]
     return entry

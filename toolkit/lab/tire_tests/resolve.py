@@ -30,25 +30,30 @@ class Resolved:
     recordings: tuple[tuple[str, Recording], ...] = ()
 
 
-def resolve_test(
-    test: Path,
-    *,
-    calibration: str | None = None,
-    calibrations: Path | None = None,
-    home: Path | None = None,
-    known_at: date | None = None,
-    draft: bool = False,
-    reader: Literal["calamine", "both"] = "calamine",
-    protocol: Path | None = None,
-    step: Callable[[str], None] = lambda _name: None,
-) -> Resolved:
-    """Return the result of a TEST argument.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Basis:
+    """What a test's result rests on.
 
     The record is ``calibration`` where it is named, else the one in force on the test's date as known at
-    ``known_at``; the protocol is that of the file named, else the test's own, else the machine's. A reduced
-    test keeps the record that made it, which must still be in the registry, whole
-    and with the same hash. A record that may not make a number (`registry.standing`) is refused, unless a
-    ``draft`` is asked for: the result then says that it is one.
+    ``known_at``; the protocol is that of the file named, else the test's own, else the machine's. A record
+    that may not make a number (`registry.standing`) is refused, unless a ``draft`` is asked for: the result
+    then says that it is one.
+    """
+
+    calibration: str | None = None
+    calibrations: Path | None = None
+    home: Path | None = None
+    known_at: date | None = None
+    draft: bool = False
+    reader: Literal["calamine", "both"] = "calamine"
+    protocol: Path | None = None
+
+
+def resolve_test(test: Path, basis: Basis, *, step: Callable[[str], None] = lambda _name: None) -> Resolved:
+    """Return the result of a TEST argument.
+
+    A reduced test keeps the record that made it, which must still be in the registry, whole and with the same
+    hash.
 
     Raises
     ------
@@ -57,51 +62,32 @@ def resolve_test(
     """
     from toolkit.calibration.registry.registry import Registry
 
-    registry = Registry(calibrations_folder(calibrations, home))
+    registry = Registry(calibrations_folder(basis.calibrations, basis.home))
     if test.is_dir():
-        return _from_folder(
-            test,
-            registry,
-            calibration=calibration,
-            known_at=known_at,
-            draft=draft,
-            reader=reader,
-            protocol=protocol,
-            step=step,
-        )
-    if protocol is not None:
+        return _from_folder(test, registry, basis, step)
+    if basis.protocol is not None:
         raise ConfigError(
             "a reduced test keeps the protocol that it was reduced by",
             where=test,
-            got=f"--protocol {protocol}",
+            got=f"--protocol {basis.protocol}",
             expected="a folder of recordings",
             next_step="process the recordings again with this protocol",
             rule="protocol-of-reduced",
         )
-    return _from_file(test, registry, calibration=calibration, known_at=known_at, draft=draft)
+    return _from_file(test, registry, basis)
 
 
-def _from_folder(
-    test: Path,
-    registry: Registry,
-    *,
-    calibration: str | None,
-    known_at: date | None,
-    draft: bool,
-    reader: Literal["calamine", "both"],
-    protocol: Path | None,
-    step: Callable[[str], None],
-) -> Resolved:
+def _from_folder(test: Path, registry: Registry, basis: Basis, step: Callable[[str], None]) -> Resolved:
     from toolkit.calibration.registry.standing import standing
     from toolkit.machine import read_protocol
     from toolkit.pipeline import machine_of, process, read_test
     from toolkit.recording.folder import read_test_folder
 
     folder = read_test_folder(test)
-    plan = None if protocol is None else read_protocol(protocol)
+    plan = None if basis.protocol is None else read_protocol(basis.protocol)
     machine = machine_of(folder, plan)
     on = date.fromisoformat(folder.info.date) if folder.info.date else None
-    if calibration is None and on is None:
+    if basis.calibration is None and on is None:
         raise ConfigError(
             "the test has no date, so no calibration record can be chosen",
             where=test / "test.toml",
@@ -110,9 +96,9 @@ def _from_folder(
             next_step="write the test's date into test.toml, or make a draft with --calibration ID --draft",
             rule="no-date",
         )
-    stands = standing(registry, machine.name, on=on, known_at=known_at, named=calibration)
-    use = stands.use(draft=draft, where=test)
-    recordings = read_test(folder, reader=reader, step=step)
+    stands = standing(registry, machine.name, on=on, known_at=basis.known_at, named=basis.calibration)
+    use = stands.use(draft=basis.draft, where=test)
+    recordings = read_test(folder, reader=basis.reader, step=step)
     result = process(folder, recordings, stands.record, protocol=plan, use=use)
     return Resolved(
         result=result,
@@ -132,9 +118,7 @@ def _findings(use: CalibrationUse) -> list[Finding]:
     ]
 
 
-def _from_file(
-    test: Path, registry: Registry, *, calibration: str | None, known_at: date | None, draft: bool
-) -> Resolved:
+def _from_file(test: Path, registry: Registry, basis: Basis) -> Resolved:
     from toolkit.calibration.registry.standing import Reason, standing
     from toolkit.errors import RecordError
     from toolkit.recording.marks import is_own_output
@@ -165,7 +149,7 @@ def _from_file(
     result = replace(result, reduced=checked(result.reduced))
     recorded = result.reduced.calibration
     record = registry.load(recorded.id)
-    applied = record if calibration in (None, recorded.id) else registry.load(calibration)
+    applied = record if basis.calibration in (None, recorded.id) else registry.load(basis.calibration)
     if applied.sha256 != recorded.sha256:
         raise RecordError(
             "the reduced test was made with another calibration record",
@@ -178,14 +162,14 @@ def _from_file(
     info = result.reduced.info
     on = date.fromisoformat(info.date) if info.date else None
     # That a record is of another machine was told when the file was made, and stays with it.
-    stands = standing(registry, record.instrument, on=on, known_at=known_at, named=record.id)
+    stands = standing(registry, record.instrument, on=on, known_at=basis.known_at, named=record.id)
     # What the file was made with stays with it: a draft is issued by processing the recordings again.
     own_reasons = tuple(
         Reason(text=one, next_step="process the recordings again with a record in force")
         for one in recorded.draft_reasons
         if one not in {reason.text for reason in stands.reasons}
     )
-    use = replace(stands, reasons=(*own_reasons, *stands.reasons)).use(draft=draft, where=test)
+    use = replace(stands, reasons=(*own_reasons, *stands.reasons)).use(draft=basis.draft, where=test)
     later = dict.fromkeys(one for one in (*recorded.since, *use.since) if one not in use.draft_reasons)
     use = replace(use, since=tuple(later))
     if use != recorded:

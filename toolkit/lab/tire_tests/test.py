@@ -123,13 +123,13 @@ class Test(Face):
         ToolkitError
             a recording cannot be read, no record is in force, or the test cannot be reduced
         """
-        from toolkit.lab.tire_tests.resolve import resolve_test
+        from toolkit.lab.tire_tests.resolve import Basis, resolve_test
 
-        resolved = resolve_test(
-            self.path, calibration=calibration, calibrations=self.calibrations, home=self.home,
-            known_at=known_at, draft=draft, protocol=as_path(protocol),
+        basis = Basis(
+            calibration=calibration, calibrations=self.calibrations, home=self.home, known_at=known_at,
+            draft=draft, protocol=as_path(protocol),
         )  # fmt: skip
-        return ProcessedTest(path=self.path, result=resolved)
+        return ProcessedTest(path=self.path, result=resolve_test(self.path, basis))
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one recording a row: file, rows, channels with their units."""

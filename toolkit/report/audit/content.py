@@ -96,7 +96,6 @@ def build_audit_content(view: AuditView, style: Style | None = None) -> ReportCo
         style,
         calibrations=view.uses,
         title=f"Audit of the archive {summary.name}",
-        author=style.laboratory or "toolkit",
         identity=summary.id,
         subject="Audit of an archive of recordings",
         issued=view.made.known_at,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from toolkit.audit.archive import ArchiveAudit
-    from toolkit.audit.linked import Linked, PastReport
+    from toolkit.audit.linked import Linked, RestingReport
     from toolkit.audit.since_good import Drift
     from toolkit.audit.timeline import Timeline, Trace
     from toolkit.calibration.records.use import CalibrationUse
@@ -201,15 +201,15 @@ def _coefficients(equation: Mapping[str, Any]) -> Table:
     return table(("term", "estimate", "from", "to"), rows, numbers=(1, 2, 3))
 
 
-def _reports(reports: Iterable[PastReport]) -> Table:
+def _reports(reports: Iterable[RestingReport]) -> Table:
     rows = [
         (
-            line["report"],
-            ", ".join(line["linked_by"]) or "nothing",
-            ", ".join(line["tests"]),
-            f"{line['not_clean']} of {report.files}",
+            report.report,
+            ", ".join(sorted(report.linked_by)) or "nothing",
+            ", ".join(sorted(report.tests)),
+            f"{report.not_clean} of {report.files}",
         )
-        for report, line in ((report, report.as_dict()) for report in reports)
+        for report in reports
     ]
     return table(("report", "linked by", "tests", "files not right"), rows, numbers=(3,))
 

@@ -104,7 +104,6 @@ def build_comparison_content(
         style,
         calibrations=comparison.uses,
         title=source.title,
-        author=style.laboratory or "toolkit",
         identity=source.id,
         subject="Comparison of tire force and moment tests",
         issued=issued,

@@ -51,7 +51,6 @@ def build_diagnosis_content(
         style,
         calibrations=() if use is None else (use,),
         title=source.answer.title,
-        author=style.laboratory or "toolkit",
         identity=source.id,
         subject="Diagnosis: simulation against recording",
         issued=issued,

@@ -86,9 +86,7 @@ def build_laboratories_content(compared: ComparedLaboratories, style: Style) -> 
     return LABORATORIES.content(
         compared,
         style,
-        calibrations=(),
         title=compared.title,
-        author=style.laboratory or "toolkit",
         identity=compared.id,
         subject=_SUBJECT,
         issued=compared.issued,

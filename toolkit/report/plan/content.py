@@ -95,9 +95,7 @@ def build_plan_content(sheet: PlanSheet, style: Style) -> ReportContent:
     return PLAN.content(
         sheet,
         style,
-        calibrations=(),
         title=sheet.title,
-        author=style.laboratory or "toolkit",
         identity=sheet.id,
         subject=_SUBJECTS[sheet.kind],
         issued=sheet.issued,

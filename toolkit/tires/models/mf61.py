@@ -33,10 +33,10 @@ from toolkit.tires.mf import (
     weight_y,
 )
 from toolkit.tires.recorded import as_array, may_differ_from_zero
-from toolkit.tires.slip import State, cosine, nonzero, readers, sine, state
+from toolkit.tires.slip import State, cosine, nonzero, readers, sine
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
@@ -64,42 +64,6 @@ class Lateral:
     K: Array
     friction: Array
     residual_shift: Array
-
-
-def lateral(
-    p: Mapping[str, float],
-    *,
-    SA: ArrayLike,
-    FZ: ArrayLike,
-    FNOMIN: float,
-    IA: ArrayLike = 0.0,
-    pressure_change: ArrayLike = 0.0,
-) -> Lateral:
-    """Return FY [N] of pure slip at slip angles [rad], loads [N], camber [rad]; arrays broadcast.
-
-    Parameters
-    ----------
-    p : coefficients and scale factors by their names in a tire file
-    FNOMIN : nominal load [N]
-    pressure_change : (P - NOMPRES) / NOMPRES
-    """
-    return side(p, state(p, SA=SA, FZ=FZ, FNOMIN=FNOMIN, IA=IA, pressure_change=pressure_change))
-
-
-def aligning(
-    p: Mapping[str, float],
-    *,
-    SA: ArrayLike,
-    FZ: ArrayLike,
-    FNOMIN: float,
-    UNLOADED_RADIUS: float,
-    IA: ArrayLike = 0.0,
-    pressure_change: ArrayLike = 0.0,
-) -> Array:
-    """Return MZ [N·m] of pure slip: minus the trail times FY at zero camber, plus the residual moment."""
-    q = state(p, SA=SA, FZ=FZ, FNOMIN=FNOMIN, IA=IA, pressure_change=pressure_change)
-    leaned, upright = side(p, q), side(p, q.upright())
-    return _moment(p, q, leaned, FY=upright.FY, ratio=np.asarray(0.0), UNLOADED_RADIUS=UNLOADED_RADIUS)
 
 
 def forces(p: Mapping[str, float], q: State, *, UNLOADED_RADIUS: float) -> Forces:
