@@ -100,7 +100,9 @@ def test_three_loads_and_seven_angles_give_the_moment_between_them(name: str, se
     assert "between-loads" not in {finding.rule for finding in global_findings(fit)}
 
 
-OTHER = pytest.mark.campaign("the other formula on the same rows: each design has one in every run, and each one")
+OTHER = pytest.mark.campaign(
+    "the other formula on the same rows: each design has one in every run, and each one"
+)
 
 
 @pytest.mark.parametrize(

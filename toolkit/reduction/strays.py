@@ -224,17 +224,22 @@ class _Surface:
         ends = np.cumsum([len(group) for group in groups])
         parts = [slice(int(end) - len(group), int(end)) for group, end in zip(groups, ends, strict=True)]
         X = self._design(rows, k)
-        Q, size, _ = np.linalg.svd(X / np.linalg.norm(X, axis=0), full_matrices=False)
-        Q = Q[:, size > _NO_SIGNAL * size[0]]
+        Q, singular, _ = np.linalg.svd(X / np.linalg.norm(X, axis=0), full_matrices=False)
+        Q = Q[:, singular > _NO_SIGNAL * singular[0]]
         residual = y[rows] - Q @ (Q.T @ y[rows])
-        misses = []
-        for part in parts:
+        misses: dict[int, _Miss] = {}
+        for size in {part.stop - part.start for part in parts}:  # groups of a size at once
+            alike = [at for at, part in enumerate(parts) if part.stop - part.start == size]
+            left_out = np.array([parts[at].start for at in alike])[:, None] + np.arange(size)
+            own = Q[left_out]
             # (I - H)^-1 r of the rows left out is what a fit without them misses there.
-            spread = np.linalg.pinv(np.eye(part.stop - part.start) - Q[part] @ Q[part].T, rcond=1e-6)
-            off = spread @ residual[part]
-            rms, leverage = (float(np.sqrt(np.mean(v))) for v in (off**2, np.diag(spread)))
-            misses.append(_Miss(off=off, size=rms, freed=rms / max(leverage, 1.0)))
-        return misses
+            spread = np.linalg.pinv(np.eye(size) - own @ own.transpose(0, 2, 1), rcond=1e-6)
+            off = (spread @ residual[left_out][:, :, None])[:, :, 0]
+            rms = np.sqrt(np.mean(off**2, axis=1))
+            leverage = np.sqrt(np.mean(np.diagonal(spread, axis1=1, axis2=2), axis=1))
+            for at, missed, one, held in zip(alike, off, rms.tolist(), leverage.tolist(), strict=True):
+                misses[at] = _Miss(off=missed, size=one, freed=one / max(held, 1.0))
+        return [misses[at] for at in range(len(parts))]
 
 
 def _usual(misses: Sequence[_Miss]) -> float:

@@ -18,7 +18,9 @@ def test_a_masked_pair_at_the_end_of_a_line() -> None:
     assert contradicting(np.column_stack([x, np.ones(20)]), y) == (19, 20)
 
 
-BETWEEN = pytest.mark.campaign("sessions between the shortest and those of most terms, which hold in every run")
+BETWEEN = pytest.mark.campaign(
+    "sessions between the shortest and those of most terms, which hold in every run"
+)
 
 
 @pytest.mark.parametrize(

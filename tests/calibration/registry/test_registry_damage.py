@@ -68,7 +68,9 @@ def dying(step: Step, folder: Path, point: str, at: int) -> None:
     os._exit(0)
 
 
-ALIKE = pytest.mark.campaign("an entry that is written as an approval is, which is killed at each kind of call")
+ALIKE = pytest.mark.campaign(
+    "an entry that is written as an approval is, which is killed at each kind of call"
+)
 
 
 @pytest.mark.parametrize(
