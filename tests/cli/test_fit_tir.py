@@ -15,8 +15,7 @@ from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_evaluate import evaluate_tir
 
 
-@pytest.fixture(scope="module")
-def table(tmp_path_factory):
+def written(folder):
     lines = ["SA [deg],FZ [N],FY [N],MZ [N*m]"]
     for FZ in (2000.0, 3500.0, 5000.0):
         for degrees in np.arange(-10.0, 10.5, 1.0):
@@ -24,16 +23,21 @@ def table(tmp_path_factory):
             FY = value((11.0, 1.3, -FZ, -0.5, 0.0, 0.0), SA)
             MZ = value((10.0, 2.3, 0.03 * FZ, -1.0, 0.0, 0.0), SA)
             lines.append(f"{degrees},{FZ},{FY:.4f},{MZ:.5f}")
-    path = tmp_path_factory.mktemp("table") / "tire.csv"
+    path = folder / "tire.csv"
     path.write_text("\n".join(lines) + "\n")
     return path
 
 
+@pytest.fixture
+def table(tmp_path):
+    return written(tmp_path)
+
+
 @pytest.fixture(scope="module")
-def fitted(table, tmp_path_factory):
+def fitted(tmp_path_factory):
     """Return the tire file and the FMU of one fit of the table, to read, and what the command says of it."""
     folder = tmp_path_factory.mktemp("fitted")
-    tir, fmu = folder / "x.tir", folder / "x.fmu"
+    table, tir, fmu = written(folder), folder / "x.tir", folder / "x.fmu"
     code, text = run(
         fit.command, table, "--model", "mf61", "--tir", tir, "--fmu", fmu, "--fmi", "3", "--json"
     )
