@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from toolkit.calibration.fit.regression import Factor, fit_terms
+from toolkit.calibration.fit.regression import fit_terms
 from toolkit.calibration.records.golden import golden_inputs, predict_exactly, solve_exactly
 from toolkit.calibration.terms import model_terms, parse_term, term_matrix
 from toolkit.errors import SessionError
@@ -146,22 +146,6 @@ def test_a_change_of_an_indications_unit_scales_its_coefficient_inversely(factor
     expected = [c / (factor if i == which else 1) for i, c in enumerate(before.coefficients)]
     assert after.coefficients == pytest.approx(expected, rel=1e-9)
     assert after.residual_sd == pytest.approx(before.residual_sd, rel=1e-9)
-
-
-@pytest.mark.parametrize("weighted", [False, True])
-def test_what_is_refined_is_the_solution_of_statsmodels_to_the_last_bit(weighted: bool) -> None:
-    from statsmodels.regression.linear_model import OLS
-
-    rng = np.random.default_rng(3)
-    for terms in range(1, 8):
-        design = rng.normal(size=(40, terms)) * 10.0 ** rng.uniform(-4, 4, terms)
-        loads, root = rng.normal(size=(2, 40)), rng.uniform(0.5, 2.0, 40) if weighted else np.ones(40)
-        factor = Factor.of(design, root if weighted else None)
-        head = (loads * root) @ factor.q
-        left = np.linalg.norm(loads * root - head @ factor.q.T, axis=1)
-        rows = np.vstack([factor.r, np.zeros(terms)])
-        for solution, *y in zip(factor._first(loads), *head.T, left, strict=True):
-            assert OLS(y, rows).fit(method="qr").params == pytest.approx(solution, rel=1e-14)
 
 
 def test_golden_points_reach_both_ends_of_every_indication() -> None:

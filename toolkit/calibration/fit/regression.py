@@ -1,4 +1,4 @@
-"""Least squares as `metrology` demands it: QR on exactly centred, scaled columns, refined.
+"""Least squares as `metrology` demands it: statsmodels with QR on exactly centred, scaled columns, refined.
 
 A pseudo-inverse on raw columns gives six correct digits on the NIST load-cell set (Pontius); QR on scaled
 columns gives twelve. Refinement with a gradient A'(y - A x) that does not round (`exact_products`; corrected
@@ -259,17 +259,19 @@ class Factor:
         return solution, residuals.high + residuals.low
 
     def _first(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the solution by QR (loads, terms), as statsmodels' OLS has it to the last bit.
+        """Return statsmodels' solution by QR (loads, terms).
 
-        The triangle R and Q'y with the length of what is left over stand in place of all rows: an orthogonal
-        change of the same problem, with the same solution and the same sum of squares.
+        It is given the triangle R and Q'y with the length of what is left over, in place of all rows: an
+        orthogonal change of the same problem, with the same solution and the same sum of squares.
         """
+        from statsmodels.regression.linear_model import OLS
+
         y = loads if self.root is None else loads * self.root
         head = y @ self.q
         residual = y - head @ self.q.T
         length = np.sqrt(np.einsum("ij,ij->i", residual, residual))
-        q, r = np.linalg.qr(np.vstack([self.r, np.zeros(len(self.r))]))
-        solutions = [np.linalg.solve(r, q.T @ column) for column in np.column_stack([head, length])]
+        rows = np.vstack([self.r, np.zeros(len(self.r))])
+        solutions = [OLS(column, rows).fit(method="qr").params for column in np.column_stack([head, length])]
         return np.asarray(solutions, dtype=np.float64)
 
 
