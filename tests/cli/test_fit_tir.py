@@ -15,8 +15,7 @@ from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_evaluate import evaluate_tir
 
 
-@pytest.fixture
-def table(tmp_path):
+def written(folder):
     lines = ["SA [deg],FZ [N],FY [N],MZ [N*m]"]
     for FZ in (2000.0, 3500.0, 5000.0):
         for degrees in np.arange(-10.0, 10.5, 1.0):
@@ -24,16 +23,31 @@ def table(tmp_path):
             FY = value((11.0, 1.3, -FZ, -0.5, 0.0, 0.0), SA)
             MZ = value((10.0, 2.3, 0.03 * FZ, -1.0, 0.0, 0.0), SA)
             lines.append(f"{degrees},{FZ},{FY:.4f},{MZ:.5f}")
-    path = tmp_path / "tire.csv"
+    path = folder / "tire.csv"
     path.write_text("\n".join(lines) + "\n")
     return path
 
 
-def test_the_tire_file_gives_the_table_again_in_its_axes(table, tmp_path):
-    tir, out = tmp_path / "x.tir", tmp_path / "out.csv"
-    code, text = run(fit.command, table, "--model", "mf61", "--tir", tir, "--json")
-    answer = json.loads(text)
+@pytest.fixture
+def table(tmp_path):
+    return written(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """Return the tire file and the FMU of one fit of the table, to read, and what the command says of it."""
+    folder = tmp_path_factory.mktemp("fitted")
+    table, tir, fmu = written(folder), folder / "x.tir", folder / "x.fmu"
+    code, text = run(
+        fit.command, table, "--model", "mf61", "--tir", tir, "--fmu", fmu, "--fmi", "3", "--json"
+    )
     assert code in (0, 1)
+    return tir, fmu, json.loads(text)
+
+
+def test_the_tire_file_gives_the_table_again_in_its_axes(table, fitted, tmp_path):
+    tir, _, answer = fitted
+    out = tmp_path / "out.csv"
     assert [(one["channel"], one["load_N"]) for one in answer["fits"]] == [("FY", None), ("MZ", None)]
     assert "tir-radius" in {finding["rule"] for finding in answer["findings"]}
     file = read_tir(tir)
@@ -59,8 +73,11 @@ def test_the_tire_file_gives_the_table_again_in_its_axes(table, tmp_path):
         (["--model", "mf61", "--rated-load", "-1"], "wrong-value"),
     ],
 )
-def test_what_a_tire_file_cannot_hold_is_refused(table, tmp_path, monkeypatch, options, rule):
+def test_what_a_tire_file_cannot_hold_is_refused_before_anything_is_fitted(
+    table, tmp_path, monkeypatch, options, rule
+):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("toolkit.lab.tire_tests.fit_models.fit_table_models", None)
     with pytest.raises(ToolkitError) as caught:
         run(fit.command, table, *options)
     assert (caught.value.rule, caught.value.exit_code) == (rule, 2)
@@ -110,15 +127,15 @@ def test_the_file_tells_its_formula_side_rated_load_radius_and_ranges(table, tmp
         assert error == pytest.approx(one["error_percent"], rel=1e-6)
 
 
-@pytest.mark.parametrize("fmi", ["2", "3"])
-def test_the_fmu_is_the_tire_of_the_tire_file(table, tmp_path, fmi):
-    tir, fmu, again = tmp_path / "x.tir", tmp_path / "x.fmu", tmp_path / "again.fmu"
-    _, text = run(fit.command, table, "--model", "mf61", "--tir", tir, "--fmu", fmu, "--fmi", fmi, "--json")
-    assert json.loads(text)["fmu"] == str(fmu)
-    run(convert.command, tir, again, "--fmi", fmi)
+def test_the_fmu_is_the_tire_of_the_tire_file(fitted, tmp_path):
+    tir, fmu, answer = fitted
+    assert answer["fmu"] == str(fmu)
+    again = {fmi: tmp_path / f"again-{fmi}.fmu" for fmi in ("2", "3")}
+    for fmi, path in again.items():
+        run(convert.command, tir, path, "--fmi", fmi)
     SA, FZ = np.linspace(-0.2, 0.2, 41), np.full(41, 3000.0)
     expected = evaluate_tir(read_tir(tir), SA=SA, FZ=FZ)[0]
-    for path in (fmu, again):
+    for path in (fmu, *again.values()):
         outputs = outputs_of(path, {"SA": SA, "FZ": FZ})
         np.testing.assert_allclose(outputs["FY"], expected.FY, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(outputs["MZ"], expected.MZ, rtol=1e-9, atol=1e-9)
@@ -140,10 +157,8 @@ def test_an_fmu_that_cannot_be_is_refused_before_anything_is_fitted(table, tmp_p
     assert not target.exists()
 
 
-def test_the_fmu_of_a_file_without_longitudinal_coefficients_says_so(table, tmp_path):
-    tir = tmp_path / "x.tir"
-    run(fit.command, table, "--model", "mf61", "--tir", tir)
-    code, text = run(convert.command, tir, tmp_path / "x.fmu", "--json")
+def test_the_fmu_of_a_file_without_longitudinal_coefficients_says_so(fitted, tmp_path):
+    code, text = run(convert.command, fitted[0], tmp_path / "x.fmu", "--json")
     notes = [finding for finding in json.loads(text)["findings"] if finding["rule"] == "tir-no-coefficients"]
     assert code == 0
     assert "FX holds nothing" in notes[0]["message"]

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from tests.qualification.demonstrated import as_demonstrated, demonstrated
 from toolkit import __version__
 from toolkit.cli.main import run
 from toolkit.qualification import numbers
@@ -51,13 +52,14 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Qualified:
         answered.append(qualified(**asked))
         return answered[0]
 
+    gates, _ = demonstrated(tmp_path_factory)
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        as_demonstrated(gates, patch)
         patch.setattr(qualification, "qualify", noted)
         assert qualify("--json", "--out", str(out)) == 0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numbers, "FOLDER", copy)
         # The gates ask nothing of that number: they stand as they were found above.
-        gates = tuple(check for check in answered[0].checks if check.group == "gates")
         patch.setattr(qualification, "check_gates", lambda _folder: gates)
         spoiled = qualified(**asked_for)
     return Qualified(whole=answered[0], spoiled=spoiled, printed=printed.getvalue(), out=out)

@@ -15,6 +15,7 @@ import pytest
 from scipy import linalg
 
 from tests.conftest import SHARED_DATA
+from tests.qualification.demonstrated import as_demonstrated, demonstrated
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.files import read_toml
 from toolkit.lab.home import packaged_home
@@ -53,8 +54,10 @@ def nist_file(name: str) -> tuple[dict[str, tuple[float, float]], float, list[li
 
 
 @pytest.fixture(scope="module")
-def record() -> QualificationRecord:
-    return qualify(calibrations=CALIBRATIONS, on=DAY)
+def record(tmp_path_factory: pytest.TempPathFactory) -> QualificationRecord:
+    with pytest.MonkeyPatch.context() as patch:
+        as_demonstrated(demonstrated(tmp_path_factory)[0], patch)
+        return qualify(calibrations=CALIBRATIONS, on=DAY)
 
 
 @pytest.fixture

@@ -102,9 +102,15 @@ PRINTED_OTHERWISE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", PRINTED_OTHERWISE)
-def test_what_is_printed_otherwise_is_no_loss(tmp_path: Path, name: str) -> None:
-    made = delivered(tmp_path, p(TAG) + PRINTED_OTHERWISE[name] + p("The end."))
+# What sets its pages otherwise has a document of its own; all else stands one below the other.
+PAGED = ("hyphens", "three columns", "pages")
+TOGETHER = tuple(name for name in PRINTED_OTHERWISE if name not in PAGED)
+
+
+@pytest.mark.parametrize("names", [TOGETHER, *((name,) for name in PAGED)], ids=lambda names: names[0])
+def test_what_is_printed_otherwise_is_no_loss(tmp_path: Path, names: tuple[str, ...]) -> None:
+    body = "".join(PRINTED_OTHERWISE[name] + p(f"The end of {name}.") for name in names)
+    made = delivered(tmp_path, p(TAG) + body)
     assert next(check.message for check in made.checks if check.name == "texts") == (
         "each text of the Word file has its place in the PDF"
     )

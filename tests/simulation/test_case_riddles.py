@@ -55,6 +55,9 @@ def test_a_makers_flat_table_against_the_lower_values_of_a_drum(flat_table):
     assert FY.augmented_rmse < 1.2 * FY.noise_floor < 0.5 * FY.refitted_rmse
 
 
+@pytest.mark.campaign(
+    "a null of the virtual machine: another one, and the brush without its drum, hold in every run"
+)
 def test_the_same_tire_without_the_drum_misses_nothing(tmp_path):
     plan = dataclasses.replace(read_plan(RIDDLES / "flat_table.toml"), effects=())
     found = answer(tmp_path, plan)

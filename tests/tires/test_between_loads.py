@@ -100,9 +100,21 @@ def test_three_loads_and_seven_angles_give_the_moment_between_them(name: str, se
     assert "between-loads" not in {finding.rule for finding in global_findings(fit)}
 
 
-@pytest.mark.parametrize("name", ["mf61", "pacejka94"])
+OTHER = pytest.mark.campaign(
+    "the other formula on the same rows: each design has one in every run, and each one"
+)
+
+
 @pytest.mark.parametrize(
-    ("design", "noise", "most"), [(FEW, 5e-3, 0.09), (WIDE, 5e-4, 0.09), (PAIR, 5e-3, 0.2)]
+    ("name", "design", "noise", "most"),
+    [
+        ("mf61", FEW, 5e-3, 0.09),
+        ("pacejka94", WIDE, 5e-4, 0.09),
+        ("mf61", PAIR, 5e-3, 0.2),
+        pytest.param("pacejka94", FEW, 5e-3, 0.09, marks=OTHER),
+        pytest.param("mf61", WIDE, 5e-4, 0.09, marks=OTHER),
+        pytest.param("pacejka94", PAIR, 5e-3, 0.2, marks=OTHER),
+    ],
 )
 def test_no_fit_is_far_from_the_tire_between_loads_without_a_finding(
     name: str, design: Any, noise: float, most: float

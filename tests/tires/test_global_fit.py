@@ -112,18 +112,18 @@ def test_every_axis_system_gives_the_same_tire_with_positive_stiffness(name, axe
 
 
 def test_intervals_of_a_global_fit_cover_the_truth():
-    # 60 tables x 7 coefficients that are free in truth and model; 0.95 of 420 independent cases would have a
-    # standard deviation of 0.011; within a table they are not independent, so that 0.89 is four of them.
+    # 30 tables x 7 coefficients that are free in truth and model; 0.95 of 210 independent cases would have a
+    # standard deviation of 0.015; within a table they are not independent, so that 0.89 is four of them.
     names = "PCY1 PDY1 PDY2 PEY1 PKY1 PKY2 PHY1".split()
     covered = []
-    for seed in range(60):
+    for seed in range(30):
         one = fit_global(find("mf52"), table(0.005, seed=seed, channels="FY"), predict=False).fit("FY")
         covered += [
             abs(p.value - TRUTH[p.name]) <= 2.006 * p.standard_error  # t, 53 dof
             for p in one.parameters
             if p.name in names and p.standard_error is not None
         ]
-    assert len(covered) > 350
+    assert len(covered) > 175
     assert 0.89 <= np.mean(covered) <= 0.995
 
 

@@ -78,12 +78,15 @@ def command(
     from toolkit.lab.tire_tests.tire_files import check_tir, write_fit
     from toolkit.publication import publication
     from toolkit.tires.field_file import is_field_file
+    from toolkit.tires.tir_write import check_side
 
     in_field_form = is_field_file(source)
     names = model_choice(model or ["mf61" if (tir or fmu) is not None and in_field_form else "magic_formula"])
     options = fit_options(loss, weights, rated_load, radius)
     into = check_tir(tir, source, names) if tir is not None else None
     modelled = check_fmu(fmu, source, names, fmi) if fmu is not None else None
+    if into is not None or modelled is not None:
+        check_side(side.upper())
     refuse_unwritable(figures)
     if source.suffix.lower() != ".csv" and not in_field_form:
         refuse_other_files(source)

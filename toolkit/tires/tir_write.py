@@ -51,6 +51,21 @@ class TireFit:
     TYRESIDE: str = "UNKNOWN"
 
 
+def check_side(side: str) -> None:
+    """Refuse a side of the tire that no property file has.
+
+    Raises
+    ------
+    ConfigError
+        ``unknown-side``
+    """
+    if side not in SIDES:
+        raise ConfigError(
+            f"unknown side of the tire {side!r}", where="--side", got=side, expected=", ".join(SIDES),
+            next_step="name one of those expected", rule="unknown-side",
+        )  # fmt: skip
+
+
 def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "UNKNOWN") -> TireFit:
     """Return what the property file of a fit holds; channels and slips that were not measured stay out.
 
@@ -65,11 +80,7 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
             expected=f"{', '.join(FITTYP)}: the Magic Formulas that .tir files hold",
             next_step="name one of those with --model", rule="tir-needs-global",
         )  # fmt: skip
-    if side not in SIDES:
-        raise ConfigError(
-            f"unknown side of the tire {side!r}", where="--side", got=side, expected=", ".join(SIDES),
-            next_step="name one of those expected", rule="unknown-side",
-        )  # fmt: skip
+    check_side(side)
     turned = data.turned("ISO-W").rows
     values = dict(zip(model.names, fit.values.tolist(), strict=True))
     slips = bool(np.ptp(turned.KAPPA))

@@ -68,8 +68,19 @@ def dying(step: Step, folder: Path, point: str, at: int) -> None:
     os._exit(0)
 
 
-@pytest.mark.parametrize("point", sorted(POINTS))
-@pytest.mark.parametrize("name", ["import", "approve", "withdraw"])
+ALIKE = pytest.mark.campaign(
+    "an entry that is written as an approval is, which is killed at each kind of call"
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "point"),
+    [
+        pytest.param(name, point, marks=[ALIKE] * (name != "approve" and point != "replace"))
+        for name in ("import", "approve", "withdraw")
+        for point in sorted(POINTS)
+    ],
+)
 def test_a_killed_decision_was_made_or_was_not(
     registry: Registry, source: Path, tmp_path: Path, name: str, point: str
 ) -> None:

@@ -98,7 +98,10 @@ def test_forces_of_a_velocity_have_a_place_where_the_position_is_recorded_in_tim
     assert not any(still.places(effect(name)) for name in BY_SPEED)
 
 
-@pytest.mark.parametrize("how", [{}, {"noise": 0.1}, {"step": 0.5}])
+EXACT = pytest.mark.campaign("a position without noise, which asks less than the two of every run")
+
+
+@pytest.mark.parametrize("how", [pytest.param({}, marks=EXACT), {"noise": 0.1}, {"step": 0.5}])
 def test_friction_is_named_beside_a_position_alone(tmp_path, how):
     made = diagnose(case(tmp_path, friction=4.0, **how), None).diagnosis
     (one,) = made.effects

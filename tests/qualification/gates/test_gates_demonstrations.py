@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import socket
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 
 import toolkit
+from tests.qualification.demonstrated import demonstrated
 from tests.recording.fig4_4 import ROWS, SYMBOLS
 from toolkit.calibration.registry import gates, judgement
 from toolkit.files import read_toml
@@ -46,25 +46,8 @@ NO_GATE = {
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The only folder that the demonstrations have: home, temporary files and what they begin in."""
-    return tmp_path_factory.mktemp("alone")
-
-
-@pytest.fixture(scope="module")
-def checks(alone: Path) -> list[Check]:
-    """Every demonstration, once, where a connection is an error."""
-
-    def connect(*_: object) -> None:
-        raise AssertionError("the qualification opened a connection")
-
-    (alone / "tmp").mkdir()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(socket.socket, "connect", connect)
-        patch.setattr(tempfile, "tempdir", str(alone / "tmp"))
-        patch.chdir(alone)
-        patch.setenv("HOME", str(alone))
-        return check_gates(FOLDER)
+def checks(tmp_path_factory: pytest.TempPathFactory) -> list[Check]:
+    return demonstrated(tmp_path_factory)[0]
 
 
 def rules_of_source() -> set[str]:
@@ -251,7 +234,8 @@ def test_without_a_record_in_force_there_is_a_failed_check(monkeypatch: pytest.M
 # What they need
 
 
-def test_they_are_offline_and_leave_nothing(checks: list[Check], alone: Path) -> None:
+def test_they_are_offline_and_leave_nothing(tmp_path_factory: pytest.TempPathFactory) -> None:
+    checks, alone = demonstrated(tmp_path_factory)
     assert all(one.passed for one in checks)  # none was ended by a connection
     assert [path.name for path in alone.rglob("*")] == ["tmp"]
 
