@@ -15,7 +15,6 @@ of ISO 376; full scale of a load is its largest reference load.
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -31,8 +30,7 @@ from toolkit.calibration.session.readings import (
     shunt_entry,
     zero_entries,
 )
-from toolkit.calibration.session.settings import zero_readings
-from toolkit.calibration.session.statements import scope_of, statements_of
+from toolkit.calibration.session.statements import entries_of, scope_of, statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.units import unit
 
@@ -40,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.session_file import StatedEntries
     from toolkit.calibration.session.table import Table
 
 CREEP_FROM_S, CREEP_TO_S = 30.0, 300.0
@@ -160,11 +159,9 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     ConfigError, UnitError
         an entry of a record made before they were checked cannot be read
     """
-    scope = scope_of(record)
-    settings = json.loads(record.settings)
-    cells = settings.get("cells", {})
-    zero = zero_entries(zero_readings(settings), scope)
-    creep = creep_entries(settings.get("creep", []), scope)
+    scope, entries = scope_of(record), entries_of(record)
+    zero = zero_entries(entries.zero_readings, scope)
+    creep = creep_entries(entries.creep, scope)
     at_rest = _rest(record, loads)
     columns = loads.columns(record.indications)
     full = {name: float(np.abs(columns[name] - at_rest[name]).max()) for name in record.indications}
@@ -174,7 +171,7 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
         full_scale=tuple(full.items()),
         zero=drifts,
         zero_loads=tuple(_load_drift(record, load, drifts, zero, at_rest) for load in record.loads if drifts),
-        shunts=tuple(_shunts(zero, cells, scope)),
+        shunts=tuple(_shunts(zero, entries, scope)),
         creep=series,
         creep_left_out=left_out,
         reversibility=_reversibility(record, loads),
@@ -183,7 +180,7 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
             (
                 name,
                 1e3 * unit(text).factor * float(np.abs(columns[name]).max()),
-                LARGEST_RATIO_MV_V[cells.get(name, {}).get("bridge") or "foil"],
+                LARGEST_RATIO_MV_V[entries.cell(name).bridge or "foil"],
             )
             for name, text in zip(record.indications, record.indication_units, strict=True)
             if unit(text).dimension == "bridge_ratio"
@@ -191,9 +188,7 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
         unscaled=tuple(
             name
             for name, text in scope.columns.items()
-            if "scale" in cells.get(name, {})
-            and not isinstance(cells[name]["scale"], dict)
-            and unit(text).dimension == "count"
+            if isinstance(entries.cell(name).scale, float) and unit(text).dimension == "count"
         ),
     )
 
@@ -272,9 +267,9 @@ def _load_drift(
     )  # fmt: skip
 
 
-def _shunts(zero: tuple[ZeroEntry, ...], cells: dict[str, Any], scope: Scope) -> Iterable[ShuntCheck]:
+def _shunts(zero: tuple[ZeroEntry, ...], entries: StatedEntries, scope: Scope) -> Iterable[ShuntCheck]:
     for name in scope.indications:
-        stated = shunt_entry(name, cells.get(name, {}), scope)
+        stated = shunt_entry(name, entries.cell(name), scope)
         if stated is not None and stated.measured is not None:
             yield _shunt_check(name, stated.unit, "shunt_measured", stated.measured, None, stated)
         last: float | None = None
