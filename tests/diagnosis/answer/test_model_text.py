@@ -49,7 +49,7 @@ def offset_machine(folder):
 
 
 def own_tire(seed, *, offset=0.0):
-    """The tire of the file by the Magic Formula's equations written out (Pacejka 2012, 4.3.2), machine axes."""
+    """The tire of the file by its equations written out (Pacejka 2012, 4.3.2), machine axes."""
     rng = np.random.default_rng(seed)
     t = np.arange(150) * 0.1
     SA = 6 * np.sin(2 * np.pi * t / 7.5 + seed)
