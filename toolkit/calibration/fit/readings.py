@@ -26,11 +26,9 @@ from toolkit.calibration.session.readings import (
     CreepEntry,
     Scope,
     ZeroEntry,
-    creep_entries,
     shunt_entry,
-    zero_entries,
 )
-from toolkit.calibration.session.statements import entries_of, scope_of, statements_of
+from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.units import unit
 
@@ -159,14 +157,15 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     ConfigError, UnitError
         an entry of a record made before they were checked cannot be read
     """
-    scope, entries = scope_of(record), entries_of(record)
-    zero = zero_entries(entries.zero_readings, scope)
-    creep = creep_entries(entries.creep, scope)
+    statements = statements_of(record)
+    scope, entries, zero = statements.scope, statements.entries, statements.zero
     at_rest = _rest(record, loads)
     columns = loads.columns(record.indications)
     full = {name: float(np.abs(columns[name] - at_rest[name]).max()) for name in record.indications}
     drifts = _zero_drifts(zero, scope, full)
-    series, left_out = _creeps(creep, scope, full, {load.load: load.largest for load in record.loads})
+    series, left_out = _creeps(
+        statements.creep, scope, full, {load.load: load.largest for load in record.loads}
+    )
     return SessionReadings(
         full_scale=tuple(full.items()),
         zero=drifts,
@@ -175,7 +174,7 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
         creep=series,
         creep_left_out=left_out,
         reversibility=_reversibility(record, loads),
-        temperature_C=statements_of(record).temperature_C,
+        temperature_C=statements.temperature_C,
         largest_ratio=tuple(
             (
                 name,

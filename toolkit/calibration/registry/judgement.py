@@ -31,7 +31,7 @@ from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check, stored_loads, stored_session
 from toolkit.calibration.session.readings import PolarityReading, polarity_readings
 from toolkit.calibration.session.session_file import StatedEntries
-from toolkit.calibration.session.statements import entries_of, scope_of, statements_of
+from toolkit.calibration.session.statements import entries_of, statements_of
 from toolkit.declared import build
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, parse_toml, reads_as_number
@@ -398,7 +398,8 @@ def _reasons(record: CalibrationRecord, reason: str | None) -> dict[str, str]:
 
 def session_readings(record: CalibrationRecord) -> tuple[PolarityReading, ...]:
     """Return the polarity readings that a record's session holds; a legacy record has none."""
-    return polarity_readings(entries_of(record).polarity, scope_of(record))
+    statements = statements_of(record)
+    return polarity_readings(statements.entries.polarity, statements.scope)
 
 
 def read_polarity_file(path: Path, record: CalibrationRecord) -> tuple[PolarityReading, ...]:
@@ -414,7 +415,8 @@ def read_polarity_file(path: Path, record: CalibrationRecord) -> tuple[PolarityR
     raw = parse_toml(read_input(path, SETTINGS_FILE), where=path)
     check_keys(raw, ("schema", "polarity"), where=path)
     stated = build(StatedEntries, raw, path).polarity
-    readings = polarity_readings(stated, dataclasses.replace(scope_of(record), where=path))
+    scope = dataclasses.replace(statements_of(record).scope, where=path)
+    readings = polarity_readings(stated, scope)
     if not readings:
         raise ConfigError(
             "a file of polarity readings has none", where=path, got="no [[polarity]]",

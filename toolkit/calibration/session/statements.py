@@ -16,8 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.calibration.session.indications import bridge_of
-from toolkit.calibration.session.readings import Scope, scope_of_entries
+from toolkit.calibration.session.readings import (
+    CreepEntry,
+    Scope,
+    ZeroEntry,
+    creep_entries,
+    scope_of_entries,
+    zero_entries,
+)
 from toolkit.calibration.session.session_file import Reference as ReferenceEntries
 from toolkit.calibration.session.session_file import stated_entries
 from toolkit.calibration.session.statement_checks import temperature_effect
@@ -30,8 +36,6 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.session_file import BetweenRuns as BetweenEntries
     from toolkit.calibration.session.session_file import (
         CellEntries,
-        Creep,
-        Reading,
         Stated,
         StatedEntries,
         Uncertainty,
@@ -162,7 +166,7 @@ class CellStatement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statements:
-    """``zero`` and ``creep`` are the entries of [[zero]] and [[creep]] as written, in their order.
+    """``entries`` as written, and the ``scope`` that its readings are read against.
 
     ``preloads`` to the largest load before the first run (ISO 376); None where not stated.
     """
@@ -172,11 +176,21 @@ class Statements:
     phase: str | None
     reference: Reference
     cells: tuple[CellStatement, ...]
-    zero: tuple[Reading, ...]
-    creep: tuple[Creep, ...]
+    entries: StatedEntries
+    scope: Scope
     certificate: Mapping[str, Any]
     preloads: int | None = None
     between_runs: tuple[BetweenRuns, ...] = ()
+
+    @property
+    def zero(self) -> tuple[ZeroEntry, ...]:
+        """The readings of [[zero]]."""
+        return zero_entries(self.entries.zero_readings, self.scope)
+
+    @property
+    def creep(self) -> tuple[CreepEntry, ...]:
+        """The readings of [[creep]]."""
+        return creep_entries(self.entries.creep, self.scope)
 
     def between(self, load: str) -> BetweenRuns | None:
         """Return what is stated of a load's differences between runs; None where nothing is."""
@@ -196,7 +210,7 @@ def statements_of(record: CalibrationRecord) -> Statements:
         largest={load.load: load.largest for load in record.loads},
         date=dt.date.fromisoformat(record.date),
         where=record.id,
-        columns=_columns(record),
+        columns={cell.name: cell.column_unit or cell.unit for cell in record.cells},
         steps={cell.name: cell.step for cell in record.cells if cell.step is not None},
     )
 
@@ -204,16 +218,6 @@ def statements_of(record: CalibrationRecord) -> Statements:
 def entries_of(record: CalibrationRecord) -> StatedEntries:
     """Return the entries of a record's session, as written."""
     return stated_entries(record.settings, record.id)
-
-
-def scope_of(record: CalibrationRecord) -> Scope:
-    """Return what the zero, shunt and creep entries of a record's settings are read against."""
-    loads = {load.load: load.unit for load in record.loads}
-    return scope_of_entries(entries_of(record), columns=_columns(record), loads=loads, where=record.id)
-
-
-def _columns(record: CalibrationRecord) -> dict[str, str]:
-    return {cell.name: cell.column_unit or cell.unit for cell in record.cells}
 
 
 def parse_statements(
@@ -234,6 +238,7 @@ def parse_statements(
     step of readings whose resolution is not stated.
     """
     entries, written = stated_entries(settings, where), json.loads(settings)
+    scope = scope_of_entries(entries, columns=columns or indications, loads=loads, where=where)
     reference, temperature = entries.reference or ReferenceEntries(), entries.temperature
     stated = written.get("reference", {})
     return Statements(
@@ -254,11 +259,11 @@ def parse_statements(
             digital=_digital(stated.get("dcc")),
         ),
         cells=tuple(
-            _cell(name, text, (columns or indications)[name], entries.cell(name), where, steps.get(name))
+            _cell(name, text, entries.cell(name), scope, steps.get(name))
             for name, text in indications.items()
         ),
-        zero=entries.zero_readings,
-        creep=entries.creep,
+        entries=entries,
+        scope=scope,
         certificate=written.get("certificate", {}),
         preloads=None if entries.standard is None else entries.standard.preloads,
         between_runs=tuple(_between(name, between, loads[name]) for name, between in entries.between_runs),
@@ -293,10 +298,8 @@ def _reference(load: str, entry: Uncertainty, text: str, largest: float) -> Refe
     return ReferenceUncertainty(load=load, U=entry.U * (scale.factor / unit(text).factor), k=entry.k)
 
 
-def _cell(
-    name: str, text: str, column: str, entries: CellEntries, where: object, step: float | None
-) -> CellStatement:
-    bridge = bridge_of(name, entries, where=where)
+def _cell(name: str, text: str, entries: CellEntries, scope: Scope, step: float | None) -> CellStatement:
+    bridge, column = scope.bridges[name], scope.columns[name]
 
     def number(entry: Stated | None, key: str) -> float | None:
         if entry is None:
