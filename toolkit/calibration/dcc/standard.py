@@ -23,6 +23,7 @@ from lxml import etree
 
 from toolkit.calibration.dcc.quantities import Point, points_of
 from toolkit.calibration.dcc.structure import DCC, check_structure
+from toolkit.calibration.session.statement_checks import load_dimension
 from toolkit.errors import SessionError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.trust.seal.check import SealCheck
@@ -144,7 +145,6 @@ def _content(node: Any) -> str:
 
 
 _UNITS = {"force": "N", "moment": "N*m"}
-_FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
 
 
 class Columns(Protocol):
@@ -336,7 +336,7 @@ def _demand_valid(
 
 def _chosen(certificate: DigitalCertificate, load: str, place: str) -> tuple[Point, ...]:
     """Return the points of a load: those that name it, else those that name no channel."""
-    quantity = "force" if _FORCE.match(load) else "moment" if _MOMENT.match(load) else None
+    quantity = load_dimension(load)
     points = [p for p in certificate.points if quantity in (None, p.dimension)]
     points = [p for p in points if load in p.channels] or [p for p in points if not p.channels]
     if len({point.dimension for point in points}) > 1:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from toolkit.calibration.session.indications import Bridge, per
 from toolkit.calibration.session.readings import (
@@ -31,6 +31,15 @@ _PER_KELVIN = re.compile(r"\s*/\s*(K|degC|°C)\s*\Z")
 _FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
 
 
+def load_dimension(name: str) -> Literal["force", "moment"] | None:
+    """Return what a load of a name is; None where it may be either.
+
+    >>> load_dimension("FZ"), load_dimension("MZ"), load_dimension("preload")
+    ('force', 'moment', None)
+    """
+    return "force" if _FORCE.match(name) else "moment" if _MOMENT.match(name) else None
+
+
 def check_load_unit(name: str, text: str, *, where: object) -> None:
     """Refuse a load's unit: F, FX, FY, FZ are forces, MX, MY, MZ moments, any other name one of both.
 
@@ -39,7 +48,7 @@ def check_load_unit(name: str, text: str, *, where: object) -> None:
     UnitError
         ``unknown-unit``, ``unit-dimension``
     """
-    wanted = "force" if _FORCE.match(name) else "moment" if _MOMENT.match(name) else None
+    wanted = load_dimension(name)
     if wanted is not None:
         si_scale(text, wanted, where=where)
     elif unit(text, where=where).dimension != "moment":
