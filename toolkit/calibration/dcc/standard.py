@@ -193,7 +193,7 @@ def with_standard(
     item = _item(certificate, reference.get("standard"), place)
     _demand_same(reference, "certificate", certificate.identifier, place)
     _demand_valid(raw, certificate, reference, place)
-    loads = {name: _chosen(certificate, str(name), place) for name in raw["loads"]}
+    loads = {name: _points_for(certificate, str(name), place) for name in raw["loads"]}
     typed = dict(reference.get("uncertainty", {}))
     for name, points in loads.items():
         if name in typed and points:
@@ -334,7 +334,7 @@ def _demand_valid(
         )  # fmt: skip
 
 
-def _chosen(certificate: DigitalCertificate, load: str, place: str) -> tuple[Point, ...]:
+def _points_for(certificate: DigitalCertificate, load: str, place: str) -> tuple[Point, ...]:
     """Return the points of a load: those that name it, else those that name no channel."""
     quantity = load_dimension(load)
     points = [p for p in certificate.points if quantity in (None, p.dimension)]

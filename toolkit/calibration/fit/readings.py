@@ -159,7 +159,7 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     """
     statements = statements_of(record)
     scope, entries, zero = statements.scope, statements.entries, statements.zero
-    at_rest = _rest(record, loads)
+    at_rest = _unloaded(record, loads)
     columns = loads.columns(record.indications)
     full = {name: float(np.abs(columns[name] - at_rest[name]).max()) for name in record.indications}
     drifts = _zero_drifts(zero, scope, full)
@@ -195,22 +195,22 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
 def readings_json(readings: SessionReadings) -> dict[str, Any]:
     """Return the readings as JSON values, by indication and load."""
 
-    def named(parts: Iterable[Any], key: str) -> dict[str, Any]:
+    def by_name(parts: Iterable[Any], key: str) -> dict[str, Any]:
         entries = [dataclasses.asdict(part) for part in parts]
         return {entry.pop(key): entry for entry in entries}
 
     return {
         "full_scale": dict(readings.full_scale),
-        "zero": named(readings.zero, "name"),
-        "zero_loads": named(readings.zero_loads, "load"),
+        "zero": by_name(readings.zero, "name"),
+        "zero_loads": by_name(readings.zero_loads, "load"),
         "shunt": [{**dataclasses.asdict(shunt), "within": shunt.within} for shunt in readings.shunts],
         "creep": [dataclasses.asdict(series) for series in readings.creep],
-        "reversibility": named(readings.reversibility, "load"),
+        "reversibility": by_name(readings.reversibility, "load"),
         "temperature_C": readings.temperature_C,
     }
 
 
-def _rest(record: CalibrationRecord, table: Table) -> dict[str, float]:
+def _unloaded(record: CalibrationRecord, table: Table) -> dict[str, float]:
     """Return each indication without load: the mean of the unloaded rows, else by a line through all rows."""
     matrix = table.matrix([load.load for load in record.loads])
     cells = table.matrix(record.indications)

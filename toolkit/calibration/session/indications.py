@@ -196,9 +196,9 @@ def without_read_zeros(
     unloaded = (np.abs(applied) <= _UNLOADED * size).all(axis=1)
     missing = sorted(set(run.tolist()) - set(run[unloaded].tolist()))
     if missing:
-        which = "" if check.run is None else f" of run {np.unique(check.run)[missing[0]]:g}"
+        run_text = "" if check.run is None else f" of run {np.unique(check.run)[missing[0]]:g}"
         raise SessionError(
-            f'the check loads{which} have no zero, and with zero = "run" each run has its own',
+            f'the check loads{run_text} have no zero, and with zero = "run" each run has its own',
             where=where, got="no row with every load at zero",
             expected="at least one row at zero load in each run of the check file",
             next_step="read the unloaded cells with the check loads and add that row; nothing was written",

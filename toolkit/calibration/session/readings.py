@@ -157,15 +157,17 @@ def creep_entries(entries: Sequence[Creep], scope: Scope) -> tuple[CreepEntry, .
     for at, entry in enumerate(entries, start=1):
         place, seconds = f"creep[{at}]", float(entry.seconds)
         load, unloaded = _load(entry.load, f"{place}.load", scope)
-        shown = _shown(entry.value, entry.load, f"{place}.value", scope)
-        values = () if shown else _values(entry.value, f"{place}.value", scope)
-        for name, _ in (*values, *([shown] if shown else ())):
+        load_reading = _load_reading(entry.value, entry.load, f"{place}.value", scope)
+        values = () if load_reading else _values(entry.value, f"{place}.value", scope)
+        for name, _ in (*values, *([load_reading] if load_reading else ())):
             if (load, name, seconds) in times:
                 raise wrong(
                     scope.where, f"{place}.seconds", f"{seconds:g}", f"one reading of {name} at a time"
                 )
             times.add((load, name, seconds))
-        readings.append(CreepEntry(load=load, unloaded=unloaded, seconds=seconds, values=values, shown=shown))
+        readings.append(
+            CreepEntry(load=load, unloaded=unloaded, seconds=seconds, values=values, shown=load_reading)
+        )
     return tuple(readings)
 
 
@@ -224,7 +226,7 @@ def _values(entry: Readings, key: str, scope: Scope) -> tuple[tuple[str, float],
     return tuple((name, scope.value(name, reading, f"{key}.{name}")) for name, reading in by_name.items())
 
 
-def _shown(value: Readings, load: str | Stated, key: str, scope: Scope) -> tuple[str, float] | None:
+def _load_reading(value: Readings, load: str | Stated, key: str, scope: Scope) -> tuple[str, float] | None:
     name = load if isinstance(load, str) else next(iter(scope.loads)) if len(scope.loads) == 1 else None
     if name is None or name not in scope.loads:
         return None

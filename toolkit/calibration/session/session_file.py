@@ -69,11 +69,11 @@ class Amount:
 
 
 Stated = float | Amount
-_Named = Annotated[Mapping[str, Stated], _INDICATIONS]
+_ByIndication = Annotated[Mapping[str, Stated], _INDICATIONS]
 _WithUnit = Annotated[Amount, Entry(expected="{ value, unit }", rule="no-unit")]
 _PLAIN = "a number in the column's unit, or { value, unit }"
 _POSITIVE = f"{_PLAIN}, above zero; leave out what is not known"
-_KNOWN = "a number above zero; leave out what is not known"
+_SIZE = "a number above zero; leave out what is not known"
 _ONE_COUNT = (
     "a number above zero; a reversed bridge shows in the sign of its coefficient, which has a gate of its own"
 )
@@ -85,7 +85,7 @@ class Reading:
 
     when: Annotated[str, Entry(expected='a text: "before", "after", "run 1", "shunt"', example="before")]
     values: Annotated[
-        _Named | tuple[Stated, ...] | Stated,
+        _ByIndication | tuple[Stated, ...] | Stated,
         Entry(expected="{ indication = number }, or a list of numbers", example={"D51": 0}),
     ]
 
@@ -110,7 +110,7 @@ class Creep:
         Entry(expected="seconds, zero or more", example=30),
     ]
     value: Annotated[
-        _Named | tuple[Stated, ...] | Stated,
+        _ByIndication | tuple[Stated, ...] | Stated,
         Entry(expected="{ indication = number }", example={"D51": 0}),
     ]
 
@@ -197,7 +197,7 @@ class CellEntries:
 
     def faults(self) -> Iterator[Fault]:
         """Yield sizes with a unit that are not above zero, and a shunt that is held against nothing."""
-        for key, expected in (("resolution", _KNOWN), ("u", _KNOWN), ("scale", _ONE_COUNT)):
+        for key, expected in (("resolution", _SIZE), ("u", _SIZE), ("scale", _ONE_COUNT)):
             entry = getattr(self, key)
             if isinstance(entry, Amount) and entry.value <= 0:
                 yield Fault(key=(key, "value"), got=entry.value, expected=expected)

@@ -48,9 +48,9 @@ def check_load_unit(name: str, text: str, *, where: object) -> None:
     UnitError
         ``unknown-unit``, ``unit-dimension``
     """
-    wanted = load_dimension(name)
-    if wanted is not None:
-        si_scale(text, wanted, where=where)
+    quantity = load_dimension(name)
+    if quantity is not None:
+        si_scale(text, quantity, where=where)
     elif unit(text, where=where).dimension != "moment":
         si_scale(text, "force", where=where)
 
@@ -67,10 +67,10 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
         name = f"u_{load}"
         if not table.has(name):
             continue
-        found, dimension = unit(table.unit(name)), unit(table.unit(load)).dimension
-        if found.dimension != dimension:
+        scale, dimension = unit(table.unit(name)), unit(table.unit(load)).dimension
+        if scale.dimension != dimension:
             raise _other_unit(
-                f"{where}, column {name}", found, dimension,
+                f"{where}, column {name}", scale, dimension,
                 f"{table.unit(load)!r}; a share of the load is stated once for all rows, "
                 f"[reference.uncertainty] {load} = {{ U = .., k = .., unit = '%' }}",
             )  # fmt: skip
@@ -181,8 +181,8 @@ def temperature_effect(
     return number("span", effect.span, "1", "1"), number("zero", effect.zero, column, target)
 
 
-def _check_unit(where: str, text: str, load_unit: str, *others: str) -> None:
+def _check_unit(where: str, text: str, load_unit: str, *alternatives: str) -> None:
     stated, dimension = unit(text, where=where), unit(load_unit).dimension
-    if stated.dimension not in (dimension, *others):
-        share = ", or '%' or 'ppm' of the applied load" if others else ""
+    if stated.dimension not in (dimension, *alternatives):
+        share = ", or '%' or 'ppm' of the applied load" if alternatives else ""
         raise _other_unit(where, stated, dimension, f"{load_unit!r}{share}")

@@ -273,7 +273,7 @@ def parse_statements(
 def _digital(entry: Any) -> DigitalSource | None:
     if not isinstance(entry, Mapping):
         return None
-    places = [(load, taken["xpath"]) for load, taken in entry["taken"].items()]
+    places = [(load, point["xpath"]) for load, point in entry["taken"].items()]
     return DigitalSource(
         file=entry["file"],
         sha256=entry["sha256"],
