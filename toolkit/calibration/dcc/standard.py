@@ -23,7 +23,7 @@ from lxml import etree
 
 from toolkit.calibration.dcc.quantities import Point, points_of
 from toolkit.calibration.dcc.structure import DCC, check_structure
-from toolkit.calibration.session.statement_checks import load_dimension
+from toolkit.channels import load_dimension
 from toolkit.errors import SessionError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.trust.seal.check import SealCheck

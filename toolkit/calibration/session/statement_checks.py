@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from toolkit.calibration.session.indications import Bridge, per
 from toolkit.calibration.session.readings import (
@@ -20,6 +20,7 @@ from toolkit.calibration.session.readings import (
 )
 from toolkit.calibration.session.session_file import Amount, TemperatureCoefficient
 from toolkit.calibration.session.settings import wrong
+from toolkit.channels import load_dimension
 from toolkit.errors import SessionError, UnitError
 from toolkit.units import Unit, si_scale, unit
 
@@ -28,16 +29,6 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
 
 _PER_KELVIN = re.compile(r"\s*/\s*(K|degC|°C)\s*\Z")
-_FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
-
-
-def load_dimension(name: str) -> Literal["force", "moment"] | None:
-    """Return what a load of a name is; None where it may be either.
-
-    >>> load_dimension("FZ"), load_dimension("MZ"), load_dimension("preload")
-    ('force', 'moment', None)
-    """
-    return "force" if _FORCE.match(name) else "moment" if _MOMENT.match(name) else None
 
 
 def check_load_unit(name: str, text: str, *, where: object) -> None:
