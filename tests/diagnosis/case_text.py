@@ -52,5 +52,6 @@ def _channels(role: str, named: Named) -> dict[str, Any]:
             stated = {"unit": entry[0], "sd": entry[1]}
         elif isinstance(entry, str):
             stated = {"unit": entry}
-        channels[name] = {"role": role} | stated
+        # In the order in which people write it: tests exchange parts of the text.
+        channels[name] = {"unit": stated.pop("unit", ""), "role": role, **stated}
     return channels

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -17,9 +16,18 @@ from toolkit.diagnosis.simulators.forces import Forces
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effect
 
-HEAD = case_text(
-    "ode", title="Tanks", inputs={"u": "m/s"}, outputs={"y": ("m", 0.004)},
-)  # fmt: skip
+HEAD = """schema = 1
+title = "Tanks"
+[simulation]
+kind = "ode"
+path = "sim.py"
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+u = { unit = "m/s", role = "input" }
+y = { unit = "m", role = "output", sd = 0.004 }
+"""
 PARAMETER = """[simulation.parameters.{name}]
 value = {value}
 unit = "m^0.5/s"
