@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toolkit.cli.main import run
+from tests import commands
 from toolkit.examples import packaged_fig4_4
 from toolkit.recording.folder import read_test_folder
 
@@ -30,18 +30,12 @@ COMMANDS = [
 ]
 
 
-def code_of(*words: object) -> int:
-    with pytest.raises(SystemExit) as caught:
-        run([str(word) for word in words])
-    return int(caught.value.code or 0)
-
-
 @pytest.mark.parametrize("line", COMMANDS)
-def test_every_command_and_option_exists(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_command_and_option_exists(line: str) -> None:
     words = shlex.split(line)[1:]
     group = words[:2] if len(words) > 1 and words[1].isalpha() and words[0] in GROUPS else words[:1]
-    assert code_of(*group, "--help") == 0
-    helped = capsys.readouterr().out
+    code, helped, _ = commands.said(*group, "--help")
+    assert code == 0
     for option in (word for word in words if word.startswith("--")):
         assert option in helped
 
@@ -81,7 +75,7 @@ def test_the_session_is_one(tmp_path: Path) -> None:
         writer.writerows(rows(6))
     registry = tmp_path / "calibrations"
     registry.mkdir()
-    assert code_of("calibrate", tmp_path / "SESSION.toml", "--calibrations", registry, "-q") == 0
+    assert commands.said("calibrate", tmp_path / "SESSION.toml", "--calibrations", registry, "-q").code == 0
     assert (registry / "m15" / "m15-r1.json").is_file()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.registry import Registry
-from toolkit.calibration.session.settings import quantity
+from toolkit.calibration.session.session_file import Amount
 from toolkit.errors import ToolkitError
 from toolkit.lab.plans.protocol_plan import _quantity
 from toolkit.machine import load_machine, read_protocol
@@ -79,7 +79,7 @@ def test_a_plan_of_a_simulation(unit: str, tmp_path: Path) -> None:
 @units
 def test_a_load_in_words_and_a_quantity(unit: str) -> None:
     (load,) = stated(unit, 3700.0)
-    assert quantity({"value": load, "unit": unit}, "force", "doctest") == pytest.approx(3700.0, rel=1e-14)
+    assert Amount(value=load, unit=unit).si("force", "doctest") == pytest.approx(3700.0, rel=1e-14)
     assert _quantity(f"{load:.15f} {unit}") == pytest.approx(3700.0, rel=1e-12)
 
 
@@ -113,4 +113,4 @@ def test_a_session(unit: str, tmp_path: Path) -> None:
 
 def test_a_mass_is_no_load(tmp_path: Path) -> None:
     with pytest.raises(ToolkitError):
-        quantity({"value": 400.0, "unit": "kg"}, "force", "doctest")
+        Amount(value=400.0, unit="kg").si("force", "doctest")

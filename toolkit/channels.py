@@ -14,6 +14,7 @@ the lateral velocity changes sign with y, the slip angle with it.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -21,6 +22,7 @@ Axes = Literal["SAE", "adapted-SAE", "ISO-W", "machine"]
 Rotation = Literal["forward", "reverse"]
 Reversal = Literal["drum", "tire"]
 
+_FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
 AXES: tuple[Axes, ...] = get_args(Axes)
 ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
 REVERSALS: tuple[Reversal, ...] = get_args(Reversal)
@@ -152,3 +154,12 @@ def _from_sae(axes: Axes, rotation: Rotation) -> dict[str, int]:
     if axes == "machine":
         return {"SA": 1, "FY": 1 if rotation == "forward" else -1, "MZ": 1}
     raise ValueError(f"unknown axis system {axes!r}; one of {', '.join(AXES)}")
+
+
+def load_dimension(name: str) -> Literal["force", "moment"] | None:
+    """Return what a load of a name is; None where it may be either.
+
+    >>> load_dimension("FZ"), load_dimension("MZ"), load_dimension("preload")
+    ('force', 'moment', None)
+    """
+    return "force" if _FORCE.match(name) else "moment" if _MOMENT.match(name) else None

@@ -9,12 +9,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.recording.fig4_4 import write_fig4_4
 from toolkit.audit.archive import audit_archive
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.main import _register, app
 
 HOME = Path(__file__).resolve().parents[2]
 DATED = 'schema = 1\nmachine = "m15"\ndate = 2019-03-01\n'
@@ -102,15 +101,9 @@ def test_a_test_toml_that_cannot_be_used_hides_no_recording(tmp_path):
     assert {one.rule for one in made.findings if one.level != "note"} == rules
 
 
-def run(*words):
-    _register()
-    return CliRunner().invoke(app, list(words), standalone_mode=False)
-
-
 def test_the_command_answers_in_json_and_ends_with_1_where_a_file_is_not_right(archive):
-    result = run("audit", str(archive), "--calibrations", str(HOME / "calibrations"), "--json")
-    answer = json.loads(result.stdout)
-    assert result.return_value == 1
+    code, answer = commands.answer("audit", archive, "--calibrations", HOME / "calibrations")
+    assert code == 1
     assert answer["schema"] == 1
     assert sum(answer["summary"]["grades"].values()) == answer["summary"]["files"] == len(answer["files"])
     assert "timing" in answer

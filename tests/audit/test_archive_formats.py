@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.audit.archive_made import FY, MZ, dated, recording
 from tests.audit.audit_factory import record
 from tests.recording.format_factory import csv, every, lvm, tdms
@@ -21,7 +21,6 @@ from toolkit.audit.identify import identify_columns
 from toolkit.audit.model import Identification, columns_of
 from toolkit.audit.one_file import unreadable
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.main import _register, app
 from toolkit.files import sha256_file
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
@@ -142,16 +141,13 @@ def test_single_precision_written_out_separates_sets_two_in_a_hundred_thousand_a
     assert {(grade, one) for _, grade, one in judged} == {("exact", "m15-r1")}
 
 
-def run(*words):
-    _register()
-    return CliRunner().invoke(app, list(words), standalone_mode=False)
-
-
 @pytest.mark.parametrize("file", sorted(every(TABLES["right"])))
 def test_inspect_reads_every_format(tmp_path, file):
     (tmp_path / file).write_bytes(every(TABLES["sign"])[file])
     dated(tmp_path, "2019-06-01")
-    done = run("inspect", str(tmp_path / file), "--calibrations", str(HOME / "calibrations"), "--json")
+    done = commands.result(
+        "inspect", str(tmp_path / file), "--calibrations", str(HOME / "calibrations"), "--json"
+    )
     assert done.return_value == 1, done.output
     assert "E5 negative in FY" in json.dumps(json.loads(done.stdout))
 
@@ -162,9 +158,9 @@ def test_a_test_in_another_format_reduces_to_the_same_numbers(tmp_path):
         folder = tmp_path / name.partition(".")[2] / "test"
         dated(folder, "2019-06-01")
         (folder / name).write_bytes(make(recording(seed=6, angle=1.0)))
-        done = run("process", str(folder), "--calibrations", str(HOME / "calibrations"), "--json")
-        assert done.return_value in (0, 1), done.output
-        answers.append(json.dumps(json.loads(done.stdout)).replace(name, "run"))
+        code, answer = commands.answer("process", folder, "--calibrations", HOME / "calibrations")
+        assert code in (0, 1), answer
+        answers.append(json.dumps(answer).replace(name, "run"))
     first = json.loads(answers[0])["conditions"]
     assert first
     for other in answers[1:]:

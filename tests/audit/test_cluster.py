@@ -24,8 +24,8 @@ import dask
 import distributed
 import pytest
 from distributed import utils
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.audit.archive_made import FY, dated, recording, write
 from tests.audit.worker_jobs import make
 from toolkit import __version__
@@ -35,7 +35,6 @@ from toolkit.audit.archive import audit_archive
 from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.workers import DIED, Lost, late
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.main import _register, app
 from toolkit.errors import ConfigError
 
 HOME = Path(__file__).resolve().parents[2]
@@ -156,10 +155,8 @@ def lines(folder):
 
 def audit_command(archive, out, *words):
     """The answer of the command, but for where it was written and how long it took."""
-    _register()
     home = ("--calibrations", str(HOME / "calibrations"), "--known-at", "2026-01-01", "--json")
-    given = ["audit", str(archive), *home, "--out", str(out), *words]
-    answer = json.loads(CliRunner().invoke(app, given, standalone_mode=False).stdout)
+    answer = json.loads(commands.result("audit", archive, *home, "--out", out, *words).stdout)
     del answer["timing"], answer["written"]
     return answer
 
@@ -303,11 +300,9 @@ def test_an_absent_library_is_named_with_its_extra(monkeypatch):
 
 
 def test_workers_are_here_or_of_a_cluster(archive):
-    _register()
-    both = ["audit", str(archive), "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"]
-    done = CliRunner().invoke(app, both)
-    assert done.exit_code == 2
-    assert "--scheduler" in done.output
+    done = commands.said("audit", archive, "--scheduler", "tcp://127.0.0.1:1", "--workers", "2")
+    assert done.code == 2
+    assert "--scheduler" in done.err
 
 
 def tls(**files):

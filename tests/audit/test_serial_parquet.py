@@ -11,13 +11,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.audit.archive_made import FY, dated, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.serial import check_parquet, write_parquet
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.main import _register, app
 from toolkit.errors import ConfigError, OutputError
 from toolkit.recording.marks import is_own_output
 
@@ -43,11 +42,6 @@ def archive(tmp_path_factory):
     return root
 
 
-def run(*words):
-    _register()
-    return CliRunner().invoke(app, list(words), standalone_mode=False)
-
-
 def as_json(row):
     """A row of the table under the shapes of the JSON answer: maps as objects, days as text."""
     row = {k: v.isoformat() if isinstance(v, dt.date) else v for k, v in row.items()}
@@ -64,7 +58,9 @@ def as_json(row):
 def test_the_table_says_what_the_answer_says(archive, tmp_path):
     target = tmp_path / "audit.parquet"
     home = ("--calibrations", str(HOME / "calibrations"))
-    done = run("audit", str(archive), *home, "--known-at", "2026-01-01", "--parquet", str(target), "--json")
+    done = commands.result(
+        "audit", str(archive), *home, "--known-at", "2026-01-01", "--parquet", str(target), "--json"
+    )
     assert done.return_value == 1
     answer = json.loads(done.stdout)
     assert answer["written"] == [str(target)]

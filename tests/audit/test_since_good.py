@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.audit.archive_made import FY, MZ, dated, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.since_good import drift_since, drifted_files, drifted_tests
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.main import _register, app
 from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 
@@ -156,11 +154,9 @@ def test_without_such_a_stretch_it_is_refused(home, tmp_path, record, said):
 
 def test_the_command_tells_each_test_and_its_page_too(home, tmp_path):
     root, registry = home
-    _register()
-    given = ["audit", str(root / "archive"), "--calibrations", str(registry.folder),
-             "--known-at", "2022-01-01", "--since-good", "m15-r2", "--out", str(tmp_path)]  # fmt: skip
-    text = CliRunner().invoke(app, given, standalone_mode=False).stdout
-    told = json.loads(CliRunner().invoke(app, [*given, "--json"], standalone_mode=False).stdout)["since_good"]
+    given = ("audit", root / "archive", "--calibrations", registry.folder,
+             "--known-at", "2022-01-01", "--since-good", "m15-r2", "--out", tmp_path)  # fmt: skip
+    text, told = commands.said(*given).out, commands.answer(*given)[1]["since_good"]
     assert [one["test"] for one in told["tests"]] == ["2020-01-01", "2021-01-01"]
     assert [one["path"] for one in told["files"]] == ["2020-01-01/run", "2021-01-01/run"]
     page = (tmp_path / "audit.html").read_text()

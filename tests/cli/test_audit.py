@@ -9,10 +9,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.recording.fig4_4 import write_fig4_4
-from toolkit.cli.main import _register, app
 from toolkit.declared import json_value
 from toolkit.lab.archives.audit_headline import headline_of
 
@@ -30,8 +29,7 @@ def archive(tmp_path):
 
 
 def run(*words):
-    _register()
-    return CliRunner().invoke(app, ["audit", *map(str, words), *CALIBRATIONS], standalone_mode=False)
+    return commands.result("audit", *words, *CALIBRATIONS)
 
 
 def test_out_holds_a_page_and_lines_for_machines(archive, tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,30 +10,17 @@ import numpy as np
 import pytest
 import typer
 
+from tests import commands
 from toolkit.calibration.registry.clock import today
 from toolkit.cli import calibrate, calibration
-from toolkit.errors import ToolkitError
 
 Run = Callable[..., tuple[int, dict[str, Any]]]
 
 
 @pytest.fixture
-def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
-    root = typer.Typer()
-    root.command(calibrate.NAME)(calibrate.command)
-    root.add_typer(calibration.app, name="calibration")
+def run(tmp_path: Path) -> Run:
     (tmp_path / "cal").mkdir()
-
-    def call(*words: object) -> tuple[int, dict[str, Any]]:
-        arguments = [str(word) for word in words] + ["--calibrations", str(tmp_path / "cal"), "--json"]
-        try:
-            code = root(args=arguments, standalone_mode=False)
-        except ToolkitError as error:
-            capsys.readouterr()
-            return error.exit_code, {"error": error.as_dict()}
-        return code, json.loads(capsys.readouterr().out)
-
-    return call
+    return lambda *words: commands.answer(*words, "--calibrations", tmp_path / "cal")
 
 
 @pytest.fixture

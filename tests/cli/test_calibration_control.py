@@ -12,11 +12,10 @@ from typing import Any
 import pytest
 import typer
 
+from tests import commands
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli import calibration
-from toolkit.errors import ToolkitError
 
 Run = Callable[..., tuple[int, Any]]
 FORCES = [100.0 * i for i in range(1, 11)]
@@ -55,21 +54,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(folder: Path, capsys: pytest.CaptureFixture[str]) -> Run:
-    root = typer.Typer()
-    root.add_typer(calibration.app, name="calibration")
-
-    def call(*words: object, as_json: bool = True) -> tuple[int, Any]:
-        arguments = ["calibration", *map(str, words), "--calibrations", str(folder)]
-        try:
-            code = root(args=arguments + (["--json"] if as_json else []), standalone_mode=False)
-        except ToolkitError as error:
-            capsys.readouterr()
-            return error.exit_code, {"error": error.as_dict()}
-        out = capsys.readouterr().out
-        return code, json.loads(out) if as_json else out
-
-    return call
+def run(folder: Path) -> Run:
+    return lambda *words: commands.answer("calibration", *words, "--calibrations", folder)
 
 
 def test_the_chart_finds_the_newest_session_and_draws_it(run: Run, tmp_path: Path) -> None:
@@ -106,7 +92,7 @@ def test_a_chart_that_cannot_be_made_is_exit_2(run: Run, words: list[str], rule:
     assert all(answer["error"][part] for part in ("what", "where", "got", "expected", "next_step"))
 
 
-def test_due_is_a_note_until_an_interval_is_set_and_exit_1_when_overdue(run: Run) -> None:
+def test_due_is_a_note_until_an_interval_is_set_and_exit_1_when_overdue(run: Run, folder: Path) -> None:
     code, answer = run("due", "--on", "2018-06-01")
     assert (code, answer["findings"][0]["rule"]) == (0, "recall-unknown")
     code, approved = run(
@@ -121,7 +107,8 @@ def test_due_is_a_note_until_an_interval_is_set_and_exit_1_when_overdue(run: Run
     code, answer = run("due", "cell", "--on", "2019-03-04")
     assert (code, answer["instruments"][0]["days_left"]) == (1, -3)
     assert answer["findings"][0]["rule"] == "overdue"
-    assert "2019-03-01" in run("due", "--on", "2019-03-04", as_json=False)[1]
+    words = ("calibration", "due", "--on", "2019-03-04", "--calibrations", folder)
+    assert "2019-03-01" in commands.said(*words).out
 
 
 def test_due_before_any_record_was_in_force(run: Run) -> None:
@@ -138,7 +125,7 @@ def test_a_recall_that_is_no_interval_is_exit_2(run: Run) -> None:
     assert (code, answer["error"]["rule"]) == (2, "recall")
 
 
-def test_the_standards_of_a_record(run: Run) -> None:
+def test_the_standards_of_a_record(run: Run, folder: Path) -> None:
     code, answer = run("standard", "cell-r1", "--standard", "e74")
     (one,) = answer["evaluations"]
     assert (code, one["class"], one["result"]["points"], one["result"]["runs"]) == (0, "AA", 30, 3)
@@ -146,7 +133,8 @@ def test_the_standards_of_a_record(run: Run) -> None:
     assert (code, answer["evaluations"][0]["class"]) == (0, None)
     assert any("rotation" in reason for reason in answer["evaluations"][0]["reasons"])
     for standard in ("e74", "iso376"):
-        assert "lass" in run("standard", "cell-r1", "--standard", standard, as_json=False)[1]
+        words = ("standard", "cell-r1", "--standard", standard, "--calibrations", folder)
+        assert "lass" in commands.said("calibration", *words).out
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 import subprocess
 import sys
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolkit.cli.main import run
+from tests import commands
 
 # What the rig does: kN per mV/V, with crosstalk. Everything below is judged against it.
 TRUE = np.array([[2.0, 0.03, -0.02], [0.01, 1.5, 0.04], [-0.05, 0.02, 5.0]])
@@ -40,18 +39,6 @@ FX = { U = 0.05, k = 2, unit = "N" }
 FY = { U = 0.05, k = 2, unit = "N" }
 FZ = { U = 0.05, k = 2, unit = "N" }
 """
-
-
-def codes(*words: object) -> int:
-    with pytest.raises(SystemExit) as caught:
-        run([str(word) for word in words])
-    return int(caught.value.code or 0)
-
-
-def answer(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, dict[str, Any]]:
-    capsys.readouterr()
-    code = codes(*words, "--json")
-    return code, json.loads(capsys.readouterr().out)
 
 
 def write(path: Path, header: list[str], rows: Any) -> None:
@@ -88,13 +75,14 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for at, load in enumerate(LOADS)
     )
     (folder / "SESSION.toml").write_text(SESSION + polarity)
-    assert codes("init", folder / "lab", "-q") == 0
-    assert codes("calibrate", folder / "SESSION.toml", "--home", folder / "lab", "-q") in (0, 1)
+    assert commands.said("init", folder / "lab", "-q").code == 0
+    calibrated = commands.said("calibrate", folder / "SESSION.toml", "--home", folder / "lab", "-q")
+    assert calibrated.code in (0, 1)
     return folder
 
 
-def approve(folder: Path) -> int:
-    return codes(
+def approve(folder: Path) -> commands.Said:
+    return commands.said(
         "calibration", "approve", "press-7-r1", "--in-force-from", "2026-02-04", "--checked-by",
         "second person", "--reason", "first record", "--home", folder / "lab",
     )  # fmt: skip
@@ -109,39 +97,36 @@ def indications(path: Path) -> Path:
     return path
 
 
-def test_a_candidate_is_refused_but_as_a_draft_that_every_row_names(
-    rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_candidate_is_refused_but_as_a_draft_that_every_row_names(rig: Path, tmp_path: Path) -> None:
     data, out = indications(tmp_path / "data.csv"), tmp_path / "loads.csv"
     words = ["calibration", "apply", "press-7-r1", data, "--out", out, "--home", rig / "lab"]
-    code, refused = answer(capsys, *words)
+    code, refused = commands.answer(*words)
     assert (code, refused["error"]["rule"]) == (2, "not-in-force")
     assert not out.exists()
-    code, told = answer(capsys, *words, "--draft")
+    code, told = commands.answer(*words, "--draft")
     assert told["calibration"]["draft"] is True
     rows = list(csv.DictReader(io.StringIO(out.read_text())))
     assert {row["mark"].split(":")[0] for row in rows} == {"DRAFT, NOT APPROVED"}
 
 
-def test_the_certificate_of_the_rig(rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    if approve(rig):
-        pytest.fail(capsys.readouterr().out)
+def test_the_certificate_of_the_rig(rig: Path, tmp_path: Path) -> None:
+    assert approve(rig).code == 0
     certificate = ["calibration", "certificate", "press-7-r1", "--out", tmp_path / "c", "--home", rig / "lab"]
-    code, told = answer(capsys, *certificate)
+    code, told = commands.answer(*certificate)
     assert code in (0, 1), told
     assert next((tmp_path / "c").glob("*.pdf")).stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("ending", [".csv", ".xlsx", ".parquet", ".tdms", ".mf4"])
 def test_loads_of_every_format_agree_with_the_rig_within_their_uncertainty(
-    ending: str, rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ending: str, rig: Path, tmp_path: Path
 ) -> None:
-    if "approved" not in status(rig, capsys):
-        assert approve(rig) == 0
+    if "approved" not in status(rig):
+        assert approve(rig).code == 0
     out = tmp_path / f"loads{ending}"
     words = ["--home", rig / "lab", "--on", "2026-02-05"]
-    code, told = answer(
-        capsys, "calibration", "apply", "press-7-r1", indications(tmp_path / "d.csv"), "--out", out, *words
+    code, told = commands.answer(
+        "calibration", "apply", "press-7-r1", indications(tmp_path / "d.csv"), "--out", out, *words
     )
     assert code == 0, told
     table = read_back(out)
@@ -155,13 +140,14 @@ def test_loads_of_every_format_agree_with_the_rig_within_their_uncertainty(
     if ending != ".xlsx":
         again = tmp_path / "again.csv"
         source = stripped(out, tmp_path)
-        assert codes("calibration", "apply", "press-7-r1", source, "--out", again, *words, "-q") == 0
+        applied = commands.said("calibration", "apply", "press-7-r1", source, "--out", again, *words, "-q")
+        assert applied.code == 0
         for load in LOADS:
             np.testing.assert_allclose(read_back(again)[f"{load} [N]"], table[f"{load} [N]"], rtol=1e-12)
 
 
-def status(rig: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    return str(answer(capsys, "calibration", "list", "--home", rig / "lab")[1]["records"][0]["status"])
+def status(rig: Path) -> str:
+    return str(commands.answer("calibration", "list", "--home", rig / "lab")[1]["records"][0]["status"])
 
 
 def read_back(path: Path) -> dict[str, np.ndarray]:
@@ -214,11 +200,9 @@ def stripped(path: Path, folder: Path) -> Path:
     return target
 
 
-def test_what_cannot_be_applied_is_refused_and_leaves_nothing(
-    rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if "approved" not in status(rig, capsys):
-        assert approve(rig) == 0
+def test_what_cannot_be_applied_is_refused_and_leaves_nothing(rig: Path, tmp_path: Path) -> None:
+    if "approved" not in status(rig):
+        assert approve(rig).code == 0
     good = indications(tmp_path / "good.csv").read_text()
     for text, out, rule in (
         (good.replace("gy [uV/V]", "gy"), "o.csv", "unknown-unit"),
@@ -233,20 +217,18 @@ def test_what_cannot_be_applied_is_refused_and_leaves_nothing(
         path.write_text(text)
         before = sorted(tmp_path.iterdir())
         words = [path, "--out", tmp_path / out, "--home", rig / "lab", "--on", "2026-02-05"]
-        code, told = answer(capsys, "calibration", "apply", "press-7-r1", *words)
+        code, told = commands.answer("calibration", "apply", "press-7-r1", *words)
         assert (code, told["error"]["rule"]) == (2, rule), told
         assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_row_beyond_the_calibrated_range_is_a_finding(
-    rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if "approved" not in status(rig, capsys):
-        assert approve(rig) == 0
+def test_a_row_beyond_the_calibrated_range_is_a_finding(rig: Path, tmp_path: Path) -> None:
+    if "approved" not in status(rig):
+        assert approve(rig).code == 0
     data = tmp_path / "data.csv"
     write(data, [f"{cell} [mV/V]" for cell in CELLS], [[9.0, 0.0, 0.0]])
     words = [data, "--out", tmp_path / "o.csv", "--home", rig / "lab", "--on", "2026-02-05"]
-    code, told = answer(capsys, "calibration", "apply", "press-7-r1", *words)
+    code, told = commands.answer("calibration", "apply", "press-7-r1", *words)
     assert code == 1
     assert [finding["rule"] for finding in told["findings"]] == ["beyond-range"]
     assert math.isclose(told["loads"]["FX"]["largest"], 18e3, rel_tol=1e-3)

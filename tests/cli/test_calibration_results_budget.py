@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
-from toolkit.cli import calibration_results
-from toolkit.errors import ToolkitError
+from tests import commands
 from toolkit.lab.home import packaged_home
 
 RECORD = "m15-virtual-r1"
 
 
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Any:
-    root = typer.Typer()
-    root.command("budget")(calibration_results.budget)
-
-    def call(*words: object, record: str = RECORD) -> tuple[int, dict[str, Any]]:
-        folder = str(packaged_home() / "calibrations")
-        words = (record, *words, "--calibrations", folder, "--json")
-        try:
-            code = root(args=[str(word) for word in words], standalone_mode=False)
-        except ToolkitError as error:
-            return error.exit_code, {"error": error.as_dict()}
-        return code, json.loads(capsys.readouterr().out)
-
-    return call
+def run(*words: object, record: str = RECORD) -> tuple[int, dict[str, Any]]:
+    folder = packaged_home() / "calibrations"
+    return commands.answer("calibration", "budget", record, *words, "--calibrations", folder)
 
 
-def test_every_load_by_default(run: Any) -> None:
+def test_every_load_by_default() -> None:
     code, found = run()
     assert code == 0
     assert list(found["loads"]) == ["FY", "MZ", "MX"]
@@ -46,12 +31,12 @@ def test_every_load_by_default(run: Any) -> None:
     assert len(one["U_rounded"].replace(".", "").lstrip("0")) == 2
 
 
-def test_a_load_value_in_another_unit(run: Any) -> None:
+def test_a_load_value_in_another_unit() -> None:
     _, found = run("--load", "FY", "--at", "4448.2216152605 N")
     assert found["loads"]["FY"]["value"] == pytest.approx(1000.0)
 
 
-def test_a_prediction_and_its_extrapolation(run: Any) -> None:
+def test_a_prediction_and_its_extrapolation() -> None:
     code, found = run("--load", "MZ", "--indications", "D51=-0.31,D52=0.3065,E5=0")
     assert code == 0
     # -233.784 * -0.31 + 244.488 * 0.3065, the record's own sensitivities
@@ -61,7 +46,7 @@ def test_a_prediction_and_its_extrapolation(run: Any) -> None:
     assert [one["rule"] for one in found["findings"]] == ["beyond-range"]
 
 
-def test_monte_carlo_says_whether_the_budget_holds(run: Any) -> None:
+def test_monte_carlo_says_whether_the_budget_holds() -> None:
     code, found = run("--load", "FY", "--monte-carlo", 50_000)
     result = found["loads"]["FY"]["monte_carlo"]
     assert result["trials"] == 50_000
@@ -71,14 +56,14 @@ def test_monte_carlo_says_whether_the_budget_holds(run: Any) -> None:
     assert code == (0 if result["validated"] else 1)
 
 
-def test_the_temperature_in_use(run: Any) -> None:
+def test_the_temperature_in_use() -> None:
     _, found = run("--load", "FY", "--temperature-range", 5, "--temperature-coefficient", 1e-4)
     part = next(p for p in found["loads"]["FY"]["components"] if p["name"] == "temperature")
     assert part["u"] == pytest.approx(1e-4 * 5 * 1393.8 / 3**0.5)
 
 
 @pytest.mark.parametrize("name", ["b.png", "b.svg", "b.pdf"])
-def test_the_picture(run: Any, tmp_path: Path, name: str) -> None:
+def test_the_picture(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     code, found = run("--load", "FY", "--figure", path)
     assert (code, found["figure"]) == (0, str(path))
@@ -106,7 +91,7 @@ def test_the_picture(run: Any, tmp_path: Path, name: str) -> None:
     ],
 )
 def test_what_cannot_be_answered_is_refused(
-    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     code, found = run(*words)
@@ -115,7 +100,7 @@ def test_what_cannot_be_answered_is_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_legacy_record_has_no_budget(run: Any) -> None:
+def test_a_legacy_record_has_no_budget() -> None:
     code, found = run(record="m15-r1")
     assert (code, found["error"]["rule"]) == (2, "budget")
     assert "calibrate" in found["error"]["next_step"]

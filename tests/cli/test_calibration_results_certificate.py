@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
-from toolkit.cli import calibration_results
-from toolkit.errors import ToolkitError
+from tests import commands
 from toolkit.lab.signatures.proofs import anchor_in
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -33,22 +31,9 @@ def calibrations(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def run(tmp_path: Path, calibrations: Path, capsys: pytest.CaptureFixture[str]) -> Run:
-    root = typer.Typer()
-    root.command("certificate")(calibration_results.certificate)
-    root.command("other")(lambda: 0)
-
-    def call(*words: object) -> tuple[int, dict[str, Any]]:
-        arguments = ["certificate", *map(str, words), "--out", str(tmp_path / "out"), "--json"]
-        arguments += ["--calibrations", str(calibrations)]
-        try:
-            code = root(args=arguments, standalone_mode=False)
-        except ToolkitError as error:
-            capsys.readouterr()
-            return error.exit_code, {"error": error.as_dict()}
-        return code, json.loads(capsys.readouterr().out)
-
-    return call
+def run(tmp_path: Path, calibrations: Path) -> Run:
+    given = ("--out", tmp_path / "out", "--calibrations", calibrations)
+    return lambda *words: commands.answer("calibration", "certificate", *words, *given)
 
 
 @office_needed

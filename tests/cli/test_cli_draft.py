@@ -14,6 +14,7 @@ from typing import Any
 import openpyxl
 import pytest
 
+from tests import commands
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry, today
@@ -33,11 +34,8 @@ office_needed = pytest.mark.skipif(
 )
 
 
-def toolkit(capsys: pytest.CaptureFixture[str], home: Path, *words: object) -> tuple[int, dict[str, Any]]:
-    with pytest.raises(SystemExit) as caught:
-        run([*map(str, words), "--json", "--home", str(home)])
-    answer: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return int(caught.value.code or 0), answer
+def toolkit(home: Path, *words: object) -> tuple[int, dict[str, Any]]:
+    return commands.answer(*words, "--home", home)
 
 
 @pytest.fixture(scope="module")
@@ -101,12 +99,11 @@ def test_no_command_makes_a_number_from_it(
     virtual_test: Path,
     draft_file: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
     words: tuple[str, ...],
 ) -> None:
     places = {"TEST": str(virtual_test), "DRAFT": str(draft_file)}
     said = [places.get(word, word.replace("OUT", str(tmp_path / "out"))) for word in words]
-    code, answer = toolkit(capsys, home, *said)
+    code, answer = toolkit(home, *said)
     assert code == 2
     error = answer["error"]
     assert error["rule"] in ("not-in-force", "certificate-candidate")
@@ -126,7 +123,7 @@ def test_a_draft_says_so_in_answer_and_file_and_stays_one(
     assert all(sheet.oddHeader.center.text.startswith("DRAFT") for sheet in book)
     assert book.properties.title.startswith("DRAFT: ")
     tire = tmp_path / "tire.tir"
-    code, answer = toolkit(capsys, home, "fit", draft_file, "--draft", "--model", "mf61", "--tir", tire)
+    code, answer = toolkit(home, "fit", draft_file, "--draft", "--model", "mf61", "--tir", tire)
     assert (code, answer["draft"], answer["calibration"]["id"]) == (1, True, REFUSED)
     assert "failed gates sign" in answer["draft_reasons"][0]
     assert f"! DRAFT, NOT APPROVED: {REFUSED}" in tire.read_text()
@@ -137,20 +134,20 @@ def test_a_draft_says_so_in_answer_and_file_and_stays_one(
     assert (caught.value.code, evaluated["draft"]) == (1, True)
     assert any(REFUSED in one["message"] for one in evaluated["findings"] if one["rule"] == "draft")
     # The comments of a tire file go along; a table has no place for the mark.
-    toolkit(capsys, home, "convert", draft_file, tmp_path / "x.tdx", "--draft")
+    toolkit(home, "convert", draft_file, tmp_path / "x.tdx", "--draft")
     assert "DRAFT, NOT APPROVED" in (tmp_path / "x.tdx").read_text()
     for source in (draft_file, tmp_path / "x.tdx"):
-        code, answer = toolkit(capsys, home, "convert", source, tmp_path / "x.csv", "--draft")
+        code, answer = toolkit(home, "convert", source, tmp_path / "x.csv", "--draft")
         assert (code, answer["error"]["rule"]) == (2, "draft-unmarked")
         assert not (tmp_path / "x.csv").exists()
 
 
 @office_needed
 def test_every_page_of_a_draft_is_marked(
-    home: Path, draft_file: Path, virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    home: Path, draft_file: Path, virtual_test: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    code, answer = toolkit(capsys, home, "report", draft_file, "--draft", "--hand-over", "--out", out)
+    code, answer = toolkit(home, "report", draft_file, "--draft", "--hand-over", "--out", out)
     assert (code, answer["draft"], answer["verified"]) == (1, True, True)
     pages = text_of(Path(answer["pdf"]))
     assert len(pages) == answer["pages"] > 5
@@ -164,17 +161,15 @@ def test_every_page_of_a_draft_is_marked(
     for name in ("test.tdx", "tire.tir"):
         assert "DRAFT, NOT APPROVED" in (out / name).read_text()
     # The same test by the record in force is none, asked for or not.
-    code, answer = toolkit(capsys, home, "process", virtual_test, "--draft")
+    code, answer = toolkit(home, "process", virtual_test, "--draft")
     assert (answer["draft"], answer["draft_reasons"]) == (False, [])
     assert "draft" not in {one["rule"] for one in answer["findings"]}
 
 
 @office_needed
-def test_a_draft_of_a_certificate_and_of_a_comparison(
-    home: Path, draft_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_draft_of_a_certificate_and_of_a_comparison(home: Path, draft_file: Path, tmp_path: Path) -> None:
     words = ("calibration", "certificate", REFUSED, "--draft", "--out", tmp_path / "certificate")
-    code, answer = toolkit(capsys, home, *words)
+    code, answer = toolkit(home, *words)
     assert (code, answer["draft"]) == (1, True)
     assert "failed gates sign" in answer["draft_reasons"][0]
     assert all("DRAFT, NOT APPROVED" in one for one in text_of(Path(answer["pdf"])))
@@ -184,7 +179,7 @@ def test_a_draft_of_a_certificate_and_of_a_comparison(
     plan.write_text(re.sub(r"(?m)^seed = .*$", "seed = 77", text))
     write_test(simulate(read_plan(plan)), other)
     out = tmp_path / "compared"
-    code, answer = toolkit(capsys, home, "compare", other, draft_file, "--draft", "--out", out)
+    code, answer = toolkit(home, "compare", other, draft_file, "--draft", "--out", out)
     assert (code, answer["draft"]) == (1, True)
     assert [one["calibration"].get("draft", False) for one in answer["entries"]] == [False, True]
     assert all("DRAFT, NOT APPROVED" in one for one in text_of(out / "comparison.pdf"))
@@ -196,13 +191,13 @@ def text_of(pdf: Path) -> list[str]:
 
 
 def test_a_reduced_test_of_a_record_in_force_is_converted_and_one_withdrawn_since_is_not(
-    home: Path, virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    home: Path, virtual_test: Path, tmp_path: Path
 ) -> None:
     own = tmp_path / "home"
     shutil.copytree(home / "calibrations", own / "calibrations")
     whole, table = tmp_path / "whole.xlsx", tmp_path / "whole.csv"
-    toolkit(capsys, own, "process", virtual_test, "--out", whole)
-    code, answer = toolkit(capsys, own, "convert", whole, table)
+    toolkit(own, "process", virtual_test, "--out", whole)
+    code, answer = toolkit(own, "convert", whole, table)
     assert (code, answer["draft"]) == (0, False)
     lines = table.read_text().splitlines()
     assert lines[0] == "SA [deg],FZ [N],FY [N],MZ [N*m]"
@@ -210,14 +205,14 @@ def test_a_reduced_test_of_a_record_in_force_is_converted_and_one_withdrawn_sinc
     registry = Registry(own / "calibrations")
     withdraw(registry, "m15-virtual-r1", on=today(), reason="cell overloaded", by="B")
     for words in (("convert", whole, table), ("fit", whole), ("report", whole, "--out", tmp_path / "out")):
-        code, answer = toolkit(capsys, own, *words)
+        code, answer = toolkit(own, *words)
         assert (code, answer["error"]["rule"]) == (2, "not-in-force")
         assert "cell overloaded" in answer["error"]["got"]
     assert not table.exists()
     assert not (tmp_path / "out").exists()
     # As it was known the day before the withdrawal: what became known since goes along.
     before = today() - dt.timedelta(days=1)
-    code, _ = toolkit(capsys, own, "convert", whole, table, "--known-at", before)
+    code, _ = toolkit(own, "convert", whole, table, "--known-at", before)
     assert code == 1
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert rows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 from collections.abc import Callable
@@ -12,18 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolkit.cli.main import run
+from tests import commands
 from toolkit.lab.home import packaged_home
 from toolkit.lab.tire_tests.resolve import Basis
 
 CALIBRATIONS = packaged_home() / "calibrations"
 
 
-def toolkit(capsys: pytest.CaptureFixture[str], *words: object, as_json: bool = True) -> tuple[int, Any]:
-    with pytest.raises(SystemExit) as caught:
-        run([*map(str, words), "--calibrations", str(CALIBRATIONS), *(["--json"] if as_json else [])])
-    out = capsys.readouterr().out
-    return int(caught.value.code or 0), json.loads(out) if as_json else out
+def toolkit(*words: object) -> tuple[int, Any]:
+    return commands.answer(*words, "--calibrations", CALIBRATIONS)
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +74,8 @@ def maker(path: Path) -> Path:
 
 
 @pytest.mark.usefixtures("read_once")
-def test_two_surfaces(
-    virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, answer = toolkit(capsys, "compare", virtual_test, other_test, "--figures", tmp_path / "figures")
+def test_two_surfaces(virtual_test: Path, other_test: Path, tmp_path: Path) -> None:
+    code, answer = toolkit("compare", virtual_test, other_test, "--figures", tmp_path / "figures")
     # The acquisition program of the virtual machine computed its own columns wrongly: a finding of the data.
     assert code == 1
     assert {one["rule"] for one in answer["findings"]} == {"acquired-differs"}
@@ -109,12 +103,12 @@ def test_two_surfaces(
 
 @pytest.mark.usefixtures("read_once")
 def test_a_reduced_test_compares_as_its_folder_does(
-    virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    virtual_test: Path, other_test: Path, tmp_path: Path
 ) -> None:
     reduced = tmp_path / "steel.xlsx"
-    toolkit(capsys, "process", other_test, "--out", reduced)
-    _, from_folder = toolkit(capsys, "compare", virtual_test, other_test)
-    _, from_file = toolkit(capsys, "compare", virtual_test, reduced)
+    toolkit("process", other_test, "--out", reduced)
+    _, from_folder = toolkit("compare", virtual_test, other_test)
+    _, from_file = toolkit("compare", virtual_test, reduced)
     assert from_file["differences"] == from_folder["differences"]
 
 
@@ -123,26 +117,23 @@ def test_two_runs_answer_the_same(
     other_test: Path,
     reader: Callable[..., Any],
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """By what the other tests have read, and by a reading of its own."""
     from toolkit.lab.tire_tests import compare as reading
 
     with monkeypatch.context() as patch:
         patch.setattr(reading, "_test", reader)
-        answers = [toolkit(capsys, "compare", virtual_test, other_test)[1]]
-    answers.append(toolkit(capsys, "compare", virtual_test, other_test)[1])
+        answers = [toolkit("compare", virtual_test, other_test)[1]]
+    answers.append(toolkit("compare", virtual_test, other_test)[1])
     for one in answers:
         one.pop("timing")
     assert answers[0] == answers[1]
 
 
 @pytest.mark.usefixtures("read_once")
-def test_against_a_maker_s_table(
-    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_against_a_maker_s_table(virtual_test: Path, tmp_path: Path) -> None:
     path = maker(tmp_path / "maker.csv")
-    _, answer = toolkit(capsys, "compare", path, virtual_test)
+    _, answer = toolkit("compare", path, virtual_test)
     assert answer["mode"] == "table"
     assert {round(one["load_N"]) for one in answer["differences"]} == {2500, 5000}
     names = {one["quantity"] for one in answer["differences"]}
@@ -152,26 +143,22 @@ def test_against_a_maker_s_table(
     )
     assert slope["reference"]["value"] == pytest.approx(0.95 * 2500 * 1.3 * 13, rel=1e-4)
     # The test's loads are met by its neighbours: the other way round gives the same difference with its sign.
-    _, turned = toolkit(capsys, "compare", virtual_test, path)
+    _, turned = toolkit("compare", virtual_test, path)
     assert any("does not reach the load" in one for one in turned["left_out"])
     assert any("has no conicity" in one for one in turned["left_out"])
 
 
 @pytest.mark.usefixtures("read_once")
-def test_against_a_maker_s_characteristics(
-    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_against_a_maker_s_characteristics(virtual_test: Path, tmp_path: Path) -> None:
     path = tmp_path / "company.csv"
     path.write_text("FZ [N],conicity [N],U_conicity [N]\n2500,40,6\n5000,80,6\n")
-    _, answer = toolkit(capsys, "compare", path, virtual_test)
+    _, answer = toolkit("compare", path, virtual_test)
     assert answer["entries"][0]["kind"] == "characteristics"
     assert [one["reference"]["standard_uncertainty"] for one in answer["differences"]] == [3.0, 3.0]
 
 
 @pytest.mark.usefixtures("read_once")
-def test_repeats_have_their_precision(
-    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], virtual_plan: Any
-) -> None:
+def test_repeats_have_their_precision(virtual_test: Path, tmp_path: Path, virtual_plan: Any) -> None:
     import dataclasses
 
     from toolkit.simulation.run import simulate
@@ -185,7 +172,7 @@ def test_repeats_have_their_precision(
         .replace("virtual operator", "another one")
         .replace("[tire]", 'mounting = "2"\n[tire]')
     )
-    _, answer = toolkit(capsys, "compare", virtual_test, again)
+    _, answer = toolkit("compare", virtual_test, again)
     assert answer["mode"] == "repeats"
     factors = {one["factor"]: one for one in answer["repeats"]["factors"]}
     assert factors["operator"]["varied"]
@@ -197,16 +184,15 @@ def test_repeats_have_their_precision(
     assert row["intermediate"][0]["factor"] == "operator"
     assert answer["repeats"]["reproducibility"] is None
     assert "another laboratory" in answer["repeats"]["reproducibility_note"]
-    code, refused = toolkit(capsys, "compare", virtual_test, again, "--reproducibility")
+    code, refused = toolkit("compare", virtual_test, again, "--reproducibility")
     assert (code, refused["error"]["rule"]) == (2, "no-other-laboratory")
 
 
 @pytest.mark.usefixtures("read_once")
-def test_people_read_it_in_their_units(
-    virtual_test: Path, other_test: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _, si = toolkit(capsys, "compare", virtual_test, other_test, as_json=False)
-    _, lbf = toolkit(capsys, "compare", virtual_test, other_test, "--units", "lbf", as_json=False)
+def test_people_read_it_in_their_units(virtual_test: Path, other_test: Path) -> None:
+    si = commands.said("compare", virtual_test, other_test, "--calibrations", CALIBRATIONS).out
+    units = ("--units", "lbf", "--calibrations", CALIBRATIONS)
+    lbf = commands.said("compare", virtual_test, other_test, *units).out
     assert "SIMULATED" in si
     assert "N·m/deg" in si
     assert "lbf·ft/deg" in lbf
@@ -224,12 +210,12 @@ def test_people_read_it_in_their_units(
     not (shutil.which("soffice") and shutil.which("pdftotext")), reason="LibreOffice and poppler make the PDF"
 )
 def test_the_document_is_verified_and_two_runs_agree(
-    virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    virtual_test: Path, other_test: Path, tmp_path: Path
 ) -> None:
     made = []
     for name in ("one", "two"):
         _, answer = toolkit(
-            capsys, "compare", virtual_test, other_test, "--out", tmp_path / name, "--known-at", "2026-04-01"
+            "compare", virtual_test, other_test, "--out", tmp_path / name, "--known-at", "2026-04-01"
         )
         made.append(answer["document"])
         assert sorted(path.name for path in (tmp_path / name).iterdir()) == [
@@ -243,7 +229,7 @@ def test_the_document_is_verified_and_two_runs_agree(
 
 @pytest.mark.usefixtures("read_once")
 def test_the_document_takes_the_units_that_were_asked_for(
-    virtual_test: Path, other_test: Path, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
+    virtual_test: Path, other_test: Path, tmp_path: Path, monkeypatch: Any
 ) -> None:
     """By the command line, else by the style file beside the template."""
     from toolkit.errors import RenderError
@@ -262,7 +248,7 @@ def test_the_document_takes_the_units_that_were_asked_for(
     for style in ('force = "N"', 'force = "lbf"'):
         template.with_suffix(".toml").write_text(f"schema = 1\n[units]\n{style}\n")
         for units in ((), ("--units", "lbf"), ("--units", "SI")):
-            assert toolkit(capsys, *words, *units)[0] == 2
+            assert toolkit(*words, *units)[0] == 2
     assert loads == ["N", "lbf", "N", "lbf", "lbf", "N"]
 
 
@@ -289,22 +275,19 @@ def test_bad_input_ends_with_2_and_writes_nothing(
     rule: str,
     virtual_test: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     maker(tmp_path / "maker.csv")
     places = {"test": virtual_test, "none": tmp_path / "none", "maker": tmp_path / "maker.csv"}
     figures = tmp_path / "figures"
-    code, answer = toolkit(capsys, "compare", *(one.format(**places) for one in words), "--figures", figures)
+    code, answer = toolkit("compare", *(one.format(**places) for one in words), "--figures", figures)
     assert (code, answer["error"]["rule"]) == (2, rule)
     assert all(answer["error"][key] for key in ("what", "where", "got", "expected", "next_step"))
     assert not figures.exists()
 
 
-def test_a_protocol_for_a_test_that_is_reduced_already(
-    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_protocol_for_a_test_that_is_reduced_already(virtual_test: Path, tmp_path: Path) -> None:
     reduced = tmp_path / "t.xlsx"
-    toolkit(capsys, "process", virtual_test, "--out", reduced)
+    toolkit("process", virtual_test, "--out", reduced)
     protocol = tmp_path / "p.toml"
     protocol.write_text(
         'source = "other"\nslip_angles = { value = [0, 1, -1], unit = "deg" }\n'
@@ -312,19 +295,19 @@ def test_a_protocol_for_a_test_that_is_reduced_already(
         "load_tolerance = 0.05\nsettle_revolutions = 2.5\naverage_revolutions = 1\n"
         'acquisition = "after_settling"\n'
     )
-    code, answer = toolkit(capsys, "process", reduced, "--protocol", protocol)
+    code, answer = toolkit("process", reduced, "--protocol", protocol)
     assert (code, answer["error"]["rule"]) == (2, "protocol-of-reduced")
-    code, answer = toolkit(capsys, "compare", virtual_test, reduced, "--protocol", protocol)
+    code, answer = toolkit("compare", virtual_test, reduced, "--protocol", protocol)
     assert (code, answer["error"]["rule"]) == (2, "protocol-of-reduced")
     copy = tmp_path / "copy"
     shutil.copytree(virtual_test, copy)
-    code, answer = toolkit(capsys, "process", copy, "--protocol", protocol)
+    code, answer = toolkit("process", copy, "--protocol", protocol)
     assert answer["protocol"] == "other"
     assert {"slip-angle-tolerance", "unplanned-load"} <= {one["rule"] for one in answer["findings"]}
 
 
-def test_the_tags_of_a_comparison_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    code, answer = toolkit(capsys, "template", "tags", "--kind", "comparison")
+def test_the_tags_of_a_comparison_are_listed() -> None:
+    code, answer = toolkit("template", "tags", "--kind", "comparison")
     assert code == 0
     listed = {one["tag"] for one in answer["tags"]}
     assert {"tk:comparison.conclusion", "tk:table.differences", "tk:figure.compared_conicity"} <= listed

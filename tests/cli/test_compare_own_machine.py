@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from tests import commands
 from tests.cli.test_compare import maker
-from toolkit.cli.main import run
 from toolkit.lab.desk.holdings import Reported, holdings_of, rows_of_tests
 from toolkit.lab.home import packaged_home
 from toolkit.machine.definition import machine_file
@@ -18,10 +18,8 @@ from toolkit.machine.definition import machine_file
 CALIBRATIONS = packaged_home() / "calibrations"
 
 
-def toolkit(*words: object) -> int:
-    with pytest.raises(SystemExit) as caught:
-        run([*map(str, words), "--calibrations", str(CALIBRATIONS)])
-    return int(caught.value.code or 0)
+def toolkit(*words: object) -> tuple[int, dict[str, Any]]:
+    return commands.answer(*words, "--calibrations", CALIBRATIONS)
 
 
 @pytest.fixture(scope="module")
@@ -38,34 +36,29 @@ def home(tmp_path_factory: pytest.TempPathFactory, virtual_test: Path) -> Path:
     before = Path.cwd()
     os.chdir(folder)
     try:
-        assert toolkit("process", "test", "--out", "reduced.xlsx", "--quiet") in (0, 1)
+        assert toolkit("process", "test", "--out", "reduced.xlsx")[0] in (0, 1)
     finally:
         os.chdir(before)
     return folder
 
 
 def test_a_reduced_test_is_compared_and_planned_by_without_its_machines_file(
-    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     moved = tmp_path / "elsewhere"
     moved.mkdir()
     shutil.copy(home / "reduced.xlsx", moved / "a.xlsx")
     monkeypatch.chdir(moved)
     table = maker(moved / "maker.csv")
-    assert toolkit("compare", "a.xlsx", table, "--json") in (0, 1)
-    capsys.readouterr()
-    asked = ("--u", "conicity", "--load", "833 lbf", "--json")
-    assert toolkit("plan", "test", "--like", "a.xlsx", *asked) == 0
-    assert json.loads(capsys.readouterr().out)["machine"] == "m15-virtual"
+    assert toolkit("compare", "a.xlsx", table)[0] in (0, 1)
+    code, planned = toolkit("plan", "test", "--like", "a.xlsx", "--u", "conicity", "--load", "833 lbf")
+    assert (code, planned["machine"]) == (0, "m15-virtual")
 
 
-def test_a_test_by_a_path_is_planned_by(
-    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_test_by_a_path_is_planned_by(home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    asked = ("--u", "conicity", "--load", "833 lbf", "--out", "p", "--json")
-    assert toolkit("plan", "test", "--like", home / "test", *asked) == 0
-    capsys.readouterr()
+    asked = ("--u", "conicity", "--load", "833 lbf", "--out", "p")
+    assert toolkit("plan", "test", "--like", home / "test", *asked)[0] == 0
     assert 'machine = "m15-virtual"' in (tmp_path / "p" / "plan.toml").read_text()
 
 

@@ -1,16 +1,15 @@
 """`toolkit diagnose`: exit codes, the answer's keys, files that are there whole or not at all."""
 
+import functools
 import json
 import re
 
 import numpy as np
 import pandas as pd
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.diagnosis.cases import HEAD, SIMULATOR, TWO, carriage, write_case
-from toolkit.cli import diagnose
 from toolkit.errors import OutputError, ToolkitError
 
 KEYS = {
@@ -22,14 +21,7 @@ PREDICT = '[[recording.predict]]\nfile = "more.csv"\n'
 
 @pytest.fixture
 def run():
-    app = typer.Typer()
-    app.command("diagnose")(diagnose.command)
-    app.command("other")(lambda: None)
-
-    def call(*arguments):
-        return CliRunner().invoke(app, ["diagnose", *map(str, arguments)], standalone_mode=False)
-
-    return call
+    return functools.partial(commands.result, "diagnose")
 
 
 def answered(out):

@@ -5,21 +5,16 @@ import shutil
 
 import pandas as pd
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
-from toolkit.cli import diagnose, simulate
 from toolkit.errors import ConfigError, OutputError
 from toolkit.simulation.model_file import read_model
 
 
 @pytest.fixture(scope="module")
 def run():
-    app = typer.Typer()
-    app.command("diagnose")(diagnose.command)
-    app.command("simulate")(simulate.command)
-    return lambda *given: CliRunner().invoke(app, [*map(str, given)], standalone_mode=False)
+    return commands.result
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,12 @@
+import functools
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.recording.fig4_4 import ROWS, SYMBOLS
-from toolkit.cli import inspect
 from toolkit.errors import ToolkitError
 from toolkit.examples import packaged_fig4_4
 from toolkit.machine import load_machine
@@ -15,16 +15,7 @@ from toolkit.recording.labview import write_labview
 
 @pytest.fixture
 def run():
-    import typer
-
-    app = typer.Typer()
-    app.command("inspect")(inspect.command)
-    app.command("other")(lambda: None)
-
-    def call(*arguments):
-        return CliRunner().invoke(app, ["inspect", *map(str, arguments)], standalone_mode=False)
-
-    return call
+    return functools.partial(commands.result, "inspect")
 
 
 def test_figure_4_4_in_an_empty_registry(run, tmp_path):

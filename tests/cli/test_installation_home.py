@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
-from toolkit.cli.main import run
+from tests import commands
 from toolkit.errors import ConfigError
 from toolkit.lab.home import calibrations_folder, find_home
 from toolkit.lab.upkeep import installation
-
-
-def code_of(*words: object) -> int:
-    with pytest.raises(SystemExit) as caught:
-        run([str(word) for word in words])
-    return int(caught.value.code or 0)
 
 
 def test_the_nearest_folder_upward_is_the_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -48,43 +41,40 @@ def test_no_home_is_an_error_that_names_init(tmp_path: Path, monkeypatch: pytest
         calibrations_folder(tmp_path / "nothing")
 
 
-def test_init_makes_a_home_and_leaves_what_is_there(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_init_makes_a_home_and_leaves_what_is_there(tmp_path: Path) -> None:
     home = tmp_path / "laboratory"
-    assert code_of("init", home, "--json") == 0
-    assert "report_templates/org.docx" in json.loads(capsys.readouterr().out)["written"]
+    code, answer = commands.answer("init", home)
+    assert code == 0
+    assert "report_templates/org.docx" in answer["written"]
     (home / "report_templates" / "org.docx").write_text("our own")
-    assert code_of("init", home) == 0
+    assert commands.said("init", home).code == 0
     assert (home / "report_templates" / "org.docx").read_text() == "our own"
     assert list((home / "calibrations").iterdir()) == []
 
 
-def test_doctor_names_the_command_that_mends(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_doctor_names_the_command_that_mends(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nonexistent")
-    assert code_of("doctor", "--json") == 1
-    answer = json.loads(capsys.readouterr().out)
+    code, answer = commands.answer("doctor")
+    assert code == 1
     assert installation.PACKAGES in answer["mend"]
     assert {c["name"] for c in answer["checks"] if not c["ok"]} >= {"soffice", "pdftotext"}
 
 
-def test_doctor_finds_nothing_missing_after_set_up(capsys: pytest.CaptureFixture[str]) -> None:
-    assert code_of("doctor", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["mend"] is None
+def test_doctor_finds_nothing_missing_after_set_up() -> None:
+    code, answer = commands.answer("doctor")
+    assert (code, answer["mend"]) == (0, None)
 
 
-def test_wrong_words_end_with_2(capsys: pytest.CaptureFixture[str]) -> None:
-    assert code_of("process") == 2
-    assert code_of("nonsense") == 2
-    assert code_of("process", "--nonsense", "--json", ".") == 2
-    out = capsys.readouterr()
-    assert json.loads(out.out)["error"]["rule"] == "usage"
+def test_wrong_words_end_with_2() -> None:
+    assert commands.said("process").code == 2
+    assert commands.said("nonsense").code == 2
+    code, answer = commands.answer("process", "--nonsense", ".")
+    assert (code, answer["error"]["rule"]) == (2, "usage")
 
 
-def test_a_bug_ends_with_101(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bug_ends_with_101(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(installation, "_mending_command", lambda: 1 / 0)
     monkeypatch.setenv("PATH", "/nonexistent")
-    assert code_of("doctor") == 101
-    assert "this is a bug" in capsys.readouterr().err
+    code, _, error = commands.said("doctor")
+    assert code == 101
+    assert "this is a bug" in error

@@ -5,11 +5,9 @@ import re
 import shutil
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
+from tests import commands
 from tests.diagnosis.answer.test_model_text import offset_machine
-from toolkit.cli import diagnose, machine
 from toolkit.errors import ConfigError, OutputError
 from toolkit.files import sha256_file
 from toolkit.machine import load_machine
@@ -21,10 +19,7 @@ WHY = ("--reason", "zero measured with the wheel at rest", "--by", "a tester", "
 
 @pytest.fixture(scope="module")
 def run():
-    app = typer.Typer()
-    app.command("diagnose")(diagnose.command)
-    app.add_typer(machine.app, name="machine")
-    return lambda *given: CliRunner().invoke(app, [*map(str, given)], standalone_mode=False)
+    return commands.result
 
 
 @pytest.fixture(scope="module")

@@ -10,12 +10,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 import toolkit
+from tests import commands
 from tests.planning.class_factory import answer, found, write_case
 from tests.planning.planning_factory import LOADS, earlier
-from toolkit.cli.main import _register, app
 from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 from toolkit.lab.plans import protocol_plan
@@ -30,12 +29,7 @@ CALIBRATIONS = ROOT / "calibrations"
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("TOOLKIT_HOME", raising=False)
-    _register()
-
-    def call(*arguments):
-        return CliRunner().invoke(app, [*map(str, arguments)], standalone_mode=False)
-
-    return call
+    return commands.result
 
 
 NEAR = LOADS[1:4]

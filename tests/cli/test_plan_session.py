@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import json
 import shutil
 import subprocess
@@ -16,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolkit.cli.main import run
+from tests import commands
 from toolkit.simulation.cells import CELLS, LOADS, CellsTruth, outputs
 from toolkit.simulation.session import LOAD_UNITS
 from toolkit.units import to_si
@@ -35,16 +33,7 @@ def toolkit(
             capture_output=True, text=True, check=False,
         )  # fmt: skip
     else:
-        out, err = io.StringIO(), io.StringIO()
-        with (
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
-            pytest.raises(SystemExit) as ended,
-        ):
-            run(words)
-        result = subprocess.CompletedProcess(
-            words, int(ended.value.code or 0), out.getvalue(), err.getvalue()
-        )
+        result = subprocess.CompletedProcess(words, *commands.said(*words))
     assert code is None or result.returncode == code, result.stdout + result.stderr
     return result
 

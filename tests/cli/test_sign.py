@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import commands
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.main import run as run_toolkit
 from toolkit.errors import TrustError
 from toolkit.lab.home import packaged_home
 from toolkit.report.certificate.collect import collect
@@ -37,17 +37,13 @@ PEOPLE = (("anna", "head"), ("ben", "head"), ("carl", "operator"), ("dora", "che
 
 
 @pytest.fixture
-def run(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """A laboratory of four people whose keys lie outside of its home; the first words of what it answers."""
     (tmp_path / "keys").mkdir()
     shutil.copytree(packaged_home() / "calibrations", tmp_path / "home/calibrations")
     monkeypatch.chdir(tmp_path / "home")
 
-    def call(*words: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as ended:
-            run_toolkit([str(word) for word in words])
-        printed = capsys.readouterr()
-        return int(ended.value.code or 0), printed.out, printed.err
+    call = commands.said
 
     for name, _ in PEOPLE:
         keygen(tmp_path / "keys" / name)

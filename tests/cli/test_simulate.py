@@ -1,12 +1,11 @@
+import functools
 import json
 from pathlib import Path
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
 import toolkit
-from toolkit.cli import simulate
+from tests import commands
 from toolkit.errors import ConfigError, OutputError
 
 EXAMPLES = Path(toolkit.__file__).parent / "examples" / "virtual"
@@ -17,14 +16,7 @@ SHORT = "date = 2026-03-17\nslip_angles = { value = [0], unit = 'deg' }\n"
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("TOOLKIT_HOME", raising=False)
-    app = typer.Typer()
-    app.command("simulate")(simulate.command)
-    app.command("other")(lambda: None)
-
-    def call(*arguments):
-        return CliRunner().invoke(app, ["simulate", *map(str, arguments)], standalone_mode=False)
-
-    return call
+    return functools.partial(commands.result, "simulate")
 
 
 @pytest.fixture

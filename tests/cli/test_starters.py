@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests import commands
 from tests.declared.test_describe_filled_in import Lines, without_sign
 from toolkit.calibration.session.read import read_session
-from toolkit.cli.main import run
 from toolkit.declared import read
 from toolkit.declared.describe import asked_of, filled_in
 from toolkit.diagnosis.case.reader import read_case
@@ -39,18 +37,6 @@ LOADS = "run,direction,gx [mV/V],gy (mV/V),FY [kN],MZ [N*m],remark\n" + "".join(
 )
 
 
-def command(*words: object) -> int:
-    with pytest.raises(SystemExit) as caught:
-        run([str(word) for word in words])
-    return int(caught.value.code or 0)
-
-
-def answered(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, dict[str, Any]]:
-    capsys.readouterr()
-    code = command(*words, "--json")
-    return code, json.loads(capsys.readouterr().out)
-
-
 def sets(entries: list[str]) -> list[str]:
     return [word for entry in entries for word in ("--set", entry)]
 
@@ -63,9 +49,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("word", FORMS)
 def test_what_is_missing_is_told_all_at_once_by_the_command_and_by_the_reader(
-    word: str, folder: Path, capsys: pytest.CaptureFixture[str]
+    word: str, folder: Path
 ) -> None:
-    code, told = answered(capsys, word, "new", "f.toml")
+    code, told = commands.answer(word, "new", "f.toml")
     assert code == 0
     assert told["open"]
     with pytest.raises(ConfigError) as caught:
@@ -76,9 +62,7 @@ def test_what_is_missing_is_told_all_at_once_by_the_command_and_by_the_reader(
 
 
 @pytest.mark.parametrize("word", FORMS)
-def test_nothing_is_written_over_and_nothing_wrong_is_written(
-    word: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_nothing_is_written_over_and_nothing_wrong_is_written(word: str, folder: Path) -> None:
     (folder / "mine.toml").write_text("mine")
     for words, rule in (
         (["mine.toml"], "not-writable"),
@@ -86,70 +70,64 @@ def test_nothing_is_written_over_and_nothing_wrong_is_written(
         (["new.toml", "--set", "nonsense=1"], "unknown-key"),
         (["new.toml", "--set", "nonsense"], "usage"),
     ):
-        code, told = answered(capsys, word, "new", *words)
+        code, told = commands.answer(word, "new", *words)
         assert (code, told["error"]["rule"]) == (2, rule), told
     assert {path.name for path in folder.iterdir()} == {"mine.toml"}
     assert (folder / "mine.toml").read_text() == "mine"
 
 
-def test_a_session_of_a_table_is_accepted_by_calibrate(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_session_of_a_table_is_accepted_by_calibrate(folder: Path) -> None:
     (folder / "data").mkdir()
     (folder / "data" / "loads.csv").write_text(LOADS.replace(",remark", "").replace(",\n", "\n"))
-    assert command("init", ".") == 0
+    assert commands.said("init", ".").code == 0
     words = ["--set", "instrument=press-7", "--set", "date=2026-02-03", "--set", "operator=first person"]
-    code, told = answered(capsys, "session", "new", "SESSION.toml", "--from", "data/loads.csv", *words)
+    code, told = commands.answer("session", "new", "SESSION.toml", "--from", "data/loads.csv", *words)
     assert (code, told["open"], told["not_guessed"]) == (0, [], [])
     assert told["guessed"] == {
         "data": "data/loads.csv", "indications": ["gx", "gy"], "loads": ["FY", "MZ"],
     }  # fmt: skip
-    code, told = answered(capsys, "calibrate", "SESSION.toml")
+    code, told = commands.answer("calibrate", "SESSION.toml")
     assert code in (0, 1), told
     assert told["record"]["id"] == "press-7-r1"
 
 
-def test_what_no_header_tells_is_said_and_left_out(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_no_header_tells_is_said_and_left_out(folder: Path) -> None:
     (folder / "loads.csv").write_text(LOADS)
-    _, told = answered(capsys, "session", "new", "s.toml", "--from", "loads.csv")
+    _, told = commands.answer("session", "new", "s.toml", "--from", "loads.csv")
     assert told["not_guessed"] == ["remark: no unit that is known; write 'NAME [unit]'"]
     assert told["open"] == ["instrument", "date", "operator"]
     # Cells that are read in units of force: no unit tells them from the loads.
     (folder / "lbf.csv").write_text("run,direction,A [lbf],B [lbf],FY [N]\n1,up,0,0,0\n")
-    _, told = answered(capsys, "session", "new", "t.toml", "--from", "lbf.csv")
+    _, told = commands.answer("session", "new", "t.toml", "--from", "lbf.csv")
     assert set(told["guessed"]) == {"data"}
     assert {"indications", "loads"} <= set(told["open"])
     assert told["lacking"] == {}
     (folder / "bare.csv").write_text("A [mV/V],FY [N]\n0,0\n")
-    _, told = answered(capsys, "session", "new", "u.toml", "--from", "bare.csv")
+    _, told = commands.answer("session", "new", "u.toml", "--from", "bare.csv")
     assert told["open"] == ["instrument", "date", "operator"]
     assert told["lacking"] == {"data": "bare.csv needs the column run and the column direction"}
 
 
 @pytest.mark.parametrize("word", ["session", "machine"])
-def test_rows_without_a_header_say_nothing_of_columns(
-    word: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_rows_without_a_header_say_nothing_of_columns(word: str, folder: Path) -> None:
     (folder / "bare.csv").write_text("23682,-0.31,9.44\n23780,-0.26,9.47\n")
-    code, answer = answered(capsys, word, "new", "s.toml", "--from", "bare.csv")
+    code, answer = commands.answer(word, "new", "s.toml", "--from", "bare.csv")
     assert (code, answer["error"]["rule"]) == (2, "no-header")
     assert not (folder / "s.toml").exists()
 
 
-def test_the_machine_of_a_recording_reads_it_whatever_form_its_units_have(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_machine_of_a_recording_reads_it_whatever_form_its_units_have(folder: Path) -> None:
     (folder / "foreign.csv").write_text("SA (deg),FZ_N,FY / N,MZ in Nm,TT [degC]\n1,3000,-500,20,40\n")
-    code, _ = answered(capsys, "machine", "new", "r.toml", "--from", "foreign.csv", *sets(BELT))
+    code, _ = commands.answer("machine", "new", "r.toml", "--from", "foreign.csv", *sets(BELT))
     assert code == 0
-    code, answer = answered(capsys, "inspect", "foreign.csv", "--machine", "r.toml")
+    code, answer = commands.answer("inspect", "foreign.csv", "--machine", "r.toml")
     channels = {channel["symbol"]: channel["unit"] for channel in answer["channels"]}
     assert channels == {"SA": "deg", "FZ": "N", "FY": "N", "MZ": "N*m", "TT": "degC"}
 
 
-def test_a_temperature_is_no_time(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_temperature_is_no_time(folder: Path) -> None:
     (folder / "run_01.csv").write_text("Time [ms],Fz [kN],SA [deg],gx [mV/V],T [degC]\n0,1,0,0,21\n")
-    code, _ = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
+    code, _ = commands.answer("machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
     assert code == 0
     columns = load_machine("belt.toml").columns
     assert [(column.symbol, column.role) for column in columns if column.header in ("Time", "T")] == [
@@ -158,9 +136,9 @@ def test_a_temperature_is_no_time(folder: Path, capsys: pytest.CaptureFixture[st
     ]
 
 
-def test_a_belt_by_a_recording_of_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_belt_by_a_recording_of_it(folder: Path) -> None:
     (folder / "run_01.csv").write_text("Fz [kN],SA [deg],gx [mV/V],gy [mV/V],FY [N]\n1,0,0,0,0\n")
-    code, told = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
+    code, told = commands.answer("machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
     # A drum's owner is told what nobody asks a belt's for: without it the road would count as flat.
     assert [text for text in told["not_guessed"] if text.startswith("drum.circumference: ")] != []
     assert (code, told["open"]) == (0, [])
@@ -170,18 +148,17 @@ def test_a_belt_by_a_recording_of_it(folder: Path, capsys: pytest.CaptureFixture
         "FZ": ("kN", "load"), "SA": ("deg", "slip_angle"), "gx": ("mV/V", "indication"),
         "gy": ("mV/V", "indication"), "FY": ("N", "acquired"),
     }  # fmt: skip
-    assert command("machine", "show", "belt.toml") == 0
-    assert command("test", "new", "test.toml", "--set", "machine=belt.toml", "--set", "date=2026-03-17") == 0
+    assert commands.said("machine", "show", "belt.toml").code == 0
+    words = ("--set", "machine=belt.toml", "--set", "date=2026-03-17")
+    assert commands.said("test", "new", "test.toml", *words).code == 0
     assert load_machine(read_test_folder(folder).info.machine).name == "belt-2"
 
 
-def test_a_case_shows_every_kind_of_simulation_and_the_chosen_one_alone(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert answered(capsys, "case", "new", "any.toml")[0] == 0
+def test_a_case_shows_every_kind_of_simulation_and_the_chosen_one_alone(folder: Path) -> None:
+    assert commands.answer("case", "new", "any.toml")[0] == 0
     text = (folder / "any.toml").read_text()
     assert [f'#kind = "{kind}"' in text for kind in ("machine", "python", "ode", "columns")] == [True] * 4
-    _, answer = answered(capsys, "case", "new", "ode.toml", "--set", "simulation.kind=ode")
+    _, answer = commands.answer("case", "new", "ode.toml", "--set", "simulation.kind=ode")
     text = (folder / "ode.toml").read_text()
     assert "simulation.path" in answer["open"]
     assert '#path = "sim.py"   # FILL IN' in text
@@ -189,12 +166,10 @@ def test_a_case_shows_every_kind_of_simulation_and_the_chosen_one_alone(
     assert "function" not in text
 
 
-def test_a_case_of_a_recording_names_its_channels_and_leaves_open_what_no_header_tells(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_case_of_a_recording_names_its_channels_and_leaves_open_what_no_header_tells(folder: Path) -> None:
     rows = "".join(f"{i},{i % 5},3000,{-900 * (i % 5)},{-890 * (i % 5)},7\n" for i in range(40))
     (folder / "r.csv").write_text(f"Time [s],SA [deg],FZ [N],FY [N],FY_sim,x\n{rows}")
-    code, told = answered(capsys, "case", "new", "c.toml", "--from", "r.csv")
+    code, told = commands.answer("case", "new", "c.toml", "--from", "r.csv")
     assert (code, told["open"], told["not_guessed"]) == (0, [], ["x: what it is to the simulation"])
     channels = {channel.name: (channel.unit, channel.role) for channel in read_case(Path("c.toml")).channels}
     assert channels == {
@@ -202,21 +177,21 @@ def test_a_case_of_a_recording_names_its_channels_and_leaves_open_what_no_header
     }  # fmt: skip
     assert told["guessed"]["simulation"] == {"kind": "columns", "simulated": {"FY": "FY_sim"}}
     # What somebody states goes before a guess, which is then none.
-    _, told = answered(capsys, "case", "new", "p.toml", "--from", "r.csv", "--set", "simulation.kind=python")
+    _, told = commands.answer("case", "new", "p.toml", "--from", "r.csv", "--set", "simulation.kind=python")
     assert (set(told["guessed"]), told["open"]) == ({"recording"}, ["simulation.path"])
     # A channel without a unit is one: its unit is asked for.
     (folder / "bare.csv").write_text("t,FY\n0,1\n")
-    _, told = answered(capsys, "case", "new", "b.toml", "--from", "bare.csv", "--set", "simulation.kind=ode")
+    _, told = commands.answer("case", "new", "b.toml", "--from", "bare.csv", "--set", "simulation.kind=ode")
     assert {"recording.channels.t.unit", "recording.channels.FY.unit"} <= set(told["open"])
 
 
-def test_a_plan_is_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _, told = answered(capsys, "plan", "new", "plan.toml")
+def test_a_plan_is_read(folder: Path) -> None:
+    _, told = commands.answer("plan", "new", "plan.toml")
     entries = ["date=2026-03-17", "tire.file=tire.tir", "tire.size=205/55R16", "seed=7"]
     examples = Path(load_machine.__code__.co_filename).parents[1] / "examples" / "virtual"
     (folder / "tire.tir").write_bytes((examples / "tire.tir").read_bytes())
     needed = [entry for entry in entries if entry.partition("=")[0] in told["open"]]
-    _, told = answered(capsys, "plan", "new", "whole.toml", *sets(needed))
+    _, told = commands.answer("plan", "new", "whole.toml", *sets(needed))
     assert told["open"] == []
     assert read_plan(folder / "whole.toml").seed is not None
 
@@ -234,13 +209,11 @@ def test_a_person_is_asked_for_what_must_be_stated(folder: Path) -> None:
     assert "\n#data = " in text
 
 
-def test_a_name_that_nobody_knows_has_no_role_of_its_unit_alone(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_that_nobody_knows_has_no_role_of_its_unit_alone(folder: Path) -> None:
     (folder / "r.csv").write_text(
         "Radlast [kN];A [N];Schräglauf [rad];G1 [mV/V];Temp [degC];F_Y [N]\n1;2;0,1;1;20;5\n"
     )
-    _, told = answered(capsys, "machine", "new", "m.toml", "--from", "r.csv")
+    _, told = commands.answer("machine", "new", "m.toml", "--from", "r.csv")
     roles = {column["symbol"]: column.get("role") for column in told["guessed"]["column"]}
     assert {name: roles[name] for name in ("Radlast", "A", "Schräglauf", "G1", "Temp")} == {
         "Radlast": None, "A": None, "Schräglauf": None, "G1": "indication", "Temp": "covariate",
@@ -276,7 +249,7 @@ def test_what_process_and_the_report_ask_for_is_marked_in_a_new_test(folder: Pat
     assert {"date", "requestor", "tire.company", "tire.DOT", "tire.series"} <= printed
     asked = asked_of(form_of("test"), {})
     assert printed == asked.keys()
-    assert command("test", "new", "test.toml", "--no-ask") == 0
+    assert commands.said("test", "new", "test.toml", "--no-ask").code == 0
     text = filled_in((folder / "test.toml").read_text())
     (folder / "test.toml").write_text(text)
     assert asked_of(form_of("test"), tomllib.loads(text)) == {}
@@ -294,7 +267,7 @@ def test_every_entry_is_accepted_as_it_is_printed_by_the_reader_of_its_command(
     (folder / "loads.csv").write_text("run,direction,D51 [mV/V],FY [N]\n" + "\n".join(rows))
     (folder / "...").write_text("D51 [mV/V],FY [N]\n0.5,500\n")  # what the entry check is printed with
     shutil.copy(packaged_home() / "toolkit/examples/virtual/tire.tir", "tire.tir")
-    assert command(word, "new", "new.toml", "--no-ask") == 0
+    assert commands.said(word, "new", "new.toml", "--no-ask").code == 0
     lines = Lines(without_sign((folder / "new.toml").read_text()))
     refused = []
     for block in lines.blocks:

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
+from tests import commands
 from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import authority, flipped, key, plain_pdf, sealed_pdf
-from toolkit.cli import verify
-from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.trust.seal.pdf import seal_pdf
 from toolkit.trust.seal.xml import seal_xml
@@ -36,21 +34,8 @@ def home(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(home: Path, capsys: pytest.CaptureFixture[str]) -> Run:
-    root = typer.Typer()
-    root.command("verify")(verify.command)
-    root.command("other")(lambda: 0)
-
-    def call(*words: object, as_json: bool = True) -> tuple[int, Any]:
-        arguments = ["verify", *map(str, words), "--home", str(home), *(["--json"] if as_json else [])]
-        try:
-            code = root(args=arguments, standalone_mode=False)
-        except ToolkitError as error:
-            return error.exit_code, error
-        said = capsys.readouterr().out
-        return code, json.loads(said) if as_json else said
-
-    return call
+def run(home: Path) -> Run:
+    return lambda *words: commands.answer("verify", *words, "--home", home)
 
 
 def _issued(record: str, sha256: str, files: dict[str, bytes] | None = None) -> bytes:
@@ -75,7 +60,7 @@ def test_a_document_over_a_record_in_force_still_holds(run: Run, home: Path, tmp
     assert answer["files"] == [{key: answer[key] for key in answer["files"][0]}]
     assert (answer["kind"], answer["signature"], answer["ledger"]) == ("pdf", "valid", "unknown")
     assert (answer["issued_by"], answer["still_holds"]) == ("Tire laboratory", True)
-    code, said = run(file, as_json=False)
+    code, said, _ = commands.said("verify", file, "--home", home)
     assert code == 0
     assert said.count("\n") == 1
     for words in ("VALID", "by Tire laboratory at 20", "over certificate of m15-virtual-r1", "still holds"):

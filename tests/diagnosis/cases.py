@@ -7,33 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tests.golden.cases import CARRIAGE_CASE as HEAD
+
 SIMULATOR = """
 def simulate(inputs, p):
     import pandas as pd
     return pd.DataFrame({"F": p["mass"] * inputs["a"] + p["c"] * inputs["v"]})
-"""
-HEAD = """schema = 1
-title = "A carriage"
-[simulation]
-kind = "python"
-path = "sim.py"
-function = "simulate"
-[simulation.parameters.mass]
-value = 94.0
-unit = "kg"
-sd = 5.0
-bounds = [80.0, 110.0]
-[simulation.parameters.c]
-value = 210.0
-unit = "N*s/m"
-sd = 40.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-v = { unit = "m/s", role = "input" }
-a = { unit = "m/s^2", role = "input" }
-F = { unit = "N", role = "output" }
 """
 ONE = '[[recording.run]]\nfile = "r0.csv"\n'
 TWO = ONE + '[[recording.run]]\nfile = "r1.csv"\n'

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -15,52 +16,25 @@ def simulate(inputs, p):
     fall = np.exp(-inputs["t"].to_numpy() / p["time_constant"])
     return pd.DataFrame({"T": p["room"] + p["excess"] * fall})
 """
-MUG = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.room]
-value = 21.0
-unit = "degC"
-sd = 3.0
-[simulation.parameters.excess]
-value = 60.0
-unit = "K"
-sd = 20.0
-[simulation.parameters.time_constant]
-value = 2000.0
-unit = "s"
-sd = 1000.0
-bounds = [60.0, 36000.0]
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-T = { unit = "degC", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+MUG = case_text(
+    "python",
+    parameters={
+        "room": (21.0, "degC", 3.0),
+        "excess": (60.0, "K", 20.0),
+        "time_constant": (2000.0, "s", 1000.0, [60.0, 36000.0]),
+    },
+    outputs={"T": "degC"},
+    runs=1,
+)
 DASHPOT = """
 import pandas as pd
 def simulate(inputs, p):
     return pd.DataFrame({"F": p["c"] * inputs["v"]})
 """
-DAMPER = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.c]
-value = 5.0
-unit = "N*s/m"
-sd = 3.0
-bounds = [0.0, 50.0]
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-v = { unit = "m/s", role = "input" }
-F = { unit = "N", role = "output" }
-"""
+DAMPER = case_text(
+    "python", parameters={"c": (5.0, "N*s/m", 3.0, [0.0, 50.0])}, inputs={"v": "m/s"},
+    outputs={"F": "N"},
+)  # fmt: skip
 
 
 def test_a_mug_that_takes_up_heat_does_not_creep(tmp_path):

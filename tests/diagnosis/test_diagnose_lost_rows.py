@@ -5,7 +5,8 @@ import pandas as pd
 
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
-from tests.diagnosis.tire_case import TIR, toml
+from tests.diagnosis.tire_case import toml
+from tests.golden.cases import TIRE_FILE
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
@@ -53,7 +54,7 @@ def test_the_sign_of_E5_is_named_although_one_row_in_a_hundred_was_lost(tmp_path
     text = toml('kind = "machine"\nmachine = "m15"\ntire = "tire.tir"\ncalibration = "m15-r2"\n',
                 axes="machine", mu="LMUY", channels=CELLS)  # fmt: skip
     frames = {f"r{i}__csv": recording(i, lost=1) for i in range(2)}
-    case = read_case(write_case(tmp_path, text, simulator=None, tire__tir=TIR, **frames))
+    case = read_case(write_case(tmp_path, text, simulator=None, tire__tir=TIRE_FILE, **frames))
     assert all(int(np.isnan(run.columns[name]).sum()) == 1 for run in case.runs for name in NAMES)
     made = diagnose(case, REGISTRY).diagnosis
     assert (made.verdict, made.remaining) == ("equivalent", "nothing")

@@ -21,34 +21,6 @@ def simulate(inputs, p):
     MZ = 0.02 * FZ * np.sin(2 * np.arctan(8 * slip)) * np.exp(-20 * slip**2)
     return pd.DataFrame({{"FY": s[1] * FY, "MZ": s[2] * MZ}})
 """
-TIR = """[MDI_HEADER]
-FILE_TYPE='tir'
-[UNITS]
-LENGTH='meter'
-FORCE='newton'
-ANGLE='radians'
-MASS='kg'
-TIME='second'
-[MODEL]
-FITTYP=6
-[DIMENSION]
-UNLOADED_RADIUS=0.3
-[VERTICAL]
-FNOMIN=4000
-[SCALING_COEFFICIENTS]
-LMUY=1
-LKY=1
-[LATERAL_COEFFICIENTS]
-PCY1=1.3
-PDY1=1.0
-PDY2=-0.1
-PKY1=-15
-PKY2=1.8
-[ALIGNING_COEFFICIENTS]
-QBZ1=8
-QCZ1=1.1
-QDZ1=0.1
-"""
 
 
 def plain(SA: np.ndarray, FZ: np.ndarray) -> pd.DataFrame:

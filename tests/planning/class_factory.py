@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tests.diagnosis.case_text import case_text
 from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis, EffectEvidence, HeldOutFit
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.problem import Problem, problem_of
@@ -16,26 +17,10 @@ SIMULATOR = """import pandas as pd
 def simulate(inputs, p):
     return pd.DataFrame({"F": p["gain"] * inputs["u"]})
 """
-CASE = """schema = 1
-title = "a late force"
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.gain]
-value = 100.0
-unit = "N/mm"
-sd = 5.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-u = { unit = "mm", role = "input" }
-F = { unit = "N", role = "output", sd = 1.0 }
-[[recording.run]]
-file = "r0.csv"
-[[recording.run]]
-file = "r1.csv"
-"""
+CASE = case_text(
+    "python", title="a late force", parameters={"gain": (100.0, "N/mm", 5.0)}, inputs={"u": "mm"},
+    outputs={"F": ("N", 1.0)}, runs=2,
+)  # fmt: skip
 DELAY = 0.03
 FREQUENCY = 0.2
 T = np.arange(500) * 0.02

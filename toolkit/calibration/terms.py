@@ -131,8 +131,8 @@ def model_terms(
                 next_step="name one of the model's terms, or remove it from drop",
                 rule="term",
             )
-    left = tuple(name for name in names if name not in drop)
-    if set(left) <= {INTERCEPT}:
+    remaining = tuple(name for name in names if name not in drop)
+    if set(remaining) <= {INTERCEPT}:
         raise SessionError(
             "no term of an indication is left in the model",
             where="drop",
@@ -141,7 +141,7 @@ def model_terms(
             next_step="drop fewer terms; nothing was written",
             rule="term",
         )
-    return left
+    return remaining
 
 
 def term_slopes(terms: Sequence[str], coefficients: Any, columns: Mapping[str, Any], zero: Any = 0.0) -> Any:
@@ -150,7 +150,7 @@ def term_slopes(terms: Sequence[str], coefficients: Any, columns: Mapping[str, A
     >>> term_slopes(["A^2", "A*B", "intercept"], [1.0, 2.0, 3.0], {"A": 5.0, "B": 7.0})
     {'A': 24.0, 'B': 10.0}
     """
-    found = dict.fromkeys(columns, zero)
+    slopes = dict.fromkeys(columns, zero)
     for term, coefficient in zip(map(parse_term, terms), coefficients, strict=True):
         factors: list[tuple[str, Any, Any]] = []
         for name, power in term.powers:
@@ -164,8 +164,8 @@ def term_slopes(terms: Sequence[str], coefficients: Any, columns: Mapping[str, A
             product = coefficient * slope
             for k, (_, value, _) in enumerate(factors):
                 product = product if k == i else product * value
-            found[name] = found[name] + product
-    return found
+            slopes[name] = slopes[name] + product
+    return slopes
 
 
 def issued_value(coefficient: float, extent: float, largest: float) -> float:

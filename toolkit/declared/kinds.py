@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 import enum
-from collections.abc import Mapping
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
@@ -30,16 +30,28 @@ Limit = Above | AtLeast | Below | AtMost
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Place:
-    """Where a value is read: the path of its keys, the format in force, the file's faults and its root."""
+    """Where a value is read: the path of its keys, the format in force, the file's faults and its root.
+
+    ``accepted`` as of `text.attempt`.
+    """
 
     path: Path
     form: Format
     faults: list[Fault]
     root: Mapping[str, Any]
+    accepted: bool = False
 
     def at(self, key: str | int) -> Place:
         """Return the place of an entry of this table or list."""
-        return Place((*self.path, key), self.form, self.faults, self.root)
+        return Place((*self.path, key), self.form, self.faults, self.root, self.accepted)
+
+    def unknown(self, key: str, known: Sequence[str], present: Container[str]) -> str | None:
+        """Tell a key that is not declared, and return the one that was meant; in an accepted file nothing."""
+        if self.accepted:
+            return None
+        near = nearest(key, known, present)
+        self.at(key).refuse(key, ", ".join(known), kind="unknown", near=near)
+        return near
 
     def refuse(
         self, got: Any, expected: str, *, what: str | None = None, rule: str | None = None, **more: Any
@@ -234,8 +246,10 @@ class TextKind(Kind):
 
     def read(self, value: Any, place: Place) -> Any:
         """Return the text."""
+        if place.accepted and self.text.numbers:
+            return str(value)
         text = value if isinstance(value, str) else self._from_number(value)
-        if text is not None and self.text.steers(text):
+        if text is not None and self.text.steers(text) and not place.accepted:
             return place.refuse(value, "a text without control characters", rule=self.entry.rule)
         if text is None or not self.text.fits(text):
             return self.wrong(value, place)

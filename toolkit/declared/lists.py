@@ -11,7 +11,6 @@ from toolkit.declared.kinds import REFUSED, Kind, Place
 from toolkit.declared.marks import Distinct, Names, Quantity, Size
 from toolkit.declared.quantities import QuantityKind
 from toolkit.declared.tables import TableKind
-from toolkit.spelling import nearest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -185,18 +184,16 @@ class KeyedKind(Kind):
         if not isinstance(value, dict) or not self.size.least <= len(value):
             return self.wrong(value, place)
         names = () if self.names is None else self.names.names(place.root)
-        entries = []
+        entries, before = [], len(place.faults)
         for key, entry in value.items():
             item_place = place.at(key)
             if names and key not in names:
-                near = nearest(key, names, value)
-                item_place.refuse(key, ", ".join(names), kind="unknown", near=near)
-                entries.append((key, REFUSED))
+                place.unknown(key, names, value)
             elif self.by is not None and isinstance(self.item, TableKind):
                 entries.append((key, self.item.read(entry, item_place, {self.by: key})))
             else:
                 entries.append((key, self.item.read(entry, item_place)))
-        if any(entry is REFUSED for _, entry in entries):
+        if len(place.faults) > before:
             return REFUSED
         if self.by is not None:
             return tuple(entry for _, entry in entries)

@@ -11,7 +11,6 @@ from toolkit.declared.kinds import REFUSED, Kind, NumberKind, Place
 from toolkit.declared.marks import Quantity, Unit, UnitName
 from toolkit.errors import UnitError
 from toolkit.files import is_number
-from toolkit.spelling import nearest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -50,9 +49,8 @@ class QuantityKind(Kind):
         """Return value and unit as written; None where the entry has no such form."""
         if isinstance(value, dict):
             for key in value:
-                if key not in ("value", "unit"):
-                    near = nearest(str(key), ("value", "unit"), value)
-                    place.at(key).refuse(key, "value, unit", kind="unknown", near=near)
+                if key not in ("value", "unit") and not place.accepted:
+                    place.unknown(str(key), ("value", "unit"), value)
                     return None
             if "value" in value and isinstance(value.get("unit"), str):
                 return value["value"], value["unit"]

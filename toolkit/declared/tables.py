@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -10,7 +11,6 @@ from toolkit.declared.kinds import REFUSED, ChoiceKind, Kind, Place
 from toolkit.declared.marks import Format, Quantity
 from toolkit.declared.quantities import QuantityKind
 from toolkit.files import is_number
-from toolkit.spelling import nearest
 
 MISSING: Any = object()
 
@@ -52,7 +52,7 @@ class TableKind(Kind):
     named_by: str | None = None
     short: str | None = None
 
-    @property
+    @functools.cached_property
     def fields(self) -> tuple[Field, ...]:
         """The fields that a file has, without the one that holds the table's own name."""
         return tuple(field for field in self.fields_of(self.cls) if field.name != self.named_by)
@@ -67,7 +67,12 @@ class TableKind(Kind):
         """Name of its JSON schema: the class's, with the field that its name stands for."""
         return self.cls.__name__ + (f"_by_{self.named_by}" if self.named_by else "")
 
-    @property
+    @functools.cached_property
+    def by_key(self) -> dict[str, Field]:
+        """The fields by their keys, former spellings among them."""
+        return {key: field for field in self.fields for key in (field.key, *field.kind.entry.old)}
+
+    @functools.cached_property
     def keys(self) -> tuple[str, ...]:
         """The keys that may stand in the table."""
         keys = {key: None for field in self.fields for key in (field.key, field.beside) if key}
@@ -95,20 +100,15 @@ class TableKind(Kind):
                 return REFUSED
             if not place.path:
                 place = replace(place, root=value)
-        fields = self.fields
         values, nearest_keys, before = dict(name_entry or {}), set(), len(place.faults)
-        by_key = {key: field for field in fields for key in (field.key, *field.kind.entry.old)}
-        keys = self.keys
         for key, entry in value.items():
-            declared = by_key.get(key)
+            declared = self.by_key.get(key)
             if declared is not None:
                 if declared.beside is None:
                     values[declared.name] = declared.kind.read(entry, place.at(key))
-            elif key not in keys:
-                near = nearest(str(key), keys, value)
-                nearest_keys.add(near)
-                place.at(key).refuse(key, ", ".join(sorted(keys)), kind="unknown", near=near)
-        for declared in fields:
+            elif key not in self.keys:
+                nearest_keys.add(place.unknown(str(key), sorted(self.keys), value))
+        for declared in self.fields:
             if declared.beside is not None and declared.key in value:
                 values[declared.name] = _with_unit_beside(declared, value, place)
             elif declared.name not in values and declared.required and declared.key not in nearest_keys:

@@ -56,7 +56,7 @@ def read_text(cls: type[T], data: bytes, *, where: object, entered: bool = False
     return build(cls, table, Source(where=where, text=data.decode("utf-8-sig")))
 
 
-def build(cls: type[T], table: Any, source: Source | object) -> T:
+def build(cls: type[T], table: Any, source: Source | object, *, accepted: bool = False) -> T:
     """Return the object of a parsed file.
 
     Parameters
@@ -64,6 +64,7 @@ def build(cls: type[T], table: Any, source: Source | object) -> T:
     cls : the declared class
     table : the entries, as tomllib or json give them
     source : the `Source` of the entries, or what names it in messages
+    accepted : as of `attempt`
 
     Raises
     ------
@@ -71,17 +72,21 @@ def build(cls: type[T], table: Any, source: Source | object) -> T:
         every entry that is unknown, missing or cannot be used
     """
     origin = source if isinstance(source, Source) else Source(where=source)
-    instance, faults = attempt(cls, table)
+    instance, faults = attempt(cls, table, accepted=accepted)
     refuse(faults, origin)
     assert instance is not None  # noqa: S101  without a fault there is an object
     return instance
 
 
-def attempt(cls: type[T], table: Any) -> tuple[T | None, tuple[Fault, ...]]:
-    """Return the object of a parsed file, None where it has faults, and the faults."""
+def attempt(cls: type[T], table: Any, *, accepted: bool = False) -> tuple[T | None, tuple[Fault, ...]]:
+    """Return the object of a parsed file, None where it has faults, and the faults.
+
+    ``accepted``: some version took the file, and it is read for ever. Keys that are not declared are passed
+    over; texts may have control characters, and one that may be a number is that of whatever stands there.
+    """
     faults: list[Fault] = []
     root = table if isinstance(table, Mapping) else {}
-    instance = table_of(cls).read(table, Place((), form_of(cls) or Format(), faults, root))
+    instance = table_of(cls).read(table, Place((), form_of(cls) or Format(), faults, root, accepted))
     return None if faults else instance, tuple(faults)
 
 

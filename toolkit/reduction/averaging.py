@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Effective rolling radius over free radius of a radial passenger tire: 0.96 to 0.98.
 ROLLING_RATIO = 0.97
 
-_WHOLE = 0.02  # of a turn
+_WHOLE_TURN = 0.02  # of a turn
 _ROWS_EACH = 8  # rows that each signal takes at least
 _NO_SIGNAL = 1e-9
 
@@ -141,7 +141,7 @@ def shaft_turns(angle: NDArray[np.float64]) -> NDArray[np.float64] | None:
     travelled = np.unwrap(angle) - angle[0]
     turns = np.abs(travelled) / (2 * np.pi)
     rising = np.maximum.accumulate(turns)
-    if len(turns) > 1 and (rising[-1] < _WHOLE or np.any(rising - turns > _WHOLE)):
+    if len(turns) > 1 and (rising[-1] < _WHOLE_TURN or np.any(rising - turns > _WHOLE_TURN)):
         return None
     return np.asarray(rising)
 
@@ -184,7 +184,7 @@ def turning(rows: int, revolutions: float | None) -> NDArray[np.float64]:
     Over whole revolutions a non-uniformity of the tire has no mean: its swing is no error.
     """
     turns = round(revolutions or 0.0)
-    if revolutions is None or turns < 1 or abs(revolutions - turns) > _WHOLE:
+    if revolutions is None or turns < 1 or abs(revolutions - turns) > _WHOLE_TURN:
         return np.zeros((0, rows))
     phase = 2 * np.pi * turns * np.arange(rows) / rows
     return np.stack([wave(order * phase) for order in (1, 2) for wave in (np.cos, np.sin)])

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from toolkit.reduction.model import Condition, ReducedTest, Tare
 
 _LEAST_FORCE = 0.3  # span of FY over the mean load from which a lever can be told
-_LEFT = 0.15  # of the moment's span: what may be left of it beside lever and offset
+_REMAINDER = 0.15  # of the moment's span: what may be left of it beside lever and offset
 _FEWEST = 5
 
 
@@ -87,10 +87,10 @@ def physics_findings(
     IA = np.array([inclinations.get((c.file, c.first_row), 0.0) for c in conditions])
     readings = _readings(conditions, info, IA)
     cells = _cells(conditions, record, machine, info, tares)
-    broken = _all(readings, cells)
+    broken = _departures(readings, cells)
     if not broken:
         return []
-    cures = dict.fromkeys(text for text, changed in _changes(readings, cells) if not _all(*changed))
+    cures = dict.fromkeys(text for text, changed in _changes(readings, cells) if not _departures(*changed))
     cure = f"all is possible with {' or '.join(cures)}" if cures else ""
     return [departure.finding(more=cure if index == 0 else "") for index, departure in enumerate(broken)]
 
@@ -110,7 +110,7 @@ def checked(reduced: ReducedTest) -> ReducedTest:
     return dataclasses.replace(reduced, findings=(*findings, *reduced.findings)) if findings else reduced
 
 
-def _all(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
+def _departures(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
     return (*departures(readings), *pattern(readings, cells))
 
 
@@ -143,14 +143,14 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
             )
         )
     share = float(np.sqrt(np.mean(residual**2)) / np.ptp(MX)) if np.ptp(MX) > 0 else 0.0
-    if share > _LEFT:
+    if share > _REMAINDER:
         worst = int(np.argmax(np.abs(residual)))
         findings.append(
             Departure(
                 rule="impossible-cells",
                 where=readings.place[worst],
                 message=f"the overturning moment in the cells leaves the line of the side force by "
-                f"{100 * share:.0f} % of its span (rms; at most {100 * _LEFT:g} %)",
+                f"{100 * share:.0f} % of its span (rms; at most {100 * _REMAINDER:g} %)",
                 cause="a cell changed its sign, its place or its sensitivity during the test",
             )
         )

@@ -102,17 +102,19 @@ def condition_finding(
     stated = si.unit if isinstance(si, Quantity) else stated_in or usual
     number = float(si.value) if isinstance(si, Quantity) else float(from_si(si, stated))
     written = _written(number, stated)
-    shown = written if stated == usual else f"{written} ({_written(float(from_si(si, usual)), usual)})"
+    reading = written if stated == usual else f"{written} ({_written(float(from_si(si, usual)), usual)})"
     low, high = condition.low, condition.high
     quantity = condition.name if called is None else f"{condition.name} {called}"
     message = (
-        f"{quantity} {shown} is outside {low:g} to {high:g} {usual}, the range of tires of road vehicles"
+        f"{quantity} {reading} is outside {low:g} to {high:g} {usual}, the range of tires of road vehicles"
     )
-    for other in condition.units:
-        meant = float(to_si(number, other))
-        if other != stated and condition.holds(meant):
-            inside = "within it" if other == usual else _written(float(from_si(meant, usual)), usual)
-            message += f"; {_written(number, other)} would be {inside}"
+    for alternative in condition.units:
+        converted = float(to_si(number, alternative))
+        if alternative != stated and condition.holds(converted):
+            inside = (
+                "within it" if alternative == usual else _written(float(from_si(converted, usual)), usual)
+            )
+            message += f"; {_written(number, alternative)} would be {inside}"
             break
     return Finding(rule="unusual-condition", where=where, message=message)
 

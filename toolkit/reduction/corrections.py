@@ -147,7 +147,7 @@ def _of_few_rows(tare: Tare, files: Sequence[tuple[Recording, Sequence[Block], S
     if _tells(tare):
         return tare
     names = [name for name, _ in tare.values]
-    own = dict(tare.u)
+    tare_u = dict(tare.u)
     noises = []
     for recording, blocks, _ in files:
         for block in blocks:
@@ -166,7 +166,7 @@ def _of_few_rows(tare: Tare, files: Sequence[tuple[Recording, Sequence[Block], S
     return dataclasses.replace(
         tare,
         borrowed=True,
-        u=tuple((name, max(own.get(name, 0.0), float(part))) for name, part in zip(names, u, strict=True)),
+        u=tuple((name, max(tare_u.get(name, 0.0), float(part))) for name, part in zip(names, u, strict=True)),
     )
 
 

@@ -36,7 +36,7 @@ _JUMP = 10.0  # in median steps of the clock
 _STRAY = 15.0  # standard deviations of the other rows
 _CORE = 0.8  # of the rows, the nearest to their median: what a few stray ones cannot widen
 _CORE_SD = 0.662  # standard deviation of that part of a normal distribution
-_NAMED = 6  # files with one trouble that are named each by itself
+_LISTED_FILES = 6  # files with one trouble that are named each by itself
 _LEVELS: tuple[Level, ...] = ("error", "warning", "note")
 _MEASURED = ("load", "indication", "slip_angle")
 
@@ -127,7 +127,7 @@ def first_of_many(findings: Sequence[Finding]) -> list[Finding]:
         for group in alike.values()
         for finding in (
             group
-            if len(group) <= _NAMED
+            if len(group) <= _LISTED_FILES
             else [dataclasses.replace(group[0], where=f"{len(group)} files ({group[0].where}, ...)")]
         )
     ]
@@ -172,8 +172,8 @@ def _constant_text(channel: Series) -> str:
 
 def _others_scatter(recording: Recording, channel: Series, stretches: Sequence[slice]) -> bool:
     # Whether another measured channel moves from row to row while this one stands still.
-    others = (c for c in recording.series if c.role in ("load", "indication") and c is not channel)
-    return any(np.ptp(other.values[stretch]) > 0 for other in others for stretch in stretches)
+    channels = (c for c in recording.series if c.role in ("load", "indication") and c is not channel)
+    return any(np.ptp(other.values[stretch]) > 0 for other in channels for stretch in stretches)
 
 
 def _repeated(recording: Recording, stretches: Sequence[slice]) -> str | None:
@@ -207,8 +207,8 @@ def _stuck(series: Series, *, only_ends: bool = False) -> tuple[str, str] | None
         return None
     # A channel printed so coarsely that it often repeats stands still by chance, not at an end of its range;
     # one that a filter smoothed does so for several rows on end, here and elsewhere.
-    others = len(repeated) - (length - 1)
-    chance = (int(repeated.sum()) - (length - 1)) / others if others else 1.0
+    outside = len(repeated) - (length - 1)
+    chance = (int(repeated.sum()) - (length - 1)) / outside if outside else 1.0
     elsewhere = repeated & (values[1:] != value)
     usual = _longest(elsewhere)[1] + 1 if elsewhere.any() else 1
     if length < max(_STUCK, _SMOOTH * usual) or len(values) * chance ** (length - 1) > _BY_CHANCE:

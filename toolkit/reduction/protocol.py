@@ -87,8 +87,8 @@ def check(
 def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[Rotation]) -> list[Finding]:
     findings: list[Finding] = []
     for rotation in rotations:
-        there = Counter((p.step_SA, p.step_FZ) for p in placed if p.rotation == rotation)
-        if not there:
+        recorded = Counter((p.step_SA, p.step_FZ) for p in placed if p.rotation == rotation)
+        if not recorded:
             findings.append(
                 Finding(
                     rule="missing",
@@ -98,7 +98,7 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
             )
             continue
         steps = list(dict.fromkeys(protocol.slip_angles_rad))
-        absent = [step for step in steps if not any(step == s for s, _ in there)]
+        absent = [step for step in steps if not any(step == s for s, _ in recorded)]
         if absent:
             findings.append(
                 Finding(
@@ -111,14 +111,14 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
             )
         for step in steps:
             where = f"drum {rotation}, slip angle {_angles_told([step])}"
-            loads = [load for load in protocol.loads_N if (step, load) not in there]
+            loads = [load for load in protocol.loads_N if (step, load) not in recorded]
             if step not in absent and loads:
                 message = f"no block at load {_loads_told(loads)}"
                 findings.append(Finding(rule="missing", where=where, message=message))
-            few = [load for load in protocol.loads_N if 0 < there[step, load] < protocol.times(step)]
+            few = [load for load in protocol.loads_N if 0 < recorded[step, load] < protocol.times(step)]
             if few:
                 message = (
-                    f"{min(there[step, load] for load in few)} of {protocol.times(step)} declared repeats "
+                    f"{min(recorded[step, load] for load in few)} of {protocol.times(step)} declared repeats "
                     f"at load {_loads_told(few)}"
                 )
                 findings.append(Finding(rule="missing-repeat", where=where, message=message))

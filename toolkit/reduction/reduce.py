@@ -213,23 +213,23 @@ def _conditions(
             conditions.append(condition)
             blocks.append((order, file, block.mean_FZ))
     conditions = _one_step_a_load(conditions, machine.protocol)
-    kept = np.flatnonzero(used).tolist()
+    used_blocks = np.flatnonzero(used).tolist()
     # A protocol, and what departs from it, is told in the slip angles that the machine shows.
-    shown = machine.SA_to_SAE
+    sense = machine.SA_to_SAE
     placed = [
         plan.Placed(
             file=file.name,
             file_order=order,
             rotation=file.rotation,
-            SA=shown * condition.SA,
+            SA=sense * condition.SA,
             FZ=mean_FZ,
-            step_SA=None if condition.step_SA is None else shown * condition.step_SA,
+            step_SA=None if condition.step_SA is None else sense * condition.step_SA,
             step_FZ=condition.step_FZ,
         )
-        for condition, (order, file, mean_FZ) in ((conditions[index], blocks[index]) for index in kept)
+        for condition, (order, file, mean_FZ) in ((conditions[index], blocks[index]) for index in used_blocks)
     ]
     later = plan.doubled(placed, machine.protocol)
-    for index in {*np.flatnonzero(~used).tolist(), *(kept[place] for place in later)}:
+    for index in {*np.flatnonzero(~used).tolist(), *(used_blocks[place] for place in later)}:
         conditions[index] = dataclasses.replace(conditions[index], used=False)
     return conditions, placed, later
 
@@ -282,8 +282,8 @@ def _condition(
     covariance: Mapping[str, NDArray[np.float64]],
 ) -> Condition:
     recording, rows = file.recording, window.rows
-    seen = seen_by_cells(file.rotation, reversal)
-    sign = signs(machine.axes, "SAE", seen)
+    seen_rotation = seen_by_cells(file.rotation, reversal)
+    sign = signs(machine.axes, "SAE", seen_rotation)
     load = file.channels[1, rows]
     SA, FZ = means(file.channels[:2, rows])
     # FY and MZ follow the load at which their means are stated, and the tire's own turn has no mean.
@@ -334,7 +334,7 @@ def _condition(
             machine=machine,
             record=record,
             covariance=covariance,
-            seen=seen,
+            seen=seen_rotation,
         ),
     )
 

@@ -96,7 +96,9 @@ def selection_findings(files: Sequence[OpenedFile], selection: Selection) -> lis
     names = [file.name for file in files for _ in file.windows]
     findings = []
     if selection.left_out:
-        away = list(dict.fromkeys(name for name, own in zip(names, selection.rows, strict=True) if not own))
+        away = list(
+            dict.fromkeys(name for name, selected in zip(names, selection.rows, strict=True) if not selected)
+        )
         message = (
             f"{selection.left_out} of {len(names)} load blocks are at other conditions and not used: "
             f"{'; '.join(selection.apart)}"

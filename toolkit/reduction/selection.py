@@ -103,16 +103,16 @@ class Selection:
 
     def findings(self, *, models: Collection[str], where: str) -> tuple[Finding, ...]:
         """Return what a fit of these rows must say: the rows that it leaves out, and where the kept stand."""
-        named = ", ".join(models)
+        names = ", ".join(models)
         findings = []
         if self.left_out:
             text = (
-                f"{named}: fitted to {int(self.rows.sum())} of {len(self.rows)} rows, {self.left_out} are at "
+                f"{names}: fitted to {int(self.rows.sum())} of {len(self.rows)} rows, {self.left_out} are at "
                 f"other conditions, which the model does not read: {'; '.join(self.apart)}"
             )
             findings.append(Finding(rule="other-conditions", where=where, message=text))
         if self.stands:
-            text = f"{named}: {'; '.join(self.stands)} in every row that is fitted: the curves are of that"
+            text = f"{names}: {'; '.join(self.stands)} in every row that is fitted: the curves are of that"
             findings.append(Finding(rule="one-condition", where=where, message=text, level="note"))
         return tuple(findings)
 
@@ -131,38 +131,39 @@ def of_one_condition(recorded: Mapping[str, Array], reads: Collection[str], *, r
     FitError
         ``no-pure-slip``: every row has longitudinal slip, and the model does not read it
     """
-    kept = np.ones(rows, dtype=np.bool_)
+    kept_rows = np.ones(rows, dtype=np.bool_)
     apart, stands = [], []
     for symbol, variable in _VARIABLES.items():
         values = recorded.get(symbol)
-        if values is None or not kept.any():
+        if values is None or not kept_rows.any():
             continue
-        if symbol in reads and not (symbol == "V" and values[kept].min() < 0 < values[kept].max()):
+        if symbol in reads and not (symbol == "V" and values[kept_rows].min() < 0 < values[kept_rows].max()):
             continue
-        level = _level(values[kept], variable, direction_alone=symbol in reads)
-        own = np.flatnonzero(kept)[level]
-        middle = _middle(values[own], variable)
+        level = _level(values[kept_rows], variable, direction_alone=symbol in reads)
+        level_rows = np.flatnonzero(kept_rows)[level]
+        middle = _middle(values[level_rows], variable)
         if symbol == "KAPPA" and abs(middle) > (variable.room or 0.0):
-            raise _no_pure_slip(values[kept])
-        if len(own) < int(kept.sum()):
-            others = np.setdiff1d(np.flatnonzero(kept), own)
-            apart.append(f"{symbol} {_told(values[others], variable)}, kept {_told(values[own], variable)}")
-            kept = np.zeros(rows, dtype=np.bool_)
-            kept[own] = True
+            raise _no_pure_slip(values[kept_rows])
+        if len(level_rows) < int(kept_rows.sum()):
+            apart_rows = np.setdiff1d(np.flatnonzero(kept_rows), level_rows)
+            apart_text, kept_text = (_range_text(values[at], variable) for at in (apart_rows, level_rows))
+            apart.append(f"{symbol} {apart_text}, kept {kept_text}")
+            kept_rows = np.zeros(rows, dtype=np.bool_)
+            kept_rows[level_rows] = True
         if variable.zero and abs(middle) > (variable.room or 0.0):
-            stands.append(f"{symbol} is {_told(values[own], variable)}")
-    return Selection(rows=kept, apart=tuple(apart), stands=tuple(stands))
+            stands.append(f"{symbol} is {_range_text(values[level_rows], variable)}")
+    return Selection(rows=kept_rows, apart=tuple(apart), stands=tuple(stands))
 
 
 def _level(values: Array, variable: _Variable, *, direction_alone: bool) -> NDArray[np.intp]:
     # The rows of the level that is meant, among values that may be of several.
     if variable.relative:
         backward = values < 0
-        way = np.flatnonzero(backward == (2 * np.count_nonzero(backward) > len(values)))
+        one_direction = np.flatnonzero(backward == (2 * np.count_nonzero(backward) > len(values)))
         if direction_alone:
-            return way
-        size = np.abs(values[way])
-        levels = [way[rows] for rows in _parted(size, variable)]
+            return one_direction
+        size = np.abs(values[one_direction])
+        levels = [one_direction[rows] for rows in _parted(size, variable)]
     else:
         levels = list(_parted(values, variable))
     if variable.zero:
@@ -173,34 +174,34 @@ def _level(values: Array, variable: _Variable, *, direction_alone: bool) -> NDAr
     room = variable.room
     if room is None:
         return level
-    own = values[level]
+    level_values = values[level]
     if variable.relative:
-        room *= abs(float(np.median(own)))
-    if np.ptp(own) <= 2 * room:
+        room *= abs(float(np.median(level_values)))
+    if np.ptp(level_values) <= 2 * room:
         return level
-    return level[np.abs(own - _middle(own, variable)) <= room]
+    return level[np.abs(level_values - _middle(level_values, variable)) <= room]
 
 
 def _parted(values: Array, variable: _Variable) -> tuple[NDArray[np.intp], ...]:
     return parted(values, gap=variable.gap, resolved=_RESOLVED * variable.gap, relative=variable.relative)
 
 
-def _middle(own: Array, variable: _Variable) -> float:
+def _middle(values: Array, variable: _Variable) -> float:
     # A sweep through zero has its rows at zero; a level away from it has a middle of its own.
-    if variable.zero and own.min() <= 0 <= own.max():
+    if variable.zero and values.min() <= 0 <= values.max():
         return 0.0
-    return float(np.median(own))
+    return float(np.median(values))
 
 
-def _told(values: Array, variable: _Variable) -> str:
+def _range_text(values: Array, variable: _Variable) -> str:
     levels = _parted(np.abs(values) if variable.relative else values, variable)
     middles = [float(np.median(values[rows])) for rows in levels]
     room = np.inf if variable.room is None else variable.room
     room *= abs(middles[0]) if variable.relative else 1.0
-    one_way = not values.min() < 0 < values.max() or not variable.relative
+    one_sense = not values.min() < 0 < values.max() or not variable.relative
     listed = 1 < len(levels) <= _LISTED or (len(levels) == 1 and np.ptp(values) <= 2 * room)
     unit = "" if variable.unit == "1" else f" {variable.unit}"
-    if listed and one_way:
+    if listed and one_sense:
         return f"{', '.join(_short(middle, variable) for middle in middles)}{unit}"
     return f"{_short(values.min(), variable)} to {_short(values.max(), variable)}{unit}"
 
@@ -212,7 +213,7 @@ def _short(value: float, variable: _Variable) -> str:
 def _no_pure_slip(values: Array) -> FitError:
     return FitError(
         "no row rolls freely, and the model reads no longitudinal slip", where="column KAPPA",
-        got=f"{len(values)} rows with KAPPA {_told(values, _VARIABLES['KAPPA'])}",
+        got=f"{len(values)} rows with KAPPA {_range_text(values, _VARIABLES['KAPPA'])}",
         expected="rows with a longitudinal slip of 0 within 0.01",
         next_step="measure a freely rolling wheel too, or fit a model that reads KAPPA to slips that vary "
         "(--model mf61)",

@@ -42,7 +42,7 @@ _SLOPES = (3.0, 6.0, 10.0, 15.0, 22.0, 30.0, 45.0, 70.0, 110.0)
 _FEWEST_ANGLES = 5
 _SPARE = 4  # freedoms that the surface leaves at least
 _SUSPECTS = 3
-_MOST = 8  # files that are tried as strays
+_MOST_TRIALS = 8  # files that are tried as strays
 _PART = 4  # one file in so many is tried; where over half of those are strays, nobody knows which are
 _SHARED_ROWS = 8
 _NO_SIGNAL = 1e-9
@@ -53,10 +53,10 @@ _CURVED = 0.3  # of the largest: so far the surface may miss a sharp bend
 
 def stray_findings(conditions: Sequence[Condition]) -> list[Finding]:
     """Return the files whose force or moment lies far off what all the other files of the test say."""
-    used = [c for c in conditions if c.used and c.step_FZ is not None and c.FZ > 0]
+    blocks = [c for c in conditions if c.used and c.step_FZ is not None and c.FZ > 0]
     findings: dict[str, Finding] = {}
     for channel in _UNITS:
-        for file, message in off_curve(used, channel).items():
+        for file, message in off_curve(blocks, channel).items():
             finding = Finding(rule="stray-file", where=file, message=message, level="error")
             findings.setdefault(file, finding)
     return list(findings.values())
@@ -102,18 +102,18 @@ class _Miss:
     freed: float
 
 
-def _strays(used: Sequence[OnCurve], channel: str) -> list[_Stray]:
-    groups = [np.array(group) for group in at_one_angle(used)] if used else []
+def _strays(points: Sequence[OnCurve], channel: str) -> list[_Stray]:
+    groups = [np.array(group) for group in at_one_angle(points)] if points else []
     if not groups:
         return []
-    FZ = np.array([c.FZ for c in used])
-    y = np.array([getattr(c, channel) for c in used]) / FZ
-    surface = _Surface.of(used)
-    tried = min(len(groups) // _PART, _MOST)
-    if not tried or not surface.tells(groups, without=tried):
+    FZ = np.array([c.FZ for c in points])
+    y = np.array([getattr(c, channel) for c in points]) / FZ
+    surface = _Surface.of(points)
+    trials = min(len(groups) // _PART, _MOST_TRIALS)
+    if not trials or not surface.tells(groups, without=trials):
         return []
-    core = _core(surface, y, groups, tried)
-    apart = [group for group in groups if not any(group is own for own in core)]
+    core = _core(surface, y, groups, trials)
+    apart = [group for group in groups if not any(group is member for member in core)]
     k = surface.slope(y, core)
     usual = _usual(surface.misses(y, core, k))
 
@@ -128,13 +128,13 @@ def _strays(used: Sequence[OnCurve], channel: str) -> list[_Stray]:
         if misses[nearest].freed > _FAR * usual and misses[nearest].size > _LARGE[channel] * largest:
             break
         core.append(apart.pop(nearest))
-    if len(apart) > max(1, tried // 2):
+    if len(apart) > max(1, trials // 2):
         return []
     misses = [of(group) for group in apart]
     angles = [float(np.mean(surface.SA[group])) for group in apart]
     strays = []
     for i, (group, miss) in enumerate(zip(apart, misses, strict=True)):
-        twice = (_same(angles[i] - angles[j], miss, misses[j]) for j in range(len(apart)) if j != i)
+        twice = (_alike(angles[i] - angles[j], miss, misses[j]) for j in range(len(apart)) if j != i)
         if miss.size < _CURVED * largest and any(twice):
             continue
         place = int(np.argmax(np.abs(miss.off)))
@@ -144,18 +144,20 @@ def _strays(used: Sequence[OnCurve], channel: str) -> list[_Stray]:
     return strays
 
 
-def _same(apart_rad: float, first: _Miss, second: _Miss) -> bool:
+def _alike(apart_rad: float, first: _Miss, second: _Miss) -> bool:
     """Tell whether two files of one slip angle lie off alike: what a tire does twice is the tire's.
 
     So lies the knee of a tire on ice, which one slip angle shows in either direction. No curve bends as far
     as a force that has turned round.
     """
-    one, other = float(np.mean(first.off)), float(np.mean(second.off))
-    return abs(apart_rad) < _ONE_ANGLE and abs(one - other) < _ALIKE * max(abs(one), abs(other))
+    first_mean, second_mean = float(np.mean(first.off)), float(np.mean(second.off))
+    return abs(apart_rad) < _ONE_ANGLE and abs(first_mean - second_mean) < _ALIKE * max(
+        abs(first_mean), abs(second_mean)
+    )
 
 
 def _core(
-    surface: _Surface, y: Array, groups: Sequence[NDArray[np.intp]], tried: int
+    surface: _Surface, y: Array, groups: Sequence[NDArray[np.intp]], count: int
 ) -> list[NDArray[np.intp]]:
     """Return the groups that agree best: without the few that the others foretell worst.
 
@@ -164,12 +166,12 @@ def _core(
     """
     core = list(groups)
     k = surface.slope(y, core)
-    for _ in range(tried):
+    for _ in range(count):
         misses = surface.misses(y, core, k)
         trials = []
         for suspect in sorted(range(len(core)), key=lambda i: -misses[i].freed)[:_SUSPECTS]:
-            left = surface.misses(y, core[:suspect] + core[suspect + 1 :], k)
-            trials.append((sum(miss.freed**2 for miss in left), suspect))
+            remaining = surface.misses(y, core[:suspect] + core[suspect + 1 :], k)
+            trials.append((sum(miss.freed**2 for miss in remaining), suspect))
         del core[min(trials)[1]]
     return core
 
@@ -182,13 +184,13 @@ class _Surface:
     turn: Array
 
     @staticmethod
-    def of(used: Sequence[OnCurve]) -> _Surface:
-        z = np.log([c.FZ for c in used])
-        turn = np.array([-1.0 if c.rotation == "reverse" else 1.0 for c in used])
+    def of(points: Sequence[OnCurve]) -> _Surface:
+        z = np.log([c.FZ for c in points])
+        turn = np.array([-1.0 if c.rotation == "reverse" else 1.0 for c in points])
         return _Surface(
-            SA=np.array([c.SA for c in used]),
+            SA=np.array([c.SA for c in points]),
             z=z - z.mean(),
-            turn=turn if np.ptp(turn) else np.zeros(len(used)),
+            turn=turn if np.ptp(turn) else np.zeros(len(points)),
         )
 
     def _angles(self, rows: NDArray[np.intp]) -> int:
@@ -251,27 +253,27 @@ def _usual(misses: Sequence[_Miss]) -> float:
 
 def copied_findings(files: Sequence[tuple[str, Recording]]) -> list[Finding]:
     """Return the files that share rows with an earlier one: two recordings never share their noise."""
-    seen: dict[bytes, str] = {}
+    first_file: dict[bytes, str] = {}
     findings = []
     for name, recording in files:
         cells = [c.values for c in recording.series if c.role == "indication"]
         if not cells:
             continue
         table = np.ascontiguousarray(np.stack(cells, axis=1))
-        own = {row.tobytes() for row in table}
-        if len(own) < max(_SHARED_ROWS, recording.rows // 2):
+        file_rows = {row.tobytes() for row in table}
+        if len(file_rows) < max(_SHARED_ROWS, recording.rows // 2):
             continue  # without noise every row repeats
         from_file: dict[str, int] = {}
-        for row in own:
-            if row in seen:
-                from_file[seen[row]] = from_file.get(seen[row], 0) + 1
-        other = max(from_file, key=lambda key: from_file[key], default=None)
-        if other is not None and from_file[other] >= max(_SHARED_ROWS, len(own) // 2):
+        for row in file_rows:
+            if row in first_file:
+                from_file[first_file[row]] = from_file.get(first_file[row], 0) + 1
+        source = max(from_file, key=lambda key: from_file[key], default=None)
+        if source is not None and from_file[source] >= max(_SHARED_ROWS, len(file_rows) // 2):
             message = (
-                f"{from_file[other]} of {recording.rows} rows have the readings of every cell that {other} "
+                f"{from_file[source]} of {recording.rows} rows have the readings of every cell that {source} "
                 "has: two recordings never share their noise"
             )
             findings.append(Finding(rule="repeated-readings", where=name, message=message, level="error"))
-        for row in own:
-            seen.setdefault(row, name)
+        for row in file_rows:
+            first_file.setdefault(row, name)
     return findings

@@ -81,8 +81,8 @@ class Sweep:
             apart = max(1, round(0.1 / max(float(np.median(np.diff(t))), 1e-6)))
             if len(t) > apart:
                 rates.append(np.abs(SA[apart:] - SA[:-apart]) / (t[apart:] - t[:-apart]))
-        every = np.concatenate(rates) if rates else np.zeros(1)
-        return float(np.median(every[every >= every.max() / 2]))
+        measured = np.concatenate(rates) if rates else np.zeros(1)
+        return float(np.median(measured[measured >= measured.max() / 2]))
 
 
 def sweeps_of(
@@ -106,8 +106,8 @@ def sweeps_of(
     for name, recording, rotation, speed in recordings:
         t = _times(recording, machine)
         if t is None or not (np.diff(t) > 0).all():
-            what = "no time" if t is None else "times that do not rise"
-            findings.append(_unused(name, f"it has {what}: name a column 't [s]', or the machine's rate"))
+            problem = "no time" if t is None else "times that do not rise"
+            findings.append(_unused(name, f"it has {problem}: name a column 't [s]', or the machine's rate"))
             continue
         findings += health_findings(
             recording, name, stretches=[slice(0, recording.rows)], read=record.indications, settled=False
@@ -183,10 +183,10 @@ def _sweep(
 ) -> Sweep | None:
     """Return what a recording shows at a load; None where the steering does not."""
     SA, V = signals["SA"], signals["V"]
-    chosen = np.flatnonzero(at_load & (np.abs(SA) <= SMALL_RAD))
+    near_zero = np.flatnonzero(at_load & (np.abs(SA) <= SMALL_RAD))
     pieces = [
         piece
-        for piece in np.split(chosen, np.flatnonzero(np.diff(chosen) > 1) + 1)
+        for piece in np.split(near_zero, np.flatnonzero(np.diff(near_zero) > 1) + 1)
         if len(piece) >= _FEWEST
         and float(np.ptp(SA[piece])) >= _TURNED_RAD
         and float(t[piece[-1]] - t[piece[0]]) * float(np.mean(V[piece])) >= _ROLLED_M
@@ -210,12 +210,12 @@ def _speed(recording: Recording, machine: Machine, stated: float) -> tuple[Array
     """Return the speed at each row [m/s] and its relative standard uncertainty: recorded, else stated."""
     drum = machine.drum
     # Without a statement of its own a speed lies anywhere within the tolerance (GUM 4.3.7).
-    known = drum.speed_tolerance_m_s / drum.speed_m_s / np.sqrt(3.0)
+    relative_u = drum.speed_tolerance_m_s / drum.speed_m_s / np.sqrt(3.0)
     if machine.sweeping is not None:
-        known = machine.sweeping.speed_u
+        relative_u = machine.sweeping.speed_u
     if recording.has("V"):
-        return np.abs(recording["V"].si), float(known)
-    return np.full(recording.rows, stated), float(known)
+        return np.abs(recording["V"].si), float(relative_u)
+    return np.full(recording.rows, stated), float(relative_u)
 
 
 def _explained(

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import typer
 
+from tests import commands
 from tests.calibration.calibration_factory import hub_data
 from tests.calibration.registry.test_candidate_legacy import GOOD
 from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.response import differences
-from toolkit.cli import calibration
-from toolkit.errors import ToolkitError
 from toolkit.trust.people import name_key
 
 Run = Callable[..., tuple[int, dict[str, Any]]]
@@ -25,15 +22,10 @@ FROM = ("--in-force-from", "2026-02-01", "--checked-by", "B")
 
 
 @pytest.fixture
-def run(registry: Registry, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(registry: Registry) -> Run:
     def call(*words: object) -> tuple[int, dict[str, Any]]:
-        arguments = [str(word) for word in words] + ["--calibrations", str(registry.folder), "--json"]
-        try:
-            code = typer.main.get_command(calibration.app)(args=arguments, standalone_mode=False)
-        except ToolkitError as error:
-            capsys.readouterr()
-            return error.exit_code, error.as_dict()
-        return code, json.loads(capsys.readouterr().out)
+        code, answer = commands.answer("calibration", *words, "--calibrations", registry.folder)
+        return code, answer.get("error", answer)
 
     return call
 

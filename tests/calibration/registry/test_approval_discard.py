@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 import multiprocessing
 import os
 from collections.abc import Callable
@@ -12,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
 
+from tests import commands
 from tests.calibration.calibration_factory import hub_data
 from tests.calibration.registry.test_candidate_legacy import GOOD
 from toolkit.calibration.control import calibrate as control
@@ -26,8 +25,7 @@ from toolkit.calibration.registry.history import approved_ids
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.cli import calibrate as calibrate_command
-from toolkit.cli import calibration
-from toolkit.errors import ConfigError, RegistryError, ToolkitError
+from toolkit.errors import ConfigError, RegistryError
 
 Make = Callable[..., Path]
 Run = Callable[..., tuple[int, dict[str, Any]]]
@@ -44,18 +42,10 @@ def approved(registry: Registry, record_id: str = "hub-r1") -> bool:
 
 
 @pytest.fixture
-def run(registry: Registry, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(registry: Registry) -> Run:
     def call(*words: object) -> tuple[int, dict[str, Any]]:
-        app = typer.Typer()
-        app.command("calibrate")(calibrate_command.command)
-        app.add_typer(calibration.app, name="calibration")
-        arguments = [str(word) for word in words] + ["--calibrations", str(registry.folder), "--json"]
-        try:
-            code = typer.main.get_command(app)(args=arguments, standalone_mode=False)
-        except ToolkitError as error:
-            capsys.readouterr()
-            return error.exit_code, error.as_dict()
-        return code, json.loads(capsys.readouterr().out)
+        code, answer = commands.answer(*words, "--calibrations", registry.folder)
+        return code, answer.get("error", answer)
 
     return call
 

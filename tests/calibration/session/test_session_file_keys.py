@@ -15,7 +15,8 @@ from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.stored import stored_session
 from toolkit.calibration.session import read
-from toolkit.calibration.session.session_file import TEXTS, SessionFile, session_faults
+from toolkit.calibration.session.certificate import TEXTS
+from toolkit.calibration.session.session_file import SessionFile, session_faults
 from toolkit.declared import table_of
 from toolkit.errors import ConfigError
 from toolkit.report.certificate.collect import collect

@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import HEAD, SIMULATOR, TWO, carriage, write_case
-from tests.diagnosis.tire_case import TIR, plain, python_tire, toml
+from tests.diagnosis.tire_case import plain, python_tire, toml
+from tests.golden.cases import BALL, BALL_CASE, TIRE_FILE
 from toolkit.diagnosis.answer.model_text import MODEL, model_text
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -23,30 +24,6 @@ from toolkit.errors import ConfigError, ToolkitError
 from toolkit.simulation.model_file import read_model
 
 DRAG = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=800.0) for i in range(2)}
-ODE = """
-def rhs(t, x, u, p):
-    return [x[1], -p["g"]]
-def outputs(x, u, p):
-    return {"h": x[0]}
-def initial(p):
-    return [0.0, 0.0]
-"""
-FALL = """schema = 1
-title = "A ball"
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["h", "v"]
-force_terms = { v = "N/kg" }
-[simulation.parameters.g]
-value = 9.81
-unit = "m/s^2"
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-h = { unit = "m", role = "output" }
-"""
 
 
 def fallen(seed):
@@ -62,17 +39,17 @@ def drag_python(folder):
 
 
 def drag_ode(folder):
-    return write_case(folder, FALL + TWO, simulator=ODE, r0__csv=fallen(0), r1__csv=fallen(1))
+    return write_case(folder, BALL_CASE + TWO, simulator=BALL, r0__csv=fallen(0), r1__csv=fallen(1))
 
 
 def offset_machine(folder):
     frames = {f"r{i}__csv": own_tire(i, offset=0.3) for i in range(2)}
     text = toml('kind = "machine"\nmachine = "m15"\ntire = "tire.tir"', axes="machine", mu="LMUY")
-    return write_case(folder, text, simulator=None, tire__tir=TIR, **frames)
+    return write_case(folder, text, simulator=None, tire__tir=TIRE_FILE, **frames)
 
 
 def own_tire(seed, *, offset=0.0):
-    """The tire of TIR by the Magic Formula's equations written out (Pacejka 2012, 4.3.2), machine axes."""
+    """The tire of the file by its equations written out (Pacejka 2012, 4.3.2), machine axes."""
     rng = np.random.default_rng(seed)
     t = np.arange(150) * 0.1
     SA = 6 * np.sin(2 * np.pi * t / 7.5 + seed)
@@ -200,7 +177,7 @@ def test_an_equation_is_led_along_its_recording_with_the_effects_that_it_has(tmp
 
 def test_a_models_effects_are_in_its_motion_once(tmp_path):
     # The pattern of a small force is read over the position: that of the fall with its drag, once.
-    text = FALL.replace('kind = "ode"', 'kind = "python"')
+    text = BALL_CASE.replace('kind = "ode"', 'kind = "python"')
     text = "".join(
         line for line in text.splitlines(keepends=True) if not line.startswith(("states", "force_terms"))
     )

@@ -6,27 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters]
-gain = { value = 1.0, unit = "1", sd = 1.0 }
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-L = { unit = "N", role = "input" }
-F = { unit = "N", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+CASE = case_text(
+    "python", parameters={"gain": (1.0, "1", 1.0)}, inputs={"L": "N"}, outputs={"F": "N"}, runs=1,
+)  # fmt: skip
 SIMULATOR = """
 import pandas as pd
 def simulate(inputs, p):

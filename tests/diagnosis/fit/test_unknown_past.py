@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import TWO, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -19,21 +20,9 @@ import pandas as pd
 def simulate(inputs, p):
     return pd.DataFrame({"F": p["k"] * inputs["u"]})
 """
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.k]
-value = 50.0
-unit = "N"
-sd = 0.5
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-u = { unit = "1", role = "input" }
-F = { unit = "N", role = "output" }
-"""
+CASE = case_text(
+    "python", parameters={"k": (50.0, "N", 0.5)}, inputs={"u": "1"}, outputs={"F": "N"},
+)  # fmt: skip
 LATE = 0.03
 
 

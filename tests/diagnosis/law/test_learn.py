@@ -12,6 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
+from tests.diagnosis.case_text import case_text
 from toolkit.cli import diagnose, simulate
 from toolkit.declared import json_value
 from toolkit.diagnosis.answer.reader import read_answer
@@ -21,29 +22,11 @@ def simulate(inputs, p):
     import pandas as pd
     return pd.DataFrame({"F": p["k"] * inputs["x"] + p["c"] * inputs["v"]})
 """
-HEAD = """schema = 1
-title = "A spring and a damper"
-[simulation]
-kind = "python"
-path = "sim.py"
-function = "simulate"
-[simulation.parameters.k]
-value = 100.0
-unit = "N/m"
-sd = 5.0
-[simulation.parameters.c]
-value = 20.0
-unit = "N*s/m"
-sd = 2.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-x = { unit = "m", role = "input" }
-v = { unit = "m/s", role = "input" }
-T = { unit = "degC", role = "covariate" }
-F = { unit = "N", role = "output" }
-"""
+HEAD = case_text(
+    "python", title="A spring and a damper", function="simulate",
+    parameters={"k": (100.0, "N/m", 5.0), "c": (20.0, "N*s/m", 2.0)}, inputs={"x": "m", "v": "m/s"},
+    outputs={"F": "N"}, others={"T": {"unit": "degC", "role": "covariate"}},
+)  # fmt: skip
 
 
 def run(*words: object) -> Result:

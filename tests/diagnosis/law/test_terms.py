@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.law.test_learn import estimates, run
 
 SIMULATOR = """
@@ -21,31 +22,11 @@ def outputs(x, u, p):
 def initial(p):
     return np.array([0.0, 0.0])
 """
-HEAD = """schema = 1
-title = "A mass on a spring"
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["x", "v"]
-force_terms = { v = "N/kg" }
-[simulation.parameters.k]
-value = 40.0
-unit = "N/m"
-sd = 2.0
-[simulation.parameters.d]
-value = 1.0
-unit = "N*s/m"
-sd = 0.2
-[simulation.parameters.m]
-value = 2.0
-unit = "kg"
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-F = { unit = "N", role = "input" }
-X = { unit = "m", role = "output" }
-"""
+HEAD = case_text(
+    "ode", title="A mass on a spring", states=["x", "v"], force_terms={"v": "N/kg"},
+    parameters={"k": (40.0, "N/m", 2.0), "d": (1.0, "N*s/m", 0.2), "m": (2.0, "kg")},
+    inputs={"F": "N"}, outputs={"X": "m"},
+)  # fmt: skip
 
 
 def _recorded(seed: int) -> pd.DataFrame:

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import toolkit.diagnosis.law.unseen_runs as unseen_runs
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
@@ -19,19 +20,9 @@ import pandas as pd
 def simulate(inputs, p):
     return pd.DataFrame({"F": p["k"] * inputs["x"]})
 """
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters]
-k = { value = 5.0, unit = "N/m", sd = 5.0 }
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-x = { unit = "m", role = "input" }
-F = { unit = "N", role = "output" }
-"""
+CASE = case_text(
+    "python", parameters={"k": (5.0, "N/m", 5.0)}, inputs={"x": "m"}, outputs={"F": "N"},
+)  # fmt: skip
 SPRING, BRANCH, TIME = 4.0, 6.0, 12.0  # N/m, N/m, s
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import HEAD, TWO, write_case
 from tests.diagnosis.tire_case import python_tire
 from toolkit.diagnosis.case.reader import read_case
@@ -25,21 +26,9 @@ import pandas as pd
 def simulate(inputs, p):
     return pd.DataFrame({"v": inputs["v0"] * np.exp(-p["c"] * inputs["t"])})
 """
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.c]
-value = 0.02
-unit = "1/s"
-sd = 0.004
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-v0 = { unit = "m/s", role = "input" }
-v = { unit = "m/s", role = "output" }
-"""
+CASE = case_text(
+    "python", parameters={"c": (0.02, "1/s", 0.004)}, inputs={"v0": "m/s"}, outputs={"v": "m/s"},
+)  # fmt: skip
 
 
 def coasts(folder, *, force):

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from scipy.signal import lfilter
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import CELL, cell_case, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -79,23 +80,9 @@ def test_of_a_constant_the_spread_is_its_noise(tmp_path):
     assert hidden(case) == ()
 
 
-CONSTANT = """schema = 1
-title = "A filter"
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.level]
-value = 2.0
-unit = "1"
-sd = 0.01
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-y = { unit = "1", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+CONSTANT = case_text(
+    "python", title="A filter", parameters={"level": (2.0, "1", 0.01)}, outputs={"y": "1"}, runs=1,
+)  # fmt: skip
 STILL = """
 import pandas as pd
 def simulate(inputs, p):

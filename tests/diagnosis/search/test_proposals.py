@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -169,25 +170,10 @@ def test_a_parameter_with_a_wrong_prior_does_not_withdraw_what_foretells_all_els
     assert shifts["damping"] < -3
 
 
-PENDULUM = """schema = 1
-title = "A bob on a thread"
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["angle", "rate"]
-force_terms = { rate = "1/s^2" }
-[simulation.parameters.length]
-value = 0.334
-unit = "m"
-sd = 0.005
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-angle = { unit = "rad", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+PENDULUM = case_text(
+    "ode", title="A bob on a thread", states=["angle", "rate"], force_terms={"rate": "1/s^2"},
+    parameters={"length": (0.334, "m", 0.005)}, outputs={"angle": "rad"}, runs=1,
+)  # fmt: skip
 SWINGING = """
 import math
 def initial(p):

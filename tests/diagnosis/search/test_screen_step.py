@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -17,25 +18,10 @@ import pandas as pd
 def simulate(inputs, p):
     return pd.DataFrame({"n": p["gain"] * inputs["u"] + p["zero"]})
 """
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.gain]
-value = 1.0
-unit = "1"
-sd = 0.3
-[simulation.parameters.zero]
-value = 0.0
-unit = "1/s"
-sd = 0.5
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-u = { unit = "1/s", role = "input" }
-n = { unit = "1/s", role = "output" }
-"""
+CASE = case_text(
+    "python", parameters={"gain": (1.0, "1", 0.3), "zero": (0.0, "1/s", 0.5)}, inputs={"u": "1/s"},
+    outputs={"n": "1/s"},
+)  # fmt: skip
 
 
 def speeds(folder, *, unsigned):

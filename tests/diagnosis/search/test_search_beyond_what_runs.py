@@ -8,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.cli import diagnose as command
 from toolkit.diagnosis.case.reader import read_case
@@ -26,22 +27,9 @@ def outputs(x, u, p):
 def initial(p):
     return [0.0]
 """
-CASE = """schema = 1
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["v"]
-[simulation.parameters.tau]
-value = 2.0
-unit = "s"
-sd = 0.1
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-U = { unit = "1", role = "input" }
-Y = { unit = "1", role = "output" }
-"""
+CASE = case_text(
+    "ode", states=["v"], parameters={"tau": (2.0, "s", 0.1)}, inputs={"U": "1"}, outputs={"Y": "1"},
+)  # fmt: skip
 
 
 def lagging(seed):

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.case.reader import read_case
@@ -20,24 +21,10 @@ from toolkit.diagnosis.search.screen_step import look
 from toolkit.diagnosis.search.unseen_runs import shown_on_unseen_runs
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
-CASE = """schema = 1
-title = "A wheel that coasts"
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["x", "v"]
-force_terms = { v = "N/kg" }
-[simulation.parameters.bearing]
-value = 0.02
-unit = "m/s^2"
-sd = 0.01
-bounds = [0.0, 0.5]
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-v = { unit = "m/s", role = "output" }
-"""
+CASE = case_text(
+    "ode", title="A wheel that coasts", states=["x", "v"], force_terms={"v": "N/kg"},
+    parameters={"bearing": (0.02, "m/s^2", 0.01, [0.0, 0.5])}, outputs={"v": "m/s"},
+)  # fmt: skip
 SIMULATOR = """
 import math
 def initial(p, run):

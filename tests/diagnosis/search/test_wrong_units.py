@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -15,26 +16,10 @@ def simulate(inputs, p):
     import pandas as pd
     return pd.DataFrame({"F": inputs["P"] * 0.1 * p["area"] + 0.0 * inputs["x"]})
 """
-HEAD = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.area]
-value = 500.0
-unit = "mm^2"
-sd = 5.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-x = { unit = "mm", role = "input" }
-P = { unit = "bar", role = "input" }
-F = { unit = "N", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-[[recording.run]]
-file = "r1.csv"
-"""
+HEAD = case_text(
+    "python", parameters={"area": (500.0, "mm^2", 5.0)}, inputs={"x": "mm", "P": "bar"},
+    outputs={"F": "N"}, runs=2,
+)  # fmt: skip
 ROTOR = """
 def initial(p):
     return [0.0]

@@ -6,29 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.python import UserFunction
 from toolkit.errors import FitError
 
-CASE = """
-schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.k]
-value = 2.0
-unit = "1"
-sd = 1.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-x = { unit = "1", role = "input" }
-y = { unit = "1", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+CASE = case_text(
+    "python", parameters={"k": (2.0, "1", 1.0)}, inputs={"x": "1"}, outputs={"y": "1"}, runs=1,
+)  # fmt: skip
 X = np.array([0.5, -1.0, 2.0, 4.0])
 HEAD = "import numpy as np\nimport pandas as pd\nSEEN = []\ndef simulate(inputs, p):\n"
 HEAD += "    SEEN.append(type(inputs).__name__)\n"

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from scipy.optimize import brentq
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -92,23 +93,11 @@ def outputs(x, u, p):
 def initial(p):
     return [0.0, 0.0]
 """
-TORSION_CASE = """schema = 1
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["th", "om"]
-force_terms = { om = "rad/s^2" }
-[simulation.parameters]
-J = { value = 0.5, unit = "kg*m^2" }
-k = { value = 20.0, unit = "N*m/rad", sd = 1.0 }
-c = { value = 0.3, unit = "N*m*s/rad", sd = 0.1 }
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-M = { unit = "N*m", role = "input" }
-th = { unit = "rad", role = "output", sd = 0.004 }
-"""
+TORSION_CASE = case_text(
+    "ode", states=["th", "om"], force_terms={"om": "rad/s^2"},
+    parameters={"J": (0.5, "kg*m^2"), "k": (20.0, "N*m/rad", 1.0), "c": (0.3, "N*m*s/rad", 0.1)},
+    inputs={"M": "N*m"}, outputs={"th": ("rad", 0.004)},
+)  # fmt: skip
 
 
 @pytest.mark.campaign("a whole diagnosis: friction that a unit leaves out is named in every run")

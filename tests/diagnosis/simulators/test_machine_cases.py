@@ -8,7 +8,8 @@ import pytest
 
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
-from tests.diagnosis.tire_case import TIR, sweep, toml
+from tests.diagnosis.tire_case import sweep, toml
+from tests.golden.cases import TIRE_FILE
 from toolkit.diagnosis.answer.answer import DiagnosedRecording
 from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 from toolkit.diagnosis.case.reader import read_case
@@ -31,7 +32,7 @@ def machine(folder, *, simulation="", frames=None, **entries):
     frames = frames or {f"r{i}__csv": sweep("machine", seed=i) for i in range(2)}
     text = toml('kind = "machine"\nmachine = "m15"\ntire = "tire.tir"\n' + simulation, axes="machine",
                 **{"mu": "LMUY", **entries})  # fmt: skip
-    return read_case(write_case(folder, text, simulator=None, tire__tir=TIR, **frames))
+    return read_case(write_case(folder, text, simulator=None, tire__tir=TIRE_FILE, **frames))
 
 
 def with_cells(df):
@@ -145,7 +146,7 @@ def test_a_lag_of_the_load_acts_once(tmp_path, measured):
     load = 'FZ = { unit = "N", role = "input" }\n'
     text = text.replace(load, load.replace("input", "output") if measured else "")
     case = read_case(
-        write_case(tmp_path, text, simulator=None, tire__tir=TIR, r0__csv=rows, r1__csv=rows[1:])
+        write_case(tmp_path, text, simulator=None, tire__tir=TIRE_FILE, r0__csv=rows, r1__csv=rows[1:])
     )
     model = model_of(case, None)
     late = AppliedEffect(effect=effects()["load_lag"], values={"time_constant": 0.5})

@@ -15,7 +15,8 @@ import pytest
 import toolkit.diagnosis.simulators as simulators
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import HEAD, TWO, write_case
-from tests.diagnosis.tire_case import TIR, python_tire, sweep, toml
+from tests.diagnosis.tire_case import python_tire, sweep, toml
+from tests.golden.cases import TIRE_FILE
 from toolkit.diagnosis.case.case import KINDS
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import builder, model_of
@@ -88,7 +89,7 @@ def test_a_tire_file_states_its_load_and_a_calibration_its_cells(tmp_path: Path)
     text = toml('kind = "machine"\ntire = "tire.tir"', mu="LMUY")
     frames = {f"r{i}__csv": sweep("SAE", seed=i) for i in range(2)}
     stated = model_of(
-        read_case(write_case(tmp_path, text, simulator=None, tire__tir=TIR, **frames)), REGISTRY
+        read_case(write_case(tmp_path, text, simulator=None, tire__tir=TIRE_FILE, **frames)), REGISTRY
     ).capability
     assert stated.nominal_load_N == 4000.0
     assert (stated.cells, stated.motion, stated.repeats, stated.together) == ((), None, None, None)

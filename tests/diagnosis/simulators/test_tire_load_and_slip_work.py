@@ -5,7 +5,8 @@ import pytest
 
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.simulators.test_machine_cases import CELLS, REGISTRY, machine, with_cells
-from tests.diagnosis.tire_case import SIGNS, SIMULATOR, TIR, plain, sweep, toml
+from tests.diagnosis.tire_case import SIGNS, SIMULATOR, plain, sweep, toml
+from tests.golden.cases import TIRE_FILE
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.applied import AppliedEffect
@@ -57,7 +58,7 @@ def test_a_load_channel_that_shows_too_much_is_not_what_the_tire_carries(tmp_pat
             'FZ = { unit = "N", role = "input" }\n', 'FZ = { unit = "N", role = "output" }\n', 1
         )
         folder = tmp_path / f"{factor}"
-        case = read_case(write_case(folder, text, simulator=None, tire__tir=TIR, **frames))
+        case = read_case(write_case(folder, text, simulator=None, tire__tir=TIRE_FILE, **frames))
         model = model_of(case, REGISTRY)
         gain = AppliedEffect(
             effect=effects()["sensitivity_error"], channel="FZ", values={"gain_error": factor - 1}

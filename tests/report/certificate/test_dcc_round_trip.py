@@ -26,7 +26,7 @@ from toolkit.trust.seal.xml import check_xml, seal_xml
 def statements_of_settings(path: Path) -> DigitalSource:
     session = read_session(path, standards=Standards(trust=trust()))
     digital = parse_statements(
-        json.loads(session.settings),
+        session.settings,
         indications={cell.name: cell.unit for cell in session.cells},
         loads={load.name: load.unit for load in session.loads},
         largest=dict.fromkeys((load.name for load in session.loads), 1.0),

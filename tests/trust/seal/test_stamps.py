@@ -18,9 +18,9 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from pyhanko.sign.timestamps import DummyTimeStamper
 
+from tests import commands
 from tests.trust.seal.authority import Authority, make_authority
 from tests.trust.seal.seal_factory import key, plain_pdf
-from toolkit.cli.main import run
 from toolkit.errors import TrustError
 from toolkit.lab.home import packaged_home
 from toolkit.lab.signatures.sealing import Sealing
@@ -105,30 +105,25 @@ def test_a_sealed_document_takes_its_stamp_from_the_same_server(tmp_path: Path) 
 
 
 def test_ledger_prove_stamps_its_checkpoint_and_check_tells_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(packaged_home() / "calibrations", tmp_path / "calibrations")
     monkeypatch.chdir(tmp_path)
 
-    def call(*words: str) -> tuple[int, str]:
-        with pytest.raises(SystemExit) as ended:
-            run(list(words))
-        return int(ended.value.code or 0), capsys.readouterr().out
-
     with served() as url:
-        code, proof = call("ledger", "prove", "m15", "--time-stamp", url)
+        code, proof, _ = commands.said("ledger", "prove", "m15", "--time-stamp", url)
     assert code == 0
     Path("proof.json").write_text(proof)
-    checked = ("ledger", "check", "m15", "--against", "proof.json", "--json")
-    assert json.loads(call(*checked)[1])["time_stamp_state"] == "untrusted"
+    checked = ("ledger", "check", "m15", "--against", "proof.json")
+    assert commands.answer(*checked)[1]["time_stamp_state"] == "untrusted"
     (tmp_path / "trust/certificates").mkdir(parents=True)
     (tmp_path / "trust/certificates/stamps.pem").write_bytes(stamps()[0].pem)
-    answer = json.loads(call(*checked)[1])
+    _, answer = commands.answer(*checked)
     assert (answer["ledger"], answer["time_stamp_state"], answer["time_stamp_by"]) == (
         "continues",
         "valid",
         "Time",
     )
-    other = json.loads(call("ledger", "prove", "m15-virtual")[1])
+    other = json.loads(commands.said("ledger", "prove", "m15-virtual").out)
     Path("proof.json").write_text(json.dumps({**other, "time_stamp": json.loads(proof)["time_stamp"]}))
-    assert call("ledger", "check", "m15-virtual", "--against", "proof.json")[0] == 2
+    assert commands.said("ledger", "check", "m15-virtual", "--against", "proof.json").code == 2

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import bisect
 import datetime as dt
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry.registry import load_checked, load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
+from toolkit.calibration.session.statements import entries_of
 from toolkit.errors import ToolkitError, UnitError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
@@ -189,8 +189,7 @@ class AsFound:
 
 def phase_of(record: CalibrationRecord) -> str | None:
     """Return ``as_found``, ``as_left`` or None, as the record's session stated."""
-    phase = json.loads(record.settings).get("phase") if record.kind == "fit" else None
-    return None if phase is None else str(phase)
+    return entries_of(record).phase
 
 
 def as_found(registry: Registry, record: CalibrationRecord) -> AsFound:

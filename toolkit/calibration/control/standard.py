@@ -55,7 +55,6 @@ def evaluate_record(
         CellSource(
             table=table,
             statements=statements_of(record),
-            settings=record.settings,
             zero=record.zero,
             loads=loads,
             indications=record.indications,

@@ -23,6 +23,7 @@ from lxml import etree
 
 from toolkit.calibration.dcc.quantities import Point, points_of
 from toolkit.calibration.dcc.structure import DCC, check_structure
+from toolkit.channels import load_dimension
 from toolkit.errors import SessionError, TrustError
 from toolkit.files import sha256_bytes
 from toolkit.trust.seal.check import SealCheck
@@ -144,7 +145,6 @@ def _content(node: Any) -> str:
 
 
 _UNITS = {"force": "N", "moment": "N*m"}
-_FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
 
 
 class Columns(Protocol):
@@ -193,7 +193,7 @@ def with_standard(
     item = _item(certificate, reference.get("standard"), place)
     _demand_same(reference, "certificate", certificate.identifier, place)
     _demand_valid(raw, certificate, reference, place)
-    loads = {name: _chosen(certificate, str(name), place) for name in raw["loads"]}
+    loads = {name: _points_for(certificate, str(name), place) for name in raw["loads"]}
     typed = dict(reference.get("uncertainty", {}))
     for name, points in loads.items():
         if name in typed and points:
@@ -334,9 +334,9 @@ def _demand_valid(
         )  # fmt: skip
 
 
-def _chosen(certificate: DigitalCertificate, load: str, place: str) -> tuple[Point, ...]:
+def _points_for(certificate: DigitalCertificate, load: str, place: str) -> tuple[Point, ...]:
     """Return the points of a load: those that name it, else those that name no channel."""
-    quantity = "force" if _FORCE.match(load) else "moment" if _MOMENT.match(load) else None
+    quantity = load_dimension(load)
     points = [p for p in certificate.points if quantity in (None, p.dimension)]
     points = [p for p in points if load in p.channels] or [p for p in points if not p.channels]
     if len({point.dimension for point in points}) > 1:

@@ -103,8 +103,8 @@ def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
     design /= length
     # design column j = (raw_j - middle_j) / length_j: a coefficient goes into a raw term by its own column,
     # and into the constant by the middle as well.
-    scale = [1 / Fraction(float(one)) for one in length]
-    shift = [Fraction(float(one)) for one in middle]
+    scale = [1 / Fraction(float(number)) for number in length]
+    shift = [Fraction(float(number)) for number in middle]
     exact = tuple(_mapped(row, row[k] if constant else Fraction(0), shift, scale) for row in expand)
     return Basis(
         terms=tuple(terms),
@@ -123,7 +123,7 @@ def _mapped(
 ) -> tuple[Fraction, ...]:
     # Most places are zero, and a product of rationals costs more than to look.
     shifted = (a - constant * m if constant and m else a for a, m in zip(row, shift, strict=True))
-    return tuple(a * one if a else a for a, one in zip(shifted, scale, strict=True))
+    return tuple(a * factor if a else a for a, factor in zip(shifted, scale, strict=True))
 
 
 def _anchor(values: NDArray[np.float64]) -> float:

@@ -234,9 +234,9 @@ def loadings(
     if level is None:
         return None
     new = np.diff(level, prepend=-1) != 0
-    for told in (run, up):
-        if told is not None:
-            new[1:] |= told[1:] != told[:-1]
+    for label in (run, up):
+        if label is not None:
+            new[1:] |= label[1:] != label[:-1]
     return np.asarray(np.cumsum(new) - 1, dtype=np.int64)
 
 

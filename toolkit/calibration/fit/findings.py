@@ -114,8 +114,8 @@ def _single(session: Session, rows: set[int]) -> set[int]:
     """Return the rows that are wrong by themselves: not those of a run of which most are."""
     group = groups_of(session.table, session.zero)[1]
     among = np.bincount(group[np.array(sorted(rows), dtype=np.int64) - 1], minlength=int(group.max()) + 1)
-    whole = among > np.bincount(group) / 2
-    return {row for row in rows if not whole[group[row - 1]]}
+    majority = among > np.bincount(group) / 2
+    return {row for row in rows if not majority[group[row - 1]]}
 
 
 def _without(fit: SessionFit, rows: set[int]) -> SessionFit:
@@ -123,10 +123,10 @@ def _without(fit: SessionFit, rows: set[int]) -> SessionFit:
     if not rows:
         return fit
     table = fit.session.table
-    kept = np.ones(table.rows, dtype=np.bool_)
-    kept[[row - 1 for row in rows]] = False
+    remaining = np.ones(table.rows, dtype=np.bool_)
+    remaining[[row - 1 for row in rows]] = False
     try:
-        return fit_session(dataclasses.replace(fit.session, table=table.only(kept)))
+        return fit_session(dataclasses.replace(fit.session, table=table.only(remaining)))
     except SessionError:
         return fit  # the others alone determine no equation
 
@@ -327,7 +327,7 @@ def _robust_findings(fit: SessionFit, wrong: Mapping[str, tuple[int, ...]]) -> l
         rows = [row for row in wrong[name] if row not in outliers]
         if rows:
             message = (
-                f"row{'s' if len(rows) > 1 else ''} {_some(rows)}{_of_runs(fit.session, rows)}: "
+                f"row{'s' if len(rows) > 1 else ''} {_row_list(rows)}{_of_runs(fit.session, rows)}: "
                 f"contradict{'' if len(rows) > 1 else 's'} the other rows; rows that are wrong together hide "
                 "from the ordinary residuals. The fit is unchanged: look at these loadings"
             )
@@ -340,7 +340,7 @@ def _scale_findings(load: LoadResult, scales: tuple[RunScale, ...]) -> list[Find
     for scale in scales:
         first, last = scale.rows[0], scale.rows[-1]
         block = last - first + 1 == len(scale.rows)
-        rows = f"{first} to {last}" if block else _some(list(scale.rows))
+        rows = f"{first} to {last}" if block else _row_list(list(scale.rows))
         message = (
             f"{scale.factor} {scale.run:g} (rows {rows}): its loads are {scale.ratio:.4g} times what "
             f"{'most' if scale.most else 'the'} other {scale.factor}s tell of the same indications"
@@ -359,16 +359,16 @@ def _of_runs(session: Session, rows: list[int]) -> str:
     if len(count) == 1:
         return ""
     number = session.table.rotation if factor == "mounting" else session.table.run
-    named = [] if number is None else np.unique(number).tolist()
+    numbers = [] if number is None else np.unique(number).tolist()
     texts = [
-        f"{some} of the {every} rows of {factor} {name:g}"
-        for name, some, every in zip(named, among.tolist(), count.tolist(), strict=True)
-        if some > every / 2
+        f"{part} of the {total} rows of {factor} {name:g}"
+        for name, part, total in zip(numbers, among.tolist(), count.tolist(), strict=True)
+        if part > total / 2
     ]
     return f" ({', '.join(texts)})" if texts else ""
 
 
-def _some(rows: list[int]) -> str:
+def _row_list(rows: list[int]) -> str:
     text = ", ".join(str(row) for row in rows[:_MOST_ROWS])
     return text if len(rows) <= _MOST_ROWS else f"{text} and {len(rows) - _MOST_ROWS} more"
 

@@ -67,7 +67,7 @@ def fit_odr(
 
     single = len(names) == 1
     eps = float(np.finfo(float).eps)
-    found = odr_fit(
+    optimum = odr_fit(
         lambda at, b: design(np.atleast_2d(at)) @ b,
         x[0] if single else x,
         load,
@@ -80,11 +80,11 @@ def fit_odr(
         partol=eps,
         maxit=_ITERATIONS,
     )
-    beta, delta = np.asarray(found.beta), np.atleast_2d(found.delta)
+    beta, delta = np.asarray(optimum.beta), np.atleast_2d(optimum.delta)
     # The last digit of its code tells why it stopped; the others doubt derivatives, which the steps below
     # prove: they end only where the objective is stationary.
-    if found.info % 10 not in (1, 2, 3) or not np.isfinite(beta).all():
-        raise ValueError(f"odrpack found no solution: {found.stopreason}")
+    if optimum.info % 10 not in (1, 2, 3) or not np.isfinite(beta).all():
+        raise ValueError(f"odrpack found no solution: {optimum.stopreason}")
     best, still = np.inf, 0
     for _ in range(_STEPS):
         slope = slopes(x + delta, beta)

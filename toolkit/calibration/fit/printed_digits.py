@@ -82,7 +82,7 @@ def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Seque
     are always told; others only where so many would agree by chance once in a hundred sessions or less, or
     where they lie nearer to rows of their loading than those lie to each other, oftener than chance allows.
     """
-    same: dict[int, int] = {}
+    equal_rows: dict[int, int] = {}
     near: dict[int, int] = {}
     expected = 0.0
     sd = np.asarray(scatter, dtype=np.float64)
@@ -97,7 +97,7 @@ def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Seque
         equal = around[(distance == 0).all(axis=1)]
         alike = around[(distance <= by).all(axis=1)]
         if equal.size:
-            same[at] = int(equal[0])
+            equal_rows[at] = int(equal[0])
         elif alike.size:
             near[at] = int(alike[0])
         # Two readings of one loading differ by sqrt(2) sd: the chance that they agree within the rounding.
@@ -107,8 +107,8 @@ def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Seque
         from scipy.special import pdtrc
 
         if pdtrc(len(near) - 1, expected) < _CHANCE:
-            same |= near
-    return _nearest(check, rows, sd) | same
+            equal_rows |= near
+    return _nearest(check, rows, sd) | equal_rows
 
 
 def _nearest(
@@ -122,7 +122,7 @@ def _nearest(
     to each other than to those of other runs, but by their noise.
     """
     noisy = sd > 0
-    found: dict[int, int] = {}
+    nearest_rows: dict[int, int] = {}
     ratios: list[float] = []
     count, chances = 0, np.ones(1)  # of so many first places by chance
     for at, values in enumerate(check):
@@ -132,16 +132,16 @@ def _nearest(
         if len(around) < _REPLICATES:
             continue
         place = rows[np.ix_(around, np.flatnonzero(noisy))] / (math.sqrt(2) * sd[noisy])
-        own = np.sqrt(np.mean((place - values[noisy] / (math.sqrt(2) * sd[noisy])) ** 2, axis=1))
+        distances = np.sqrt(np.mean((place - values[noisy] / (math.sqrt(2) * sd[noisy])) ** 2, axis=1))
         apart = np.sqrt(np.mean((place[:, None] - place) ** 2, axis=2))
         np.fill_diagonal(apart, np.inf)
         nearest = apart.min(axis=1)
-        closest = float(own.min())
+        closest = float(distances.min())
         chance = 1 / (len(around) + 1)
         chances = np.convolve(chances, [1 - chance, chance])
         count += bool((nearest > closest).all())
         ratios.append(closest / min(1.0, float(np.median(nearest)) or 1.0))
         if ratios[-1] < _CHANGED:
-            found[at] = int(around[own.argmin()])
-    told = bool(found) and chances[count:].sum() < _JOINT and np.median(ratios) < _CHANGED
-    return found if told else {}
+            nearest_rows[at] = int(around[distances.argmin()])
+    certain = bool(nearest_rows) and chances[count:].sum() < _JOINT and np.median(ratios) < _CHANGED
+    return nearest_rows if certain else {}

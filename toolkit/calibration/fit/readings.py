@@ -15,7 +15,6 @@ of ISO 376; full scale of a load is its largest reference load.
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -27,12 +26,9 @@ from toolkit.calibration.session.readings import (
     CreepEntry,
     Scope,
     ZeroEntry,
-    creep_entries,
     shunt_entry,
-    zero_entries,
 )
-from toolkit.calibration.session.settings import zero_readings
-from toolkit.calibration.session.statements import scope_of, statements_of
+from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.units import unit
 
@@ -40,6 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.session_file import StatedEntries
     from toolkit.calibration.session.table import Table
 
 CREEP_FROM_S, CREEP_TO_S = 30.0, 300.0
@@ -160,30 +157,29 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     ConfigError, UnitError
         an entry of a record made before they were checked cannot be read
     """
-    scope = scope_of(record)
-    settings = json.loads(record.settings)
-    cells = settings.get("cells", {})
-    zero = zero_entries(zero_readings(settings), scope)
-    creep = creep_entries(settings.get("creep", []), scope)
-    at_rest = _rest(record, loads)
+    statements = statements_of(record)
+    scope, entries, zero = statements.scope, statements.entries, statements.zero
+    at_rest = _unloaded(record, loads)
     columns = loads.columns(record.indications)
     full = {name: float(np.abs(columns[name] - at_rest[name]).max()) for name in record.indications}
     drifts = _zero_drifts(zero, scope, full)
-    series, left_out = _creeps(creep, scope, full, {load.load: load.largest for load in record.loads})
+    series, left_out = _creeps(
+        statements.creep, scope, full, {load.load: load.largest for load in record.loads}
+    )
     return SessionReadings(
         full_scale=tuple(full.items()),
         zero=drifts,
         zero_loads=tuple(_load_drift(record, load, drifts, zero, at_rest) for load in record.loads if drifts),
-        shunts=tuple(_shunts(zero, cells, scope)),
+        shunts=tuple(_shunts(zero, entries, scope)),
         creep=series,
         creep_left_out=left_out,
         reversibility=_reversibility(record, loads),
-        temperature_C=statements_of(record).temperature_C,
+        temperature_C=statements.temperature_C,
         largest_ratio=tuple(
             (
                 name,
                 1e3 * unit(text).factor * float(np.abs(columns[name]).max()),
-                LARGEST_RATIO_MV_V[cells.get(name, {}).get("bridge") or "foil"],
+                LARGEST_RATIO_MV_V[entries.cell(name).bridge or "foil"],
             )
             for name, text in zip(record.indications, record.indication_units, strict=True)
             if unit(text).dimension == "bridge_ratio"
@@ -191,9 +187,7 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
         unscaled=tuple(
             name
             for name, text in scope.columns.items()
-            if "scale" in cells.get(name, {})
-            and not isinstance(cells[name]["scale"], dict)
-            and unit(text).dimension == "count"
+            if isinstance(entries.cell(name).scale, float) and unit(text).dimension == "count"
         ),
     )
 
@@ -201,22 +195,22 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
 def readings_json(readings: SessionReadings) -> dict[str, Any]:
     """Return the readings as JSON values, by indication and load."""
 
-    def named(parts: Iterable[Any], key: str) -> dict[str, Any]:
+    def by_name(parts: Iterable[Any], key: str) -> dict[str, Any]:
         entries = [dataclasses.asdict(part) for part in parts]
         return {entry.pop(key): entry for entry in entries}
 
     return {
         "full_scale": dict(readings.full_scale),
-        "zero": named(readings.zero, "name"),
-        "zero_loads": named(readings.zero_loads, "load"),
+        "zero": by_name(readings.zero, "name"),
+        "zero_loads": by_name(readings.zero_loads, "load"),
         "shunt": [{**dataclasses.asdict(shunt), "within": shunt.within} for shunt in readings.shunts],
         "creep": [dataclasses.asdict(series) for series in readings.creep],
-        "reversibility": named(readings.reversibility, "load"),
+        "reversibility": by_name(readings.reversibility, "load"),
         "temperature_C": readings.temperature_C,
     }
 
 
-def _rest(record: CalibrationRecord, table: Table) -> dict[str, float]:
+def _unloaded(record: CalibrationRecord, table: Table) -> dict[str, float]:
     """Return each indication without load: the mean of the unloaded rows, else by a line through all rows."""
     matrix = table.matrix([load.load for load in record.loads])
     cells = table.matrix(record.indications)
@@ -272,9 +266,9 @@ def _load_drift(
     )  # fmt: skip
 
 
-def _shunts(zero: tuple[ZeroEntry, ...], cells: dict[str, Any], scope: Scope) -> Iterable[ShuntCheck]:
+def _shunts(zero: tuple[ZeroEntry, ...], entries: StatedEntries, scope: Scope) -> Iterable[ShuntCheck]:
     for name in scope.indications:
-        stated = shunt_entry(name, cells.get(name, {}), scope)
+        stated = shunt_entry(name, entries.cell(name), scope)
         if stated is not None and stated.measured is not None:
             yield _shunt_check(name, stated.unit, "shunt_measured", stated.measured, None, stated)
         last: float | None = None

@@ -106,8 +106,8 @@ def recommend_wider(fit: SessionFit) -> Wider | None:
     models = [m for m in _models(session) if _determined(m.terms, columns, applied)]
     if not models or not loads:
         return None
-    own = _refit(fit, loads, current.terms, columns)
-    solved = {(current.name, load.setting.name): total for load, total in zip(loads, own, strict=True)}
+    refitted = _refit(fit, loads, current.terms, columns)
+    solved = {(current.name, load.setting.name): total for load, total in zip(loads, refitted, strict=True)}
     for model in models:
         sums = _refit(fit, loads, model.terms, columns)
         solved |= {(model.name, load.setting.name): total for load, total in zip(loads, sums, strict=True)}
@@ -163,10 +163,10 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
     if not out:
         return None
     remaining = tuple(t for t in session.terms if t not in out)
-    own = _refit(fit, loads, session.terms, columns)
+    refitted = _refit(fit, loads, session.terms, columns)
     ratios = [
         _f_test(narrow, wide)
-        for narrow, wide in zip(_refit(fit, loads, remaining, columns), own, strict=True)
+        for narrow, wide in zip(_refit(fit, loads, remaining, columns), refitted, strict=True)
     ]
     if idle and min(p for _, p in ratios) < RISK / len(loads):
         # Parallel terms share their effect: each seems idle while the other is there.
@@ -177,7 +177,7 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
         remaining = tuple(t for t in session.terms if t not in out)
         ratios = [
             _f_test(narrow, wide)
-            for narrow, wide in zip(_refit(fit, loads, remaining, columns), own, strict=True)
+            for narrow, wide in zip(_refit(fit, loads, remaining, columns), refitted, strict=True)
         ]
     base = model_terms(session.model, session.indications, degree=session.degree)
     dropped = [t for t in base if t not in session.terms]
@@ -254,7 +254,7 @@ def _sound(
         return dict(better)
     columns = fit.session.table.columns(fit.session.indications)
     narrow = build_basis(fit.session.terms, columns).design
-    kept, tests = {}, len(models) * len(loads)
+    models_kept, tests = {}, len(models) * len(loads)
     for model in models:
         rows = better.get(model.name, [])
         wide = build_basis(model.terms, columns).design
@@ -265,8 +265,8 @@ def _sound(
             for ratio, p, load in rows
         ]
         if any(p < RISK for _, p, _ in sound):
-            kept[model.name] = sound
-    return kept
+            models_kept[model.name] = sound
+    return models_kept
 
 
 def _robust(narrow: NDArray[np.float64], wide: NDArray[np.float64], load: NDArray[np.float64]) -> float:
@@ -278,10 +278,10 @@ def _robust(narrow: NDArray[np.float64], wide: NDArray[np.float64], load: NDArra
     left = np.linalg.svd(wide - q @ (q.T @ wide), full_matrices=False)[0]
     added = left[:, : wide.shape[1] - narrow.shape[1]]
     every = np.column_stack([q, added])
-    rest = load - every @ (every.T @ load)
+    residual = load - every @ (every.T @ load)
     leverage = np.minimum(np.einsum("ij,ij->i", every, every), 1 - 1e-9)
     moved = added.T @ load
-    spread = (added * (rest / (1 - leverage))[:, None] ** 2).T @ added
+    spread = (added * (residual / (1 - leverage))[:, None] ** 2).T @ added
     wald = float(moved @ np.linalg.pinv(spread, hermitian=True) @ moved) / len(moved)
     return float(fdtrc(len(moved), n - every.shape[1], wald))
 

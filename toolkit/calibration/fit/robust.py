@@ -159,10 +159,10 @@ def deviating(
     design: NDArray[np.float64], load: NDArray[np.float64], wrong: Sequence[int]
 ) -> tuple[int, ...]:
     """Return those of the ``wrong`` rows (from 1) that contradict the other rows on this design too."""
-    others = np.delete(np.arange(len(load)), np.array(wrong) - 1)
-    if len(others) - design.shape[1] < 1:
+    other_rows = np.delete(np.arange(len(load)), np.array(wrong) - 1)
+    if len(other_rows) - design.shape[1] < 1:
         return ()
-    judged = _judged(np.linalg.qr(design)[0], load, others)
+    judged = _judged(np.linalg.qr(design)[0], load, other_rows)
     return () if judged is None else tuple(row for row in wrong if judged[0][row - 1] >= judged[1])
 
 

@@ -151,10 +151,10 @@ def noise_of(
     q = np.linalg.qr(design / np.where(length > 0, length, 1.0))[0]
     ordinary = q @ (q.T @ y)
     residuals = y - ordinary
-    told = math.sqrt(float(residuals @ residuals) / (len(y) - design.shape[1]))
+    residual_sd = math.sqrt(float(residuals @ residuals) / (len(y) - design.shape[1]))
     v = ordinary / float(np.abs(y).max()) if errors.proportional else np.ones(len(y))
     return RowNoise(
-        u=np.full(len(y), told) if errors.u is None else errors.u, stated=errors.u is not None,
+        u=np.full(len(y), residual_sd) if errors.u is None else errors.u, stated=errors.u is not None,
         v=errors.u_shared * v, group=errors.group, u_shared=errors.u_shared,
         proportional=errors.proportional, design=design,
     )  # fmt: skip
@@ -204,7 +204,7 @@ def weighed_rows(
     relative = rows_of(design, load, group, operator).relative
     stated = [noise.size**2 if noise.stated else 0.0, 0.0, 0.0]
     shared = None
-    if noise.u_shared and group.any() and _same(group, noise.group):
+    if noise.u_shared and group.any() and _same_partition(group, noise.group):
         stated[2 if noise.proportional else 1] = noise.u_shared**2
         relative = noise.v / noise.u_shared if noise.proportional else relative
     elif noise.u_shared:
@@ -230,7 +230,7 @@ def scatter_of_one(
     )  # fmt: skip
 
 
-def _same(runs: NDArray[np.int64], groups: NDArray[np.intp]) -> bool:
+def _same_partition(runs: NDArray[np.int64], groups: NDArray[np.intp]) -> bool:
     """Tell whether two numberings of rows part them alike."""
     pairs = len(np.unique(np.column_stack([runs, groups]), axis=0))
     return pairs == len(np.unique(runs)) == len(np.unique(groups))

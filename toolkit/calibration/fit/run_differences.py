@@ -86,14 +86,14 @@ def cell_gains(session: Session, load: LoadResult) -> CellGains | None:
         return None
     names = [name for name in session.indications if name in load.fit.terms]
     x = session.table.matrix(names)
-    own = _of_groups(rows.group, np.column_stack([np.ones(len(x)), rows.relative]))
-    narrow = np.column_stack([rows.mean.columns, own])
+    lines = _of_groups(rows.group, np.column_stack([np.ones(len(x)), rows.relative]))
+    narrow = np.column_stack([rows.mean.columns, lines])
     wide = np.column_stack([narrow, _of_groups(rows.group, x)])
     # Of what even the wide model leaves: gains that differ would pass for scatter that grows.
-    sd = shown_profile(session.table.columns(session.indications), _rest(wide, rows.load))
+    sd = shown_profile(session.table.columns(session.indications), _residual(wide, rows.load))
     weight = np.ones(len(x)) if sd is None else float(np.sqrt(np.mean(sd**2))) / sd
     y = rows.load * weight
-    (before, few), (after, many) = (_left(part * weight[:, None], y) for part in (narrow, wide))
+    (before, few), (after, many) = (_squares_left(part * weight[:, None], y) for part in (narrow, wide))
     extra, dof = many - few, len(rows.load) - many
     if extra < 1 or dof < _FEWEST_DOF or after <= 0:
         return None
@@ -118,21 +118,23 @@ def odd_run(session: Session, load: LoadResult) -> OddRun | None:
     design = term_matrix(load.fit.terms, session.table.columns(session.indications))
     off, within = [], []
     for run in range(rows.groups):
-        own = rows.group == run
-        others = np.column_stack(
+        in_run = rows.group == run
+        other_rows = np.column_stack(
             [design, _of_groups(rows.group, np.column_stack([np.ones(len(design)), rows.relative]))]
-        )[~own]
-        length = np.linalg.norm(others, axis=0)
-        scaled = others / np.where(length > 0, length, 1.0)
-        solution, _, rank, _ = np.linalg.lstsq(scaled, rows.load[~own], rcond=1e-10)
+        )[~in_run]
+        length = np.linalg.norm(other_rows, axis=0)
+        scaled = other_rows / np.where(length > 0, length, 1.0)
+        solution, _, rank, _ = np.linalg.lstsq(scaled, rows.load[~in_run], rcond=1e-10)
         c = (solution / np.where(length > 0, length, 1.0))[: design.shape[1]]
-        predicted = design[own] @ c
+        predicted = design[in_run] @ c
         about = np.column_stack([np.ones(len(predicted)), predicted])
         # Runs that load other axes tell nothing of each other.
-        comparable = len(predicted) > about.shape[1] + 2 and _leverage(design[~own], design[own]) < _FORETOLD
-        off.append(_rms(about, rows.load[own]) if comparable else 0.0)
-        rest = rows.load[~own] - scaled @ solution
-        within.append(float(np.sqrt(rest @ rest / max(len(rest) - rank, 1))))
+        comparable = (
+            len(predicted) > about.shape[1] + 2 and _leverage(design[~in_run], design[in_run]) < _FORETOLD
+        )
+        off.append(_rms(about, rows.load[in_run]) if comparable else 0.0)
+        residual = rows.load[~in_run] - scaled @ solution
+        within.append(float(np.sqrt(residual @ residual / max(len(residual) - rank, 1))))
     ratio = np.array(off) / np.maximum(within, 1e-300)
     at = int(np.argmax(ratio))
     if off[at] <= load.setting.tolerance or ratio[at] <= _ODD:
@@ -170,18 +172,20 @@ def copied_runs(session: Session) -> CopiedRuns | None:
             apart[first, second] = len(pairs), _noise_of_pairs(x, applied, pairs)
     if not apart:
         return None
-    (first, second), (count, noise) = min(apart.items(), key=lambda one: float(np.sum(one[1][1])))
-    others = [
+    (first, second), (count, noise) = min(apart.items(), key=lambda item: float(np.sum(item[1][1])))
+    other_noise = [
         sizes for pair, (_, sizes) in apart.items() if pair != (first, second) and {first, second} & set(pair)
     ]
     # What repeats of hysteresis scatters within a run too: there runs are copies to the last digit alone.
     usual = {"rows of one run at one load": np.where(noise <= digits, within, 0.0)}
-    if others:
-        usual["the other runs"] = np.min(others, axis=0)
+    if other_noise:
+        usual["the other runs"] = np.min(other_noise, axis=0)
     for against, sizes in usual.items():
-        told = sizes > _DIGITS * digits
-        if told.any() and (noise[told] < sizes[told] / _COPIED).all():
-            at = int(np.flatnonzero(told)[np.argmax(sizes[told] / np.maximum(noise[told], 1e-300))])
+        resolved = sizes > _DIGITS * digits
+        if resolved.any() and (noise[resolved] < sizes[resolved] / _COPIED).all():
+            at = int(
+                np.flatnonzero(resolved)[np.argmax(sizes[resolved] / np.maximum(noise[resolved], 1e-300))]
+            )
             return CopiedRuns(
                 factor=factor, runs=(float(names[first]), float(names[second])),
                 indication=session.indications[at], apart=float(noise[at]), usual=float(sizes[at]),
@@ -206,18 +210,18 @@ def _rows(session: Session, load: LoadResult) -> SessionRows | None:
 
 def _of_groups(group: NDArray[np.int64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return columns (rows, k) for each group by itself (rows, k x groups)."""
-    own = group[:, None] == np.arange(int(group.max()) + 1)
-    return np.asarray((columns[:, :, None] * own[:, None, :]).reshape(len(group), -1), dtype=np.float64)
+    member = group[:, None] == np.arange(int(group.max()) + 1)
+    return np.asarray((columns[:, :, None] * member[:, None, :]).reshape(len(group), -1), dtype=np.float64)
 
 
-def _left(design: NDArray[np.float64], load: NDArray[np.float64]) -> tuple[float, int]:
+def _squares_left(design: NDArray[np.float64], load: NDArray[np.float64]) -> tuple[float, int]:
     """Return the squares that a design leaves of loads, and its rank."""
     q = _orthonormal(design)
-    rest = load - q @ (q.T @ load)
-    return float(rest @ rest), q.shape[1]
+    residual = load - q @ (q.T @ load)
+    return float(residual @ residual), q.shape[1]
 
 
-def _rest(design: NDArray[np.float64], load: NDArray[np.float64]) -> NDArray[np.float64]:
+def _residual(design: NDArray[np.float64], load: NDArray[np.float64]) -> NDArray[np.float64]:
     q = _orthonormal(design)
     return np.asarray(load - q @ (q.T @ load))
 
@@ -229,7 +233,7 @@ def _orthonormal(design: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _rms(design: NDArray[np.float64], load: NDArray[np.float64]) -> float:
-    return float(np.sqrt(_left(design, load)[0] / (len(load) - design.shape[1])))
+    return float(np.sqrt(_squares_left(design, load)[0] / (len(load) - design.shape[1])))
 
 
 def _leverage(design: NDArray[np.float64], at: NDArray[np.float64]) -> float:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.read import Session
 
 _APART = 0.05  # runs of one instrument differ by less
-_LEFT = 0.1  # of the residuals: a scale that leaves more explains something else
-_TOLD = 0.02  # least singular value of an equation and factors that the runs tell apart
+_LARGEST_SHARE = 0.1  # of the residuals: a scale that leaves more explains something else
+_LEAST_SINGULAR = 0.02  # least singular value of an equation and factors that the runs tell apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +57,7 @@ def run_scales(session: Session, load: LoadResult) -> tuple[RunScale, ...]:
     agree = (np.abs(scale[:, None] / scale - 1) < _APART).sum(axis=1)
     usual = int(np.argmax(agree))
     ratio = scale / scale[usual]
-    if _rms(design, reference / ratio[group]) > _LEFT * _rms(design, reference):
+    if _rms(design, reference / ratio[group]) > _LARGEST_SHARE * _rms(design, reference):
         return ()
     number = session.table.rotation if factor == "mounting" else session.table.run
     names = np.unique(group if number is None else number)
@@ -92,12 +92,12 @@ def _scales(
         return None
     solution, _, _, singular = np.linalg.lstsq(matrix / length, np.where(group == 0, load, 0.0), rcond=None)
     inverse = (solution / length)[design.shape[1] :]
-    if singular[-1] < _TOLD or not (inverse > 0).all():
+    if singular[-1] < _LEAST_SINGULAR or not (inverse > 0).all():
         return None
     return np.asarray(np.concatenate([[1.0], 1 / inverse]), dtype=np.float64)
 
 
 def _rms(design: NDArray[np.float64], load: NDArray[np.float64]) -> float:
     """Return what an equation leaves of loads, by their size."""
-    rest = load - design @ np.linalg.lstsq(design, load, rcond=None)[0]
-    return float(np.linalg.norm(rest) / np.linalg.norm(load))
+    residual = load - design @ np.linalg.lstsq(design, load, rcond=None)[0]
+    return float(np.linalg.norm(residual) / np.linalg.norm(load))

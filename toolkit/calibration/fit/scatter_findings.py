@@ -132,12 +132,12 @@ def difference_findings(fit: SessionFit) -> list[Finding]:
         )
         findings.append(Finding(rule="run-apart", where=name, message=message, level="error"))
     if moved:
-        _, most = max(moved, key=lambda one: one[1].size)
+        _, largest = max(moved, key=lambda pair: pair[1].size)
         factor = groups_of(session.table, session.zero)[0]
         message = (
-            f"gains of single cells differ from {factor} to {factor} by {100 * most.size:.2g} % (F = "
-            f"{most.F:.3g} with {most.dof[0]} and {most.dof[1]} degrees of freedom, p = "
-            f"{most.probability:.1g}), beyond the one gain of each load and {factor} that the covariance "
+            f"gains of single cells differ from {factor} to {factor} by {100 * largest.size:.2g} % (F = "
+            f"{largest.F:.3g} with {largest.dof[0]} and {largest.dof[1]} degrees of freedom, p = "
+            f"{largest.probability:.1g}), beyond the one gain of each load and {factor} that the covariance "
             "holds: coefficients and loads are less certain than stated. Look at the excitation and the "
             "amplifier of each cell"
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -325,7 +324,7 @@ def load_errors(session: Session, setting: LoadSetting) -> KnownErrors:
 def session_statements(session: Session) -> Statements:
     """Return what a session states beside its data, typed."""
     return parse_statements(
-        json.loads(session.settings),
+        session.settings,
         indications={cell.name: cell.unit for cell in session.cells},
         loads={load.name: load.unit for load in session.loads},
         largest={load.name: float(abs(session.table.column(load.name)).max()) for load in session.loads},

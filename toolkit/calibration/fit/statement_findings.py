@@ -47,11 +47,11 @@ def statement_findings(fit: SessionFit) -> list[Finding]:
     findings += _resolutions(fit)
     wrong = direction_conflicts(session.table, [load.name for load in session.loads])
     if wrong:
-        named = ", ".join(str(row) for row in wrong[:_MOST_NAMED])
-        more = f" and {len(wrong) - _MOST_NAMED} more" if len(wrong) > _MOST_NAMED else ""
+        row_list = ", ".join(str(row) for row in wrong[:_MOST_NAMED])
+        further = f" and {len(wrong) - _MOST_NAMED} more" if len(wrong) > _MOST_NAMED else ""
         message = (
-            f"the load falls through rows labelled up, or rises through rows labelled down: rows {named}"
-            f"{more}; the labels are wrong, or the rows are not in the order of loading. Reversibility is "
+            f"the load falls through rows labelled up, or rises through rows labelled down: rows {row_list}"
+            f"{further}; the labels are wrong, or the rows are not in the order of loading. Reversibility is "
             "evaluated by these labels"
         )
         findings.append(Finding(rule="direction", where=where, message=message))

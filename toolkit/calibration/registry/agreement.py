@@ -117,23 +117,24 @@ def check_inputs(record: CalibrationRecord) -> None:
 def _entries(
     record: CalibrationRecord, settings: Settings, table: Table, file: str, roles: set[str]
 ) -> Iterator[tuple[str, object, object]]:
-    yield "instrument", record.instrument, settings.instrument
-    yield "date", record.date, settings.date.isoformat()
-    yield "entered_by", record.entered_by, settings.operator
-    yield "zero", record.zero, settings.zero
-    yield "indications", record.indications, settings.indications
+    entries = settings.entries
+    yield "instrument", record.instrument, entries.instrument
+    yield "date", record.date, entries.date
+    yield "entered_by", record.entered_by, entries.operator
+    yield "zero", record.zero, entries.fit_zero
+    yield "indications", record.indications, entries.indications
     yield "serial", tuple(cell.serial for cell in record.cells), settings.serials
-    yield "loads", tuple(load.load for load in record.loads), settings.loads
+    yield "loads", tuple(load.load for load in record.loads), entries.loads
     for load in record.loads:
         yield f"{load.load}, terms", load.terms, settings.terms
-        yield f"{load.load}, method", load.method, settings.method
+        yield f"{load.load}, method", load.method, entries.method
         largest = float(np.abs(table.column(load.load)).max())
         tolerance = settings.tolerance(load.load, table.unit(load.load), largest, file)
         yield f"{load.load}, tolerance", load.tolerance, tolerance
     if record.settings != settings.text:
         yield _first_difference(record.settings, settings.text)
     hashes = {file_entry.role: file_entry.sha256 for file_entry in record.data}
-    if settings.check is not None or (settings.check_table and "check" in hashes):
+    if entries.check_file is not None or (entries.check is not None and "check" in hashes):
         roles = {*roles, "check"}
     yield "files", (*sorted(hashes), len(record.data)), (*sorted(roles), len(roles))
 

@@ -156,7 +156,7 @@ def calibrate(
         )
         # What a gate says takes the place of the same in the session's own words: its level is the gate's.
         by_gates = {(result.rule, result.where): result.finding() for result in judged.results}
-        findings = tuple(by_gates.pop((one.rule, one.where), one) for one in findings)
+        findings = tuple(by_gates.pop((entry.rule, entry.where), entry) for entry in findings)
         findings += tuple(by_gates.values())
     return Candidate(
         record=record,

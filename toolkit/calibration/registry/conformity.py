@@ -119,8 +119,10 @@ def _failed(
     if failed:
         problem = "the record fails gates that an approval passes"
         places = [f"{result.rule} ({result.where}: {result.message})" for result in failed]
-        more = f" and {len(places) - _PLACES} more" if len(places) > _PLACES else ""
-        return _unapprovable(record, problem, f"{'; '.join(places[:_PLACES])}{more}", "a record that passes")
+        further = f" and {len(places) - _PLACES} more" if len(places) > _PLACES else ""
+        return _unapprovable(
+            record, problem, f"{'; '.join(places[:_PLACES])}{further}", "a record that passes"
+        )
     missing = [term for term in unverifiable(record, check, loads) if term not in entry.unverifiable]
     if missing:
         problem = "the approval does not name what no check load verifies"

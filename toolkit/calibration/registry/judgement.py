@@ -7,9 +7,8 @@ as findings; an approval is blocked by what blocks or asks, and its ledger entry
 from __future__ import annotations
 
 import datetime as dt
-import json
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -31,7 +30,9 @@ from toolkit.calibration.registry.response import (
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check, stored_loads, stored_session
 from toolkit.calibration.session.readings import PolarityReading, polarity_readings
-from toolkit.calibration.session.statements import scope_of, statements_of
+from toolkit.calibration.session.session_file import StatedEntries
+from toolkit.calibration.session.statements import entries_of, statements_of
+from toolkit.declared import build
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, parse_toml, reads_as_number
 from toolkit.inputs import SETTINGS_FILE, read_input
@@ -390,15 +391,15 @@ def _refused_by_session(registry: Records, record: CalibrationRecord) -> tuple[G
 
 def _reasons(record: CalibrationRecord, reason: str | None) -> dict[str, str]:
     """Return why each cell was replaced: by its session, else by the approval."""
-    cells: Mapping[str, Mapping[str, object]] = json.loads(record.settings).get("cells", {})
-    stated = {name: cells.get(name, {}).get("replacement") or reason for name in record.indications}
-    return {name: str(text) for name, text in stated.items() if text}
+    entries = entries_of(record)
+    stated = {name: entries.cell(name).replacement or reason for name in record.indications}
+    return {name: text for name, text in stated.items() if text}
 
 
 def session_readings(record: CalibrationRecord) -> tuple[PolarityReading, ...]:
     """Return the polarity readings that a record's session holds; a legacy record has none."""
-    entries = json.loads(record.settings).get("polarity", []) if record.kind == "fit" else []
-    return polarity_readings(entries, scope_of(record)) if entries else ()
+    statements = statements_of(record)
+    return polarity_readings(statements.entries.polarity, statements.scope)
 
 
 def read_polarity_file(path: Path, record: CalibrationRecord) -> tuple[PolarityReading, ...]:
@@ -413,7 +414,9 @@ def read_polarity_file(path: Path, record: CalibrationRecord) -> tuple[PolarityR
 
     raw = parse_toml(read_input(path, SETTINGS_FILE), where=path)
     check_keys(raw, ("schema", "polarity"), where=path)
-    readings = polarity_readings(raw.get("polarity", []), dataclasses.replace(scope_of(record), where=path))
+    stated = build(StatedEntries, raw, path).polarity
+    scope = dataclasses.replace(statements_of(record).scope, where=path)
+    readings = polarity_readings(stated, scope)
     if not readings:
         raise ConfigError(
             "a file of polarity readings has none", where=path, got="no [[polarity]]",

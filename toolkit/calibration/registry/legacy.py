@@ -12,7 +12,8 @@ from typing import Annotated, ClassVar, Literal
 
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, canonical
 from toolkit.calibration.registry.refit import polarity
-from toolkit.calibration.session.settings import INSTRUMENT, INSTRUMENT_FORM, wrong
+from toolkit.calibration.session.session_file import INSTRUMENT, INSTRUMENT_FORM
+from toolkit.calibration.session.settings import wrong
 from toolkit.calibration.session.statement_checks import check_load_unit
 from toolkit.calibration.terms import INTERCEPT, NAME, parse_term
 from toolkit.declared import Day, Entry, Fault, Format, Keyed, Size, Text, UnitName, plain, read_text

@@ -113,7 +113,7 @@ def _wait(path: Path, until: float | None = None) -> None:
             raise RegistryError(
                 "another process writes to this registry",
                 where=path,
-                got=_told(holder),
+                got=_holder_text(holder),
                 expected="no lock file, or one whose process has ended",
                 next_step="wait for it; where that process has certainly ended, remove the lock file; "
                 "nothing was changed",
@@ -188,7 +188,7 @@ def _processes() -> str | None:
         return None
 
 
-def _told(holder: bytes) -> str:
+def _holder_text(holder: bytes) -> str:
     try:
         body = json.loads(holder)
         return f"a lock file of process {body['pid']} on {body['host']}, since {body['time']}"

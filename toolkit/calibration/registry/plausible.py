@@ -204,11 +204,11 @@ def _intercept(record: CalibrationRecord, load: LoadFit, loads: Table) -> list[G
     if INTERCEPT not in load.terms or not load.covariance:
         return []
     at = load.terms.index(INTERCEPT)
-    value, own = load.coefficients[at], load.standard_errors[at]
-    if abs(value) <= max(AT_ZERO * _limit(load), _SIGMAS * own):
+    value, standard_error = load.coefficients[at], load.standard_errors[at]
+    if abs(value) <= max(AT_ZERO * _limit(load), _SIGMAS * standard_error):
         return []  # whatever reversal and misfit add
     scatter = scatter_of(record, loads, load)
-    u = math.hypot(own, scatter.reversal, scatter.misfit)
+    u = math.hypot(standard_error, scatter.reversal, scatter.misfit)
     if abs(value) <= _SIGMAS * u:
         return []
     message = (

@@ -285,7 +285,8 @@ class Registry:
         best = _best(ledger, on, known_on)
         if best is None:
             standings = [
-                _told(status_of(record_id, ledger.of(record_id), known_on)) for record_id in ledger.entered()
+                _status_text(status_of(record_id, ledger.of(record_id), known_on))
+                for record_id in ledger.entered()
             ]
             raise RegistryError(
                 f"no calibration of {instrument} is in force on {on.isoformat()}",
@@ -372,7 +373,7 @@ def _best(ledger: Ledger, on: date, known_on: date) -> str | None:
     return None if best is None else best[3]
 
 
-def _told(status: RecordStatus) -> str:
+def _status_text(status: RecordStatus) -> str:
     if status.in_force_from is None:
         return f"{status.id} ({status.state})"
     void = "" if status.void_from is None else f", void from {status.void_from.isoformat()}"

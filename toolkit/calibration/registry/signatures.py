@@ -122,10 +122,9 @@ def unproved(
         return None
     for number, place in enumerate(places, start=1):
         if place is not None and _end(ledger, place[0]) != place[1]:
-            there = "" if number == 1 else f" for version {number}"
-            return (
-                f"its first {place[0]} lines are not those that were there when people were enrolled{there}"
-            )
+            version = "" if number == 1 else f" for version {number}"
+            lines = f"its first {place[0]} lines"
+            return f"{lines} are not those that were there when people were enrolled{version}"
     unsigned_lines = places[0][0] if places and places[0] is not None else 0
     tree = Growing()
     for entry, text in zip(ledger.entries, ledger.lines, strict=True):

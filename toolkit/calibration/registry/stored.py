@@ -20,7 +20,9 @@ from toolkit.calibration.session.indications import (
 )
 from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.read import Session, read_session
+from toolkit.calibration.session.session_file import session_entries
 from toolkit.calibration.session.settings import dcc_name, parse_session
+from toolkit.calibration.session.statements import entries_of
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import real_path
@@ -111,7 +113,7 @@ def _as_fitted(record: CalibrationRecord, table: Table, where: Path) -> Table:
 def _bridges(record: CalibrationRecord, names: list[str]) -> dict[str, Bridge]:
     if not names:
         return {}
-    return bridges_of(json.loads(record.settings).get("cells", {}), names, where=record.id)
+    return bridges_of(entries_of(record), names, where=record.id)
 
 
 def bad_record(record_id: str, where: object, actual: object, expected: object, rule: str) -> RecordError:
@@ -157,13 +159,11 @@ def stored_session(registry: Path, record: CalibrationRecord) -> Session:
             rule="data",
         )
     raw = parse_session(files["session"], where=folder / f"{record.id}.session.toml", entered=True)
-    entry = raw.get("check")
-    check = (
-        entry if isinstance(entry, str) else (entry or {}).get("file", (entry or {}).get("data", "check.csv"))
-    )
+    entries = session_entries(raw, where=folder / f"{record.id}.session.toml")
+    check = entries.check_file or "check.csv"
     with tempfile.TemporaryDirectory() as place:
         # The session names its files as they were called when it was recorded.
-        for name, role in ((raw["data"], "loads"), (check, "check"), (dcc_name(raw), "dcc")):
+        for name, role in ((entries.data, "loads"), (check, "check"), (dcc_name(raw), "dcc")):
             if role in files:
                 target = real_path(Path(place, str(name)))
                 if not target.is_relative_to(real_path(Path(place))):

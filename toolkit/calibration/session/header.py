@@ -152,11 +152,13 @@ def _read_head(header: tuple[str, ...], layout: Wanted, where: str) -> Head:
 @lru_cache(maxsize=1024)
 def _split(text: str, layout: Wanted) -> tuple[str, str | None]:
     """Return a header's name, as the session writes it where it is one of its, and its unit."""
-    name, stated = split_header(" ".join(text.split()), lambda name: _named(name, layout) in layout.names)
-    return _named(name, layout), stated
+    name, stated = split_header(
+        " ".join(text.split()), lambda name: _session_name(name, layout) in layout.names
+    )
+    return _session_name(name, layout), stated
 
 
-def _named(name: str, layout: Wanted) -> str:
+def _session_name(name: str, layout: Wanted) -> str:
     name = name.strip()
     if name in layout.names:
         return name

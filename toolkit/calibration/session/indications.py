@@ -28,18 +28,18 @@ import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.settings import quantity, wrong
+from toolkit.calibration.session.session_file import Amount
 from toolkit.errors import SessionError
-from toolkit.files import check_keys, is_number
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.calibration.session.session_file import CellEntries, Stated, StatedEntries
     from toolkit.calibration.session.table import Table
 
 
@@ -92,54 +92,34 @@ class Bridge:
                 return stated.factor / expected.factor / self.excitation_V
         return si_scale(text, expected.dimension, where=where) / expected.factor
 
-    def stated(self, entry: object, key: str, *, column: str, target: str) -> float:
+    def stated(self, entry: Stated, key: str, *, column: str, target: str) -> float:
         """Return a number in the target unit: ``{ value, unit }``, or a bare number in the column's unit.
 
         Raises
         ------
-        ConfigError, UnitError
-            it is no finite number, its unit is unknown or of a dimension that does not lead to the target
+        UnitError
+            its unit is unknown, or of a dimension that does not lead to the target
         """
-        place = f"{self.where}: {key}"
-        text: str = column
-        value = entry
-        if isinstance(entry, dict):
-            unit_text = entry.get("unit")
-            # For its checks alone: the number must keep its last digit where no unit is changed.
-            quantity(
-                entry, unit(unit_text, where=place).dimension if isinstance(unit_text, str) else "", place
-            )
-            text, value = str(unit_text), entry["value"]
-        if not is_number(value):
-            raise wrong(self.where, key, entry, f"a finite number in {column}, or {{ value, unit }}")
-        return value * self.factor(text, target, where=place)
+        text, value = (entry.unit, entry.value) if isinstance(entry, Amount) else (column, entry)
+        return value * self.factor(text, target, where=f"{self.where}: {key}")
 
 
-def bridge_of(name: str, cell: Mapping[str, Any], *, where: object) -> Bridge:
-    """Read the excitation and the scale of ``[cells.NAME]``.
+def bridge_of(name: str, cell: CellEntries, *, where: object) -> Bridge:
+    """Return what excitation and scale of ``[cells.NAME]`` say.
 
     Raises
     ------
-    ConfigError, UnitError
-        one of them is not positive, or in a unit that a bridge cannot have
+    UnitError
+        the scale is in a unit that a bridge cannot have
     """
-    excitation = scale = None
-    if "excitation" in cell:
-        entry = cell["excitation"]
-        excitation = (
-            quantity(entry, "voltage", f"{where}: cells.{name}.excitation")
-            if isinstance(entry, dict)
-            else entry
-        )
-        excitation = _positive(excitation, entry, f"cells.{name}.excitation", where, "volts above zero")
-    if "scale" in cell:
-        scale = _scale(cell["scale"], f"cells.{name}.scale", where)
+    scale = _scale(cell.scale, f"{where}: cells.{name}.scale") if isinstance(cell.scale, Amount) else None
+    excitation = None if cell.excitation is None else float(cell.excitation)
     return Bridge(name=name, where=str(where), excitation_V=excitation, scale=scale)
 
 
-def bridges_of(cells: Mapping[str, Any], indications: Sequence[str], *, where: object) -> dict[str, Bridge]:
+def bridges_of(entries: StatedEntries, indications: Sequence[str], *, where: object) -> dict[str, Bridge]:
     """Return the bridges of indications by name, from a session's ``[cells]``."""
-    return {name: bridge_of(name, cells.get(name, {}), where=where) for name in indications}
+    return {name: bridge_of(name, entries.cell(name), where=where) for name in indications}
 
 
 def fit_units(table: Table, bridges: Mapping[str, Bridge]) -> dict[str, str]:
@@ -176,30 +156,11 @@ def per(text: str, suffix: re.Pattern[str] = _PER_COUNT) -> str:
     return suffix.sub("", text)
 
 
-def _scale(entry: object, key: str, where: object) -> tuple[float, str] | None:
-    stated = isinstance(entry, dict)
-    if isinstance(entry, dict):
-        check_keys(entry, ("value", "unit"), where=f"{where}: {key}")
-    value = _positive(
-        entry.get("value") if isinstance(entry, dict) else entry, entry, key, where,
-        'a number above zero, or { value, unit = "mV/V" } of one count; a reversed bridge shows in the '
-        "sign of its coefficient, which has a gate of its own",
-    )  # fmt: skip
-    if not stated or not isinstance(entry, dict):
-        return None
-    text = entry.get("unit")
-    if not isinstance(text, str):
-        raise wrong(where, f"{key}.unit", text, "a unit such as 'mV/V'", "no-unit")
-    found = unit(per(text), where=f"{where}: {key}")
-    if not (found.dimension in (RATIO_DIMENSION, "force", "moment") or _is_voltage(found.text)):
-        si_scale(found.text, RATIO_DIMENSION, where=f"{where}: {key}")
-    return value, found.text
-
-
-def _positive(value: object, entry: object, key: str, where: object, expected: str) -> float:
-    if not is_number(value) or not value > 0:
-        raise wrong(where, key, entry, expected)
-    return float(value)
+def _scale(entry: Amount, where: str) -> tuple[float, str]:
+    scale = unit(per(entry.unit), where=where)
+    if not (scale.dimension in (RATIO_DIMENSION, "force", "moment") or _is_voltage(scale.text)):
+        si_scale(scale.text, RATIO_DIMENSION, where=where)
+    return entry.value, scale.text
 
 
 def _is_voltage(text: str) -> bool:
@@ -235,9 +196,9 @@ def without_read_zeros(
     unloaded = (np.abs(applied) <= _UNLOADED * size).all(axis=1)
     missing = sorted(set(run.tolist()) - set(run[unloaded].tolist()))
     if missing:
-        which = "" if check.run is None else f" of run {np.unique(check.run)[missing[0]]:g}"
+        run_text = "" if check.run is None else f" of run {np.unique(check.run)[missing[0]]:g}"
         raise SessionError(
-            f'the check loads{which} have no zero, and with zero = "run" each run has its own',
+            f'the check loads{run_text} have no zero, and with zero = "run" each run has its own',
             where=where, got="no row with every load at zero",
             expected="at least one row at zero load in each run of the check file",
             next_step="read the unloaded cells with the check loads and add that row; nothing was written",

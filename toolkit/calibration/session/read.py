@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.cells import FILES
@@ -19,15 +19,13 @@ from toolkit.calibration.session.indications import (
     without_run_zeros,
 )
 from toolkit.calibration.session.known_errors import group_column, row_columns
-from toolkit.calibration.session.session_file import session_faults
+from toolkit.calibration.session.session_file import CellEntries, SessionFile, session_faults
 from toolkit.calibration.session.settings import (
     Settings,
-    date_of,
     dcc_name,
     inputs_hash,
     parse_session,
     settings_of,
-    wrong,
 )
 from toolkit.calibration.session.statement_checks import check_columns, check_statements, check_weights
 from toolkit.calibration.session.table import Table, read_table
@@ -132,63 +130,61 @@ def read_session(path: Path, *, entered: bool = False, standards: Standards | No
     if not entered:
         refuse(session_faults(raw), Source(where=path, text=session_bytes.decode("utf-8-sig")))
     dcc_bytes = None
-    if dcc_name(raw) is not None:
+    if (certificate := dcc_name(raw)) is not None:
         # Few sessions have one: the others do not wait for cryptography.
         from toolkit.calibration.dcc.standard import Standards, check_covered, with_standard
 
         settings_of(raw, where=path)  # its faults first, in the session's own words
-        dcc_bytes = _file(path, dcc_name(raw), "reference.dcc")
+        dcc_bytes = _file(path, certificate, "reference.dcc")
         raw = with_standard(
             raw, dcc_bytes, where=path, standards=None if entered else standards or Standards()
         )
     settings = settings_of(raw, where=path)
-    loads, indications = settings.loads, settings.indications
-    data_bytes = _file(path, raw.get("data"), "data")
+    entries = settings.entries
+    loads, indications = entries.loads, entries.indications
+    data_bytes = _file(path, entries.data, "data")
     uncertainties = row_columns(loads)
     labels = group_column(raw.get("reference", {}))
     recorded = read_table(
         data_bytes,
-        where=path.parent / str(raw["data"]),
+        where=path.parent / entries.data,
         required=[*indications, *loads],
         optional=uncertainties,
         labels=labels,
     )
     if not entered:
         for name, texts in recorded.labels:
-            check_entries(texts, where=f"{path.parent / str(raw['data'])}, column {name}")
-    if settings.method == "wls":
+            check_entries(texts, where=f"{path.parent / entries.data}, column {name}")
+    if entries.method == "wls":
         check_weights(recorded, loads, path)
     check_columns(recorded, loads, path)
-    check_statements(raw, recorded, loads, path)
-    bridges = bridges_of(raw.get("cells", {}), indications, where=path)
+    check_statements(entries, recorded, path)
+    bridges = bridges_of(entries, indications, where=path)
     table = converted(recorded, bridges, fit_units(recorded, bridges), where=path)
-    if settings.zero == "run":
+    if entries.fit_zero == "run":
         table = without_run_zeros(table, indications, loads)
-    check_name = _check_name(settings, path)
+    check_name = _check_name(entries, path)
     check_bytes = None if check_name is None else _file(path, check_name, "check")
     check = None
     if check_bytes is not None:
-        check = _check_table(check_bytes, path.parent / str(check_name), table, bridges, settings, labels)
-    reference = raw.get("reference", {})
+        check = _check_table(check_bytes, path.parent / str(check_name), table, bridges, entries, labels)
     if dcc_bytes is not None:
-        check_covered(reference, (table, check), path)
+        check_covered(raw["reference"], (table, check), path)
+    due = None if entries.reference is None else entries.reference.due
     return Session(
         path=path,
-        instrument=settings.instrument,
+        instrument=entries.instrument,
         date=settings.date,
-        operator=settings.operator,
-        cells=tuple(
-            _cell(bridges[name], serial, raw.get("cells", {}).get(name, {}), recorded.unit(name))
-            for name, serial in zip(indications, settings.serials, strict=True)
-        ),
+        operator=entries.operator,
+        cells=tuple(_cell(bridges[name], entries.cell(name), recorded.unit(name)) for name in indications),
         loads=tuple(_load(name, settings, table, path) for name in loads),
         terms=settings.terms,
-        model=settings.model,
+        model=entries.model,
         degree=settings.degree,
-        method=settings.method,
-        zero=settings.zero,
-        phase=settings.phase,
-        reference_due=None if "due" not in reference else date_of(reference["due"], "reference.due", path),
+        method=entries.method,
+        zero=entries.fit_zero,
+        phase=entries.phase,
+        reference_due=None if due is None else dt.date.fromisoformat(due),
         settings=settings.text,
         table=table,
         check=check,
@@ -199,11 +195,11 @@ def read_session(path: Path, *, entered: bool = False, standards: Standards | No
     )
 
 
-def _check_name(settings: Settings, path: Path) -> str | None:
+def _check_name(entries: SessionFile, path: Path) -> str | None:
     # A table [check] without a name means check.csv, or check.xlsx, beside the session.
-    if settings.check is None and settings.check_table:
+    if entries.check_file is None and entries.check is not None:
         return next((name for name in ("check.csv", "check.xlsx") if (path.parent / name).is_file()), None)
-    return settings.check
+    return entries.check_file
 
 
 def _check_table(
@@ -211,21 +207,21 @@ def _check_table(
     where: Path,
     table: Table,
     bridges: Mapping[str, Bridge],
-    settings: Settings,
+    entries: SessionFile,
     labels: tuple[str, ...],
 ) -> Table:
     check = read_table(
         data,
         where=where,
-        required=[*settings.indications, *settings.loads],
-        passed=row_columns(settings.loads, labels),
+        required=[*entries.indications, *entries.loads],
+        passed=row_columns(entries.loads, labels),
         runs=False,
     )
     # The check file may be in other units than the data; it is brought to those of the fit.
     units = {name: table.unit(name) for name in check.names}
     check = converted(check, bridges, units, where=where).in_units(units)
-    if settings.zero == "run":
-        check = without_read_zeros(check, settings.indications, settings.loads, where)
+    if entries.fit_zero == "run":
+        check = without_read_zeros(check, entries.indications, entries.loads, where)
     return check
 
 
@@ -234,23 +230,20 @@ def _load(name: str, settings: Settings, table: Table, path: Path) -> LoadSettin
     return LoadSetting(name=name, unit=text, tolerance=settings.tolerance(name, text, largest, path))
 
 
-def _cell(bridge: Bridge, serial: str | None, entry: Mapping[str, Any], column: str) -> CellSetting:
+def _cell(bridge: Bridge, cell: CellEntries, column: str) -> CellSetting:
     text, key = bridge.unit(column), f"cells.{bridge.name}.resolution"
-    resolution = (
-        bridge.stated(entry["resolution"], key, column=column, target=text) if "resolution" in entry else None
-    )
+    stated = cell.resolution
+    resolution = None if stated is None else bridge.stated(stated, key, column=column, target=text)
     return CellSetting(
         name=bridge.name,
         unit=text,
-        serial=serial,
+        serial=cell.serial,
         resolution=resolution,
         column_unit=None if column == text else column,
     )
 
 
-def _file(path: Path, name: object, key: str) -> bytes:
-    if not isinstance(name, str) or not name:
-        raise wrong(path, key, name, f'the name of a file, such as {key} = "{key}.csv" or "{key}.xlsx"')
+def _file(path: Path, name: str, key: str) -> bytes:
     target = path.parent / name
     try:
         # Links too: what an error quotes of a file must never be another one than the session's own.

@@ -30,19 +30,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
-from toolkit.calibration.session.indications import RATIO, RATIO_DIMENSION, Bridge
-from toolkit.calibration.session.settings import quantity, wrong
+from toolkit.calibration.session.indications import RATIO, RATIO_DIMENSION, Bridge, bridges_of
+from toolkit.calibration.session.session_file import Amount
+from toolkit.calibration.session.settings import wrong
+from toolkit.declared import Quantity
 from toolkit.errors import UnitError
-from toolkit.files import check_keys, is_number
+from toolkit.files import check_keys
 from toolkit.units import unit
 
+if TYPE_CHECKING:
+    from toolkit.calibration.session.session_file import (
+        CellEntries,
+        Creep,
+        Polarity,
+        Reading,
+        Stated,
+        StatedEntries,
+    )
+
+    Readings = Mapping[str, Stated] | tuple[Stated, ...] | Stated
+
 SHUNT_TOLERANCE_PERCENT = 0.1
-_ZERO, _CREEP = ("when", "values"), ("load", "seconds", "value")
-AGREEMENT = 0.2
-_LARGEST_AGREEMENT = 0.5  # beyond it a reading of half the size, or of half again, would agree
-_KEYS = ("load", "value", "indications", "zero", "tolerance")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,9 +73,18 @@ class Scope:
         """Return the unit in which an indication is fitted."""
         return self.bridges[name].unit(self.columns[name])
 
-    def value(self, name: str, entry: object, key: str) -> float:
+    def value(self, name: str, entry: Stated, key: str) -> float:
         """Return a reading of an indication in the unit of the fit."""
         return self.bridges[name].stated(entry, key, column=self.columns[name], target=self.unit(name))
+
+
+def scope_of_entries(
+    entries: StatedEntries, *, columns: Mapping[str, str], loads: Mapping[str, str], where: object
+) -> Scope:
+    """Return what a session's entries are read against; units of columns and loads by name."""
+    return Scope(
+        bridges=bridges_of(entries, tuple(columns), where=where), columns=columns, loads=loads, where=where
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,162 +126,137 @@ class ShuntEntry:
     tolerance_percent: float
 
 
-def zero_entries(entries: object, scope: Scope) -> tuple[ZeroEntry, ...]:
-    """Read [[zero]].
+def zero_entries(entries: Sequence[Reading], scope: Scope) -> tuple[ZeroEntry, ...]:
+    """Return the readings of [[zero]] in the units of the fit.
 
     Raises
     ------
     ConfigError, UnitError
-        an unknown key or cell, a value that is no number, a unit that does not lead to the indication's
+        not a reading of each indication, a unit that does not lead to the indication's
     """
-    made = []
-    for at, entry in enumerate(_tables(entries, "zero", _ZERO, scope), start=1):
-        place = f"zero {at}"
-        when = entry.get("when")
-        if not isinstance(when, str) or not when.strip():
-            raise wrong(scope.where, f"{place}.when", when, 'a text: "before", "after", "run 1", "shunt"')
-        values = _values(entry.get("values"), f"{place}.values", scope)
+    zeros = []
+    for at, entry in enumerate(entries, start=1):
+        values = _values(entry.values, f"zero[{at}].values", scope)
         if not values:
             expected = f"{{ {scope.indications[0]} = number }}, or a list of {len(scope.indications)} numbers"
-            raise wrong(scope.where, f"{place}.values", entry.get("values"), expected)
-        made.append(ZeroEntry(when=when.strip(), values=values))
-    return tuple(made)
+            raise wrong(scope.where, f"zero[{at}].values", entry.values, expected)
+        zeros.append(ZeroEntry(when=entry.when.strip(), values=values))
+    return tuple(zeros)
 
 
-def creep_entries(entries: object, scope: Scope) -> tuple[CreepEntry, ...]:
-    """Read [[creep]].
+def creep_entries(entries: Sequence[Creep], scope: Scope) -> tuple[CreepEntry, ...]:
+    """Return the readings of [[creep]] in the units of the fit.
 
     Raises
     ------
     ConfigError, UnitError
-        as `zero_entries`; an unknown load, seconds below zero, two readings of one moment
+        as `zero_entries`; an unknown load, two readings of one moment
     """
-    made: list[CreepEntry] = []
+    readings: list[CreepEntry] = []
     times = set()
-    for at, entry in enumerate(_tables(entries, "creep", _CREEP, scope), start=1):
-        place = f"creep {at}"
-        load, unloaded = _load(entry.get("load"), f"{place}.load", scope)
-        seconds = entry.get("seconds")
-        if isinstance(seconds, dict):
-            seconds = quantity(seconds, "time", f"{scope.where}: {place}.seconds")
-        if not is_number(seconds) or not seconds >= 0:
-            raise wrong(scope.where, f"{place}.seconds", entry.get("seconds"), "seconds, zero or more")
-        if entry.get("value") is None:
-            raise wrong(scope.where, f"{place}.value", None, f"{{ {scope.indications[0]} = number }}")
-        applied = _shown(entry["value"], entry.get("load"), f"{place}.value", scope)
-        values = () if applied else _values(entry["value"], f"{place}.value", scope)
-        for name, _ in (*values, *([applied] if applied else ())):
-            if (load, name, float(seconds)) in times:
-                raise wrong(scope.where, f"{place}.seconds", seconds, f"one reading of {name} at a time")
-            times.add((load, name, float(seconds)))
-        made.append(
-            CreepEntry(load=load, unloaded=unloaded, seconds=float(seconds), values=values, shown=applied)
+    for at, entry in enumerate(entries, start=1):
+        place, seconds = f"creep[{at}]", float(entry.seconds)
+        load, unloaded = _load(entry.load, f"{place}.load", scope)
+        load_reading = _load_reading(entry.value, entry.load, f"{place}.value", scope)
+        values = () if load_reading else _values(entry.value, f"{place}.value", scope)
+        for name, _ in (*values, *([load_reading] if load_reading else ())):
+            if (load, name, seconds) in times:
+                raise wrong(
+                    scope.where, f"{place}.seconds", f"{seconds:g}", f"one reading of {name} at a time"
+                )
+            times.add((load, name, seconds))
+        readings.append(
+            CreepEntry(load=load, unloaded=unloaded, seconds=seconds, values=values, shown=load_reading)
         )
-    return tuple(made)
+    return tuple(readings)
 
 
-def shunt_entry(name: str, cell: Mapping[str, Any], scope: Scope) -> ShuntEntry | None:
-    """Read the shunt of ``[cells.NAME]``; None where none is expected.
+def shunt_entry(name: str, cell: CellEntries, scope: Scope) -> ShuntEntry | None:
+    """Return the shunt of ``[cells.NAME]``; None where none is expected.
 
     The step is told as the bridge's output (mV/V) also where the column is scaled to a force; the measured
     one must then be told so too.
 
     Raises
     ------
-    ConfigError, UnitError
-        no finite number, an expected step of zero, a measured one or a tolerance without an expected one
+    UnitError
     """
-    key = f"cells.{name}.shunt_expected"
-    if "shunt_expected" not in cell:
-        if lone := sorted({"shunt_measured", "shunt_tolerance"} & set(cell)):
-            raise wrong(scope.where, key, None, f"the step that {lone[0]} is held against")
+    entry = cell.shunt_expected
+    if entry is None:
         return None
     bridge, column, text = scope.bridges[name], scope.columns[name], scope.unit(name)
-    entry = cell["shunt_expected"]
+    key = f"cells.{name}.shunt_expected"
     try:
         expected = bridge.stated(entry, key, column=column, target=text)
     except UnitError:
-        if unit(entry["unit"], where=f"{scope.where}: {key}").dimension != RATIO_DIMENSION:
+        stated = unit(entry.unit if isinstance(entry, Amount) else column, where=f"{scope.where}: {key}")
+        if stated.dimension != RATIO_DIMENSION:
             raise
         text = RATIO
         expected = bridge.stated(entry, key, column=column, target=text)
-    if expected == 0:
-        raise wrong(scope.where, key, entry, "a step that is not zero")
     measured = None
-    if "shunt_measured" in cell:
+    if cell.shunt_measured is not None:
         measured = bridge.stated(
-            cell["shunt_measured"], f"cells.{name}.shunt_measured", column=column, target=text
+            cell.shunt_measured, f"cells.{name}.shunt_measured", column=column, target=text
         )
-    tolerance = cell.get("shunt_tolerance", SHUNT_TOLERANCE_PERCENT)
-    if isinstance(tolerance, dict):
-        tolerance = 100 * quantity(tolerance, "ratio", f"{scope.where}: cells.{name}.shunt_tolerance")
-    if not is_number(tolerance) or not tolerance > 0:
-        raise wrong(scope.where, f"cells.{name}.shunt_tolerance", tolerance, "per cent, above zero")
-    return ShuntEntry(
-        name=name, unit=text, expected=expected, measured=measured, tolerance_percent=float(tolerance)
-    )
+    tolerance = cell.shunt_tolerance
+    if tolerance is None:
+        percent = SHUNT_TOLERANCE_PERCENT
+    elif isinstance(tolerance, Quantity) and tolerance.unit == "%":
+        percent = float(tolerance.value)
+    else:
+        percent = 100 * tolerance
+    return ShuntEntry(name=name, unit=text, expected=expected, measured=measured, tolerance_percent=percent)
 
 
-def _tables(entries: object, key: str, keys: Sequence[str], scope: Scope) -> list[dict[str, Any]]:
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise wrong(scope.where, key, entries, f"tables [[{key}]] with {', '.join(keys)}")
-    return entries
-
-
-def _values(entry: object, key: str, scope: Scope) -> tuple[tuple[str, float], ...]:
+def _values(entry: Readings, key: str, scope: Scope) -> tuple[tuple[str, float], ...]:
     names = scope.indications
-    if isinstance(entry, dict) and not {"value", "unit"} & set(entry):
-        check_keys(entry, names, where=f"{scope.where}: {key}")
+    by_name: Mapping[str, Stated]
+    if isinstance(entry, Mapping):
         by_name = {name: entry[name] for name in names if name in entry}
-    elif isinstance(entry, list):
+    elif isinstance(entry, tuple):
         if len(entry) != len(names):
-            raise wrong(
-                scope.where, key, f"{len(entry)} values", f"one value each of {', '.join(names)}, in order"
-            )
+            expected = f"one value each of {', '.join(names)}, in order"
+            raise wrong(scope.where, key, f"{len(entry)} values", expected)
         by_name = dict(zip(names, entry, strict=True))
-    elif entry is None or len(names) > 1:
+    elif len(names) > 1:
         return ()
     else:
         by_name = {names[0]: entry}
     return tuple((name, scope.value(name, reading, f"{key}.{name}")) for name, reading in by_name.items())
 
 
-def _shown(value: object, load: object, key: str, scope: Scope) -> tuple[str, float] | None:
+def _load_reading(value: Readings, load: str | Stated, key: str, scope: Scope) -> tuple[str, float] | None:
     name = load if isinstance(load, str) else next(iter(scope.loads)) if len(scope.loads) == 1 else None
     if name is None or name not in scope.loads:
         return None
-    found = unit(scope.loads[name])
-    if isinstance(value, dict) and isinstance(value.get("unit"), str):
+    if isinstance(value, Amount):
         # A force that the indication itself is in stays a reading of the indication.
-        told = unit(value["unit"], where=f"{scope.where}: {key}").dimension
-        if told != found.dimension or told in {
+        stated = unit(value.unit, where=f"{scope.where}: {key}").dimension
+        scale = unit(scope.loads[name])
+        if stated != scale.dimension or stated in {
             unit(scope.unit(indication)).dimension for indication in scope.indications
         }:
             return None
-        value = quantity(value, told, f"{scope.where}: {key}") / found.factor
-    elif isinstance(value, dict | list) or len(scope.indications) == 1:
+        return name, value.si(stated, f"{scope.where}: {key}") / scale.factor
+    if isinstance(value, Mapping | tuple) or len(scope.indications) == 1:
         return None
-    if not is_number(value):
-        raise wrong(scope.where, key, value, "a finite number")
-    return name, float(value)
+    return name, value
 
 
-def _load(entry: object, key: str, scope: Scope) -> tuple[str, bool]:
-    if isinstance(entry, str) and entry in scope.loads:
-        return entry, False
-    value, text = entry, next(iter(scope.loads.values())) if len(scope.loads) == 1 else None
-    if isinstance(entry, dict):
+def _load(entry: str | Stated, key: str, scope: Scope) -> tuple[str, bool]:
+    if isinstance(entry, str):
+        if entry in scope.loads:
+            return entry, False
+        raise wrong(scope.where, key, entry, f"{', '.join(scope.loads)}, a number, or {{ value, unit }}")
+    if isinstance(entry, Amount):
         dimensions = {unit(load).dimension for load in scope.loads.values()}
-        text = entry.get("unit")
-        dimension = unit(text, where=f"{scope.where}: {key}").dimension if isinstance(text, str) else ""
-        if dimension not in dimensions:
-            # Says what is wrong: no unit, no number, or a unit of none of the loads.
-            quantity(entry, sorted(dimensions)[0], f"{scope.where}: {key}")
-        value = entry.get("value")
-    if not is_number(value):
-        expected = f"{', '.join(scope.loads)}, a number, or {{ value, unit }}"
-        raise wrong(scope.where, key, entry, expected)
-    return f"{value:.12g}" + ("" if text is None else f" {text}"), value == 0
+        place = f"{scope.where}: {key}"
+        if unit(entry.unit, where=place).dimension not in dimensions:
+            entry.si(min(dimensions), place)  # which refuses it
+        return f"{entry.value:.12g} {entry.unit}", entry.value == 0
+    text = f" {next(iter(scope.loads.values()))}" if len(scope.loads) == 1 else ""
+    return f"{entry:.12g}{text}", entry == 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -281,61 +275,46 @@ class PolarityReading:
     place: str
 
 
-def polarity_readings(entries: object, scope: Scope) -> tuple[PolarityReading, ...]:
-    """Read [[polarity]] against a session's or a record's units.
+def polarity_readings(entries: Sequence[Polarity], scope: Scope) -> tuple[PolarityReading, ...]:
+    """Return the readings of [[polarity]] in a session's or a record's units.
 
     Raises
     ------
     ConfigError, UnitError
-        an unknown key, load or indication, an indication without a reading, a number without a unit or in
-        one that does not lead to the fit's
+        an unknown load, an indication without a reading, a unit that does not lead to the fit's
     """
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise wrong(scope.where, "polarity", entries, "tables [[polarity]] with load, value, indications")
-    return tuple(_reading(entry, f"polarity {at}", scope) for at, entry in enumerate(entries, start=1))
+    return tuple(_reading(entry, f"polarity[{at}]", scope) for at, entry in enumerate(entries, start=1))
 
 
-def _reading(entry: dict[str, Any], place: str, scope: Scope) -> PolarityReading:
-    check_keys(entry, _KEYS, where=f"{scope.where}: {place}")
-    load = entry.get("load")
-    if not isinstance(load, str) or load not in scope.loads:
-        raise wrong(scope.where, f"{place}.load", load, ", ".join(scope.loads))
-    text = scope.loads[load]
+def _reading(entry: Polarity, place: str, scope: Scope) -> PolarityReading:
+    if entry.load not in scope.loads:
+        raise wrong(scope.where, f"{place}.load", entry.load, ", ".join(scope.loads))
+    text = scope.loads[entry.load]
     stated = unit(text)
-    value = (
-        quantity(entry.get("value", {}), stated.dimension, f"{scope.where}: {place}.value") / stated.factor
-    )
-    if not is_number(value) or value == 0:
-        raise wrong(scope.where, f"{place}.value", entry.get("value"), "a load that is not zero")
-    indications = _indications(entry.get("indications"), f"{place}.indications", scope)
+    value = entry.value.si(stated.dimension, f"{scope.where}: {place}.value") / stated.factor
+    indications = _indications(entry.indications, f"{place}.indications", scope)
     lacking = [name for name in scope.indications if name not in dict(indications)]
     if lacking:
         expected = f"a reading of every indication: {', '.join(lacking)} too"
         raise wrong(scope.where, f"{place}.indications", ", ".join(dict(indications)), expected)
-    tolerance = entry.get("tolerance", AGREEMENT)
-    if not is_number(tolerance) or not 0 < tolerance <= _LARGEST_AGREEMENT:
-        expected = f"a share of the load above 0 and up to {_LARGEST_AGREEMENT:g}"
-        raise wrong(scope.where, f"{place}.tolerance", tolerance, expected)
-    zero = _indications(entry["zero"], f"{place}.zero", scope) if "zero" in entry else ()
     return PolarityReading(
-        load=load,
-        value=float(value),
+        load=entry.load,
+        value=value,
         unit=text,
         indications=indications,
-        zero=zero,
-        tolerance=float(tolerance),
+        zero=_indications(entry.zero, f"{place}.zero", scope),
+        tolerance=entry.tolerance,
         place=f"{scope.where}: {place}",
     )
 
 
-def _indications(entry: object, key: str, scope: Scope) -> tuple[tuple[str, float], ...]:
-    example = f'{{ {scope.indications[0]} = {{ value = 0.1, unit = "mV/V" }} }}'
-    if not isinstance(entry, dict):
-        raise wrong(scope.where, key, entry, example)
-    check_keys(entry, scope.indications, where=f"{scope.where}: {key}")
-    for name, reading in entry.items():
-        if not isinstance(reading, dict):
-            raise wrong(scope.where, f"{key}.{name}", reading, f"a number with its unit: {example}")
+def _indications(
+    entries: Sequence[tuple[str, Amount]], key: str, scope: Scope
+) -> tuple[tuple[str, float], ...]:
+    stated = dict(entries)
+    check_keys(stated, scope.indications, where=f"{scope.where}: {key}")
     return tuple(
-        (name, scope.value(name, entry[name], f"{key}.{name}")) for name in scope.indications if name in entry
+        (name, scope.value(name, stated[name], f"{key}.{name}"))
+        for name in scope.indications
+        if name in stated
     )

@@ -1,16 +1,21 @@
-"""SESSION.toml, declared once: the session's reader and the certificate both go by it.
+"""SESSION.toml, declared once: sessions, the settings that records hold, and certificates are read by it.
 
-What an entry may be stands here. What depends on the data or on other entries (whether a unit is of the
-column's dimension, a term of the model) is judged where it is read; all of it happens before anything is
-fitted or written.
+What an entry may be stands here. What depends on the data (whether a unit is of the column's dimension, a
+term of the model) is judged where it is read; all of it happens before anything is fitted or written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal
 
+from toolkit.calibration.records.record import Zero
+from toolkit.calibration.session.certificate import Certificate
+from toolkit.calibration.terms import INTERCEPT, NAME
 from toolkit.declared import (
     Above,
     AtLeast,
@@ -26,64 +31,22 @@ from toolkit.declared import (
     Text,
     Unit,
     attempt,
+    build,
 )
+from toolkit.units import si_scale, unit
 
-TEXTS = (
-    "number laboratory address place country accreditation customer customer_address item method "
-    "decision_rule interval opinions"
-).split()
-DECISION_RULES: Mapping[str, str] = {
-    "simple": "simple",
-    "simple acceptance": "simple",
-    "guard band": "guard_band",
-    "guard band w=u": "guard_band",
-    "guarded acceptance": "guard_band",
-    "guarded": "guard_band",
-    "w=u": "guard_band",
-}
+# It is a folder's name and the beginning of files' names, which file systems limit to 255 bytes.
+INSTRUMENT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,199}\Z")
+INSTRUMENT_FORM = "letters, digits, '-', '_' and '.', 200 at most"
+_FORMAT = Format(
+    title="session", wrong="session", missing="session", schema=1,
+    next_step="correct {key}; nothing was written",
+)  # fmt: skip
 _LOADS, _INDICATIONS = Names(of="loads"), Names(of="indications")
+_RESERVED = {"run", "direction", "rotation", INTERCEPT, "abs"}
 
 
-def rule_of(text: str) -> str | None:
-    """Return the decision rule that a session names; None for a text that names none.
-
-    >>> rule_of("guard band, w = U"), rule_of("Simple acceptance"), rule_of("by eye")
-    ('guard_band', 'simple', None)
-    """
-    plain = " ".join(text.lower().replace("_", " ").replace("-", " ").replace(",", " ").split())
-    return DECISION_RULES.get(plain.replace(" = ", "=").replace("= ", "=").replace(" =", "="))
-
-
-_Text = Annotated[str | None, Text(numbers="int")]
 _Date = Annotated[str | None, Day()]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
-    """What a certificate prints besides the results."""
-
-    number: Annotated[_Text, Entry("of the certificate")] = None
-    laboratory: Annotated[_Text, Entry("name of the laboratory")] = None
-    address: Annotated[_Text, Entry("of the laboratory")] = None
-    place: Annotated[_Text, Entry("where the calibration was made")] = None
-    # As the digital certificate's schema has it: DCC 3.3.0, stringISO3166Type.
-    country: Annotated[
-        str | None, Text(pattern="[A-Z]{2}"), Entry(expected='an ISO 3166-1 code, such as "US"', example="US")
-    ] = None
-    accreditation: Annotated[_Text, Entry("number of the accreditation")] = None
-    customer: _Text = None
-    customer_address: _Text = None
-    item: Annotated[_Text, Entry("what was calibrated")] = None
-    method: Annotated[_Text, Entry("of the calibration")] = None
-    decision_rule: Annotated[
-        str | None, Text(accepts=rule_of),
-        Entry("how conformity is decided", expected="simple | guard_band", example="simple"),
-    ] = None  # fmt: skip
-    interval: Annotated[_Text, Entry("until the next calibration")] = None
-    interval_agreed: Annotated[bool, Entry("whether the customer agreed to the interval")] = False
-    opinions: Annotated[_Text, Entry("and interpretations")] = None
-    received: Annotated[_Date, Entry("when the item came")] = None
-    due: Annotated[_Date, Entry("when it is to be calibrated again")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,12 +56,27 @@ class Amount:
     value: Annotated[float, Entry(expected="a finite number", rule="wrong-value", example=1)]
     unit: Annotated[str, Entry(expected="a unit such as 'N'", rule="no-unit", example="N")]
 
+    def __str__(self) -> str:
+        """Return it as a session writes it."""
+        return f'{{ value = {self.value}, unit = "{self.unit}" }}'
 
-_Stated = float | Amount
-_Named = Mapping[str, _Stated]
+    def si(self, dimension: str, where: object) -> float:
+        """Return it in SI; ``unit-dimension`` where its unit is of another dimension."""
+        stated = unit(self.unit, where=where)
+        if stated.dimension == dimension:
+            return self.value * stated.factor + stated.offset
+        return self.value * si_scale(self.unit, dimension, where=where)
+
+
+Stated = float | Amount
+_ByIndication = Annotated[Mapping[str, Stated], _INDICATIONS]
 _WithUnit = Annotated[Amount, Entry(expected="{ value, unit }", rule="no-unit")]
 _PLAIN = "a number in the column's unit, or { value, unit }"
 _POSITIVE = f"{_PLAIN}, above zero; leave out what is not known"
+_SIZE = "a number above zero; leave out what is not known"
+_ONE_COUNT = (
+    "a number above zero; a reversed bridge shows in the sign of its coefficient, which has a gate of its own"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +85,7 @@ class Reading:
 
     when: Annotated[str, Entry(expected='a text: "before", "after", "run 1", "shunt"', example="before")]
     values: Annotated[
-        _Named | tuple[_Stated, ...] | _Stated,
+        _ByIndication | tuple[Stated, ...] | Stated,
         Entry(expected="{ indication = number }, or a list of numbers", example={"D51": 0}),
     ]
 
@@ -124,7 +102,7 @@ class ZeroTable:
 class Creep:
     """A reading under a constant load."""
 
-    load: Annotated[str | _Stated, Entry(expected="a load, a number, or { value, unit }", example="FY")]
+    load: Annotated[str | Stated, Entry(expected="a load, a number, or { value, unit }", example="FY")]
     seconds: Annotated[
         float,
         Unit("s", plain=True),
@@ -132,7 +110,7 @@ class Creep:
         Entry(expected="seconds, zero or more", example=30),
     ]
     value: Annotated[
-        _Named | tuple[_Stated, ...] | _Stated,
+        _ByIndication | tuple[Stated, ...] | Stated,
         Entry(expected="{ indication = number }", example={"D51": 0}),
     ]
 
@@ -171,10 +149,10 @@ class TemperatureCoefficient:
     """What a kelvin does to a cell."""
 
     span: Annotated[
-        _Stated | None, Entry("relative", expected="a number per kelvin, or { value, unit } in %/K")
+        Stated | None, Entry("relative", expected="a number per kelvin, or { value, unit } in %/K")
     ] = None
     zero: Annotated[
-        _Stated | None, Entry("in the column's unit", expected="a number per kelvin, or { value, unit }")
+        Stated | None, Entry("in the column's unit", expected="a number per kelvin, or { value, unit }")
     ] = None
 
 
@@ -185,9 +163,9 @@ class CellEntries:
     serial: Annotated[
         str | None, Text(numbers="int"), Entry("serial number", expected='a text: serial = "..."')
     ] = None
-    resolution: Annotated[_Stated | None, Above(0), Entry("the smallest step", expected=_POSITIVE)] = None
+    resolution: Annotated[Stated | None, Above(0), Entry("the smallest step", expected=_POSITIVE)] = None
     scale: Annotated[
-        _Stated | None, Above(0),
+        Stated | None, Above(0),
         Entry("of one count", expected='a number above zero, or { value, unit = "mV/V" } of one count'),
     ] = None  # fmt: skip
     excitation: Annotated[
@@ -196,26 +174,40 @@ class CellEntries:
         Above(0),
         Entry("of the bridge", expected="volts above zero"),
     ] = None
-    shunt_expected: Annotated[_Stated | None, Entry("the step that the shunt makes", expected=_PLAIN)] = None
+    shunt_expected: Annotated[Stated | None, Entry("the step that the shunt makes", expected=_PLAIN)] = None
     shunt_measured: Annotated[
-        _Stated | None, Entry("the step that was read", expected=_PLAIN, together="shunt_expected")
+        Stated | None, Entry("the step that was read", expected=_PLAIN, together="shunt_expected")
     ] = None
     shunt_tolerance: Annotated[
         float | None, Unit("%", plain=True), Above(0),
         Entry("of the expected step; default 0.1 %", expected="per cent, above zero",
               together="shunt_expected"),
     ] = None  # fmt: skip
-    u: Annotated[_Stated | None, Above(0), Entry("standard uncertainty", expected=_POSITIVE)] = None
+    u: Annotated[Stated | None, Above(0), Entry("standard uncertainty", expected=_POSITIVE)] = None
     bridge: Annotated[
         Literal["foil", "semiconductor"] | None,
         Entry("the gauges; a foil bridge gives at most 10 mV/V", example="semiconductor"),
     ] = None
     temperature_coefficient: Annotated[
-        TemperatureCoefficient | _Stated | None, Entry("of the span, or of span and zero, per kelvin")
+        TemperatureCoefficient | Stated | None, Entry("of the span, or of span and zero, per kelvin")
     ] = None
     replacement: Annotated[
         str | None, Entry("why a cell was replaced", expected="a text: why the cell was replaced")
     ] = None
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield sizes with a unit that are not above zero, and a shunt that is held against nothing."""
+        for key, expected in (("resolution", _SIZE), ("u", _SIZE), ("scale", _ONE_COUNT)):
+            entry = getattr(self, key)
+            if isinstance(entry, Amount) and entry.value <= 0:
+                yield Fault(key=(key, "value"), got=entry.value, expected=expected)
+        step = self.shunt_expected
+        if (step.value if isinstance(step, Amount) else step) == 0:
+            yield Fault(key=("shunt_expected",), got=0, expected="a step that is not zero")
+        lone = [key for key in ("shunt_measured", "shunt_tolerance") if getattr(self, key) is not None]
+        if step is None and lone:
+            expected = f"the step that {lone[0]} is held against"
+            yield Fault(key=("shunt_expected",), expected=expected, kind="missing")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -282,7 +274,13 @@ class Polarity:
         Entry("without load, where it is not zero", expected="{ NAME = { value, unit } }",
               example={"D51": {"value": 0.0, "unit": "mV/V"}}),
     ] = ()  # fmt: skip
+    # Beyond a half, a reading of half the size, or of half again, would agree.
     tolerance: Annotated[float, Above(0), AtMost(0.5), Entry("as a share of the load")] = 0.2
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield a load of zero, which has no direction."""
+        if self.value.value == 0:
+            yield Fault(key=("value", "value"), got=0, expected="a load that is not zero")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -298,20 +296,18 @@ class StandardEntries:
     ] = None  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SessionFile:
-    """A calibration session: what was calibrated, against what, and how it is fitted."""
-
-    FORMAT: ClassVar[Format] = Format(
-        title="session", wrong="session", missing="session", schema=1,
-        next_step="correct {key}; nothing was written",
-    )  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """What was calibrated, by whom, and how it is fitted."""
 
     instrument: Annotated[
-        str, Entry("what was calibrated", expected='a text: instrument = "..."', example="hub")
-    ]
+        str, Text(strip=True),
+        Entry("what was calibrated", expected='a text: instrument = "..."', example="hub"),
+    ]  # fmt: skip
     date: Annotated[str, Day(), Entry("of the session")]
-    operator: Annotated[str, Entry("who calibrated", expected='a text: operator = "..."')]
+    operator: Annotated[
+        str, Text(strip=True), Entry("who calibrated", expected='a text: operator = "..."')
+    ]  # fmt: skip
     indications: Annotated[
         tuple[str, ...], Size(), Distinct(),
         Entry(
@@ -333,9 +329,6 @@ class SessionFile:
             expected='the name of a file, such as data = "loads.csv" or "loads.xlsx"',
         ),
     ]  # fmt: skip
-    phase: Annotated[Literal["as_found", "as_left"] | None, Entry("of the instrument", example="as_left")] = (
-        None
-    )
     model: Annotated[
         Literal["linear", "polynomial", "balance"],
         Entry("of the loads; a polynomial has a degree", example="polynomial", together="degree"),
@@ -351,6 +344,17 @@ class SessionFile:
         tuple[str, ...],
         Entry("terms that are left out", expected="a list of term names", example=["intercept"]),
     ] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatedEntries:
+    """What is stated beside the fit; the settings that a record holds have it, but for ``check``."""
+
+    FORMAT: ClassVar[Format] = _FORMAT
+
+    phase: Annotated[Literal["as_found", "as_left"] | None, Entry("of the instrument", example="as_left")] = (
+        None
+    )
     temperature: Annotated[
         Amount | None,
         Entry("of the room", expected='{ value = 20, unit = "degC" }', example={"value": 20, "unit": "degC"}),
@@ -371,12 +375,88 @@ class SessionFile:
     certificate: Annotated[Certificate | None, Entry("what it prints besides results")] = None
     standard: Annotated[StandardEntries | None, Entry("what a class of ISO 376 needs")] = None
 
+    @property
+    def fit_zero(self) -> Zero:
+        """How the zero enters the fit; readings of it say nothing of that."""
+        zero = self.zero.fit if isinstance(self.zero, ZeroTable) else self.zero
+        return "included" if isinstance(zero, tuple) else zero
+
+    @property
+    def zero_readings(self) -> tuple[Reading, ...]:
+        """The entries of [[zero]], or of [[zero.readings]] below a table ``[zero]`` with ``fit``."""
+        readings = self.zero.readings if isinstance(self.zero, ZeroTable) else self.zero
+        return readings if isinstance(readings, tuple) else ()
+
+    @property
+    def check_file(self) -> str | None:
+        """The name of the check loads' file; None where none is named."""
+        return self.check.file or self.check.data if isinstance(self.check, CheckTable) else self.check
+
+    def cell(self, name: str) -> CellEntries:
+        """Return what is stated of an indication."""
+        return dict(self.cells).get(name, CellEntries())
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionFile(StatedEntries, Fitted):
+    """A calibration session: what was calibrated, against what, and how it is fitted."""
+
+    FORMAT: ClassVar[Format] = _FORMAT
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield names that cannot be, and a degree without a polynomial or a polynomial without one."""
+        if not INSTRUMENT.match(self.instrument):
+            yield Fault(key=("instrument",), got=self.instrument, expected=INSTRUMENT_FORM)
+        for key, names in (("indications", self.indications), ("loads", self.loads)):
+            if not all(NAME.match(name) for name in names):
+                expected = f'a list of names such as {key} = ["FY", "MZ"]'
+                yield Fault(key=(key,), got=names, expected=expected)
+            if _RESERVED & set(names):
+                expected = "different names, none of them run, direction or rotation"
+                yield Fault(key=(key,), got=names, expected=expected)
+        if set(self.indications) & set(self.loads):
+            yield Fault(key=("loads",), got=self.loads, expected="names that are no indications")
+        if self.model == "polynomial" and self.degree is None:
+            yield Fault(key=("degree",), expected="a whole number from 1 to 9", kind="missing")
+        if self.model != "polynomial" and self.degree is not None:
+            expected = 'no degree, or model = "polynomial"'
+            yield Fault(key=("degree",), got=self.degree, expected=expected)
+
 
 def session_faults(raw: Mapping[str, Any]) -> tuple[Fault, ...]:
     """Return every entry of a parsed session that is unknown, missing or of the wrong kind."""
     return attempt(SessionFile, raw)[1]
 
 
-def certificate_faults(table: Mapping[str, Any]) -> tuple[Fault, ...]:
-    """Return the faults of a session's ``[certificate]``: records from before these checks may have some."""
-    return attempt(Certificate, table)[1]
+def session_entries(raw: Mapping[str, Any], *, where: object) -> SessionFile:
+    """Return the entries of a parsed session that was accepted: by `session_faults`, or by a version before.
+
+    Raises
+    ------
+    ConfigError
+        an entry that a record depends on cannot be used
+    """
+    return build(SessionFile, _read_here(raw), where, accepted=True)
+
+
+@lru_cache(maxsize=64)
+def stated_entries(settings: str, where: object) -> StatedEntries:
+    """Return the entries of the settings (JSON) of a record, or of a session that is fitted; errors as above.
+
+    The settings of a legacy import state nothing.
+    """
+    return build(StatedEntries, _read_here(json.loads(settings)), where, accepted=True)
+
+
+def _read_here(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries without those that are judged elsewhere, since versions before took anything there.
+
+    A certificate says of itself what it cannot print; who shares a standard is asked by gls alone; and of
+    the name of the standard's certificate became what was taken from it.
+    """
+    entries = {key: entry for key, entry in raw.items() if key != "certificate"}
+    reference = entries.get("reference")
+    if isinstance(reference, dict):
+        elsewhere = {"shared_group"} | ({"dcc"} if isinstance(reference.get("dcc"), dict) else set())
+        entries["reference"] = {key: entry for key, entry in reference.items() if key not in elsewhere}
+    return entries

@@ -7,27 +7,28 @@ certificates: a number whose unit is of another dimension is refused, never kept
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from toolkit.calibration.session.indications import Bridge, bridges_of, per
+from toolkit.calibration.session.indications import Bridge, per
 from toolkit.calibration.session.readings import (
-    Scope,
     creep_entries,
     polarity_readings,
+    scope_of_entries,
     shunt_entry,
     zero_entries,
 )
-from toolkit.calibration.session.settings import quantity, wrong, zero_readings
+from toolkit.calibration.session.session_file import Amount, TemperatureCoefficient
+from toolkit.calibration.session.settings import wrong
+from toolkit.channels import load_dimension
 from toolkit.errors import SessionError, UnitError
-from toolkit.files import check_keys, is_number
 from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:
+    from toolkit.calibration.session.session_file import CellEntries, SessionFile, Stated
     from toolkit.calibration.session.table import Table
 
 _PER_KELVIN = re.compile(r"\s*/\s*(K|degC|°C)\s*\Z")
-_FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
 
 
 def check_load_unit(name: str, text: str, *, where: object) -> None:
@@ -38,9 +39,9 @@ def check_load_unit(name: str, text: str, *, where: object) -> None:
     UnitError
         ``unknown-unit``, ``unit-dimension``
     """
-    wanted = "force" if _FORCE.match(name) else "moment" if _MOMENT.match(name) else None
-    if wanted is not None:
-        si_scale(text, wanted, where=where)
+    quantity = load_dimension(name)
+    if quantity is not None:
+        si_scale(text, quantity, where=where)
     elif unit(text, where=where).dimension != "moment":
         si_scale(text, "force", where=where)
 
@@ -57,10 +58,10 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
         name = f"u_{load}"
         if not table.has(name):
             continue
-        found, dimension = unit(table.unit(name)), unit(table.unit(load)).dimension
-        if found.dimension != dimension:
+        scale, dimension = unit(table.unit(name)), unit(table.unit(load)).dimension
+        if scale.dimension != dimension:
             raise _other_unit(
-                f"{where}, column {name}", found, dimension,
+                f"{where}, column {name}", scale, dimension,
                 f"{table.unit(load)!r}; a share of the load is stated once for all rows, "
                 f"[reference.uncertainty] {load} = {{ U = .., k = .., unit = '%' }}",
             )  # fmt: skip
@@ -107,50 +108,46 @@ def _other_unit(where: str, unit: Unit, dimension: str, allowed: str) -> UnitErr
     )
 
 
-def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...], where: object) -> None:
-    """Check what a session states beside its data; ``table`` is the data as recorded, its keys are `keys`'.
+def check_statements(entries: SessionFile, table: Table, where: object) -> None:
+    """Hold what a session states beside its data against the units of ``table``, the data as recorded.
 
     Raises
     ------
     ConfigError, UnitError
-        a number that is none, a unit that is unknown or of another dimension
+        a unit that is unknown or of another dimension; readings that belong to no indication or load
     """
-    indications = list(raw["indications"])  # checked by `settings`; a list of readings is in this order
-    cells = raw.get("cells", {})
-    scope = Scope(
-        bridges=bridges_of(cells, indications, where=where),
-        columns={name: table.unit(name) for name in indications},
-        loads={load: table.unit(load) for load in loads},
+    scope = scope_of_entries(
+        entries,
+        columns={name: table.unit(name) for name in entries.indications},
+        loads={load: table.unit(load) for load in entries.loads},
         where=where,
     )
-    for name, cell in cells.items():
-        bridge, column = scope.bridges[name], scope.columns[name]
-        for key in ("resolution", "u"):
-            if key not in cell:
-                continue
-            place = f"cells.{name}.{key}"
-            if not bridge.stated(cell[key], place, column=column, target=scope.unit(name)) > 0:
-                raise wrong(where, place, cell[key], "a number above zero; leave out what is not known")
-        temperature_effect(cell.get("temperature_coefficient"), bridge, column, scope.unit(name))
-        replacement = cell.get("replacement", "none")
-        if not isinstance(replacement, str) or not replacement.strip():
-            raise wrong(where, f"cells.{name}.replacement", replacement, "a text: why the cell was replaced")
+    for name, cell in entries.cells:
+        for key, entry in (("resolution", cell.resolution), ("u", cell.u)):
+            if entry is not None:
+                scope.value(name, entry, f"cells.{name}.{key}")
+        temperature_effect(cell, scope.bridges[name], scope.columns[name], scope.unit(name))
         shunt_entry(name, cell, scope)
-    _check_reference(raw.get("reference", {}), table, where)
-    _check_between(raw.get("between_runs", {}), table, where)
-    zero_entries(zero_readings(raw), scope)
-    creep_entries(raw.get("creep", []), scope)
-    polarity_readings(raw.get("polarity", []), scope)
-    if "temperature" in raw:
-        kelvin = quantity(raw["temperature"], "temperature", f"{where}: temperature")
+    if entries.reference is not None:
+        for load, uncertainty in entries.reference.uncertainty:
+            _check_unit(
+                f"{where}: reference.uncertainty.{load}.unit", uncertainty.unit, table.unit(load), "ratio"
+            )
+    for load, between in entries.between_runs:
+        _check_unit(f"{where}: between_runs.{load}.unit", between.unit, table.unit(load))
+    zero_entries(entries.zero_readings, scope)
+    creep_entries(entries.creep, scope)
+    polarity_readings(entries.polarity, scope)
+    if entries.temperature is not None:
+        kelvin = entries.temperature.si("temperature", f"{where}: temperature")
         if not kelvin > 0:
-            raise wrong(where, "temperature", raw["temperature"], "a temperature above absolute zero")
+            raise wrong(where, "temperature", entries.temperature, "a temperature above absolute zero")
 
 
 def temperature_effect(
-    entry: object, bridge: Bridge, column: str, target: str
+    cell: CellEntries, bridge: Bridge, column: str, target: str
 ) -> tuple[float | None, float | None]:
-    """Read ``temperature_coefficient`` of a cell: (span [1/K], zero [``target`` per K]).
+    """Return ``temperature_coefficient`` of a cell: (span [1/K], zero [``target`` per K]).
 
     It is ``{ span, zero }``, or one number for the span. ``span`` is a number, or ``{ value, unit }`` in
     1/K, %/K, ppm/K; ``zero`` a number in the column's unit per kelvin, or ``{ value, unit }``. A unit may
@@ -158,52 +155,25 @@ def temperature_effect(
 
     Raises
     ------
-    ConfigError, UnitError
+    UnitError
     """
-    key = f"cells.{bridge.name}.temperature_coefficient"
-    if entry is None:
-        return None, None
-    parts = entry if isinstance(entry, dict) and not {"value", "unit"} & set(entry) else {"span": entry}
-    check_keys(parts, ("span", "zero"), where=f"{bridge.where}: {key}")
-    plain = {
-        name: part | {"unit": per(part["unit"], _PER_KELVIN)}
-        if isinstance(part, dict) and isinstance(part.get("unit"), str)
-        else part
-        for name, part in parts.items()
-    }
-    span = zero = None
-    if "span" in plain:
-        span = bridge.stated(plain["span"], f"{key}.span", column="1", target="1")
-    if "zero" in plain:
-        zero = bridge.stated(plain["zero"], f"{key}.zero", column=column, target=target)
-    return span, zero
+    effect = cell.temperature_coefficient
+    if not isinstance(effect, TemperatureCoefficient):
+        effect = TemperatureCoefficient(span=effect)
+
+    def number(name: str, entry: Stated | None, column: str, target: str) -> float | None:
+        if entry is None:
+            return None
+        if isinstance(entry, Amount):
+            entry = replace(entry, unit=per(entry.unit, _PER_KELVIN))
+        key = f"cells.{bridge.name}.temperature_coefficient.{name}"
+        return bridge.stated(entry, key, column=column, target=target)
+
+    return number("span", effect.span, "1", "1"), number("zero", effect.zero, column, target)
 
 
-def _check_between(entries: Mapping[str, Any], table: Table, where: object) -> None:
-    for name, entry in entries.items():
-        place = f"between_runs.{name}"
-        for key in ("zero", "gain"):
-            if not is_number(entry[key]) or entry[key] < 0:
-                raise wrong(where, f"{place}.{key}", entry[key], "a standard deviation, zero or more")
-        found, dimension = (
-            unit(entry["unit"], where=f"{where}: {place}.unit"),
-            unit(table.unit(name)).dimension,
-        )
-        if found.dimension != dimension:
-            raise _other_unit(f"{where}: {place}.unit", found, dimension, repr(table.unit(name)))
-
-
-def _check_reference(reference: Mapping[str, Any], table: Table, where: object) -> None:
-    for name, entry in reference.get("uncertainty", {}).items():
-        place = f"reference.uncertainty.{name}"
-        for key, least in (("U", "a number, zero or more"), ("k", "a positive number")):
-            value = entry.get(key)
-            if not is_number(value):
-                raise wrong(where, f"{place}.{key}", value, least)
-            if value < 0 or (key == "k" and value == 0):
-                raise wrong(where, f"{place}.{key}", value, least)
-        text = entry["unit"]
-        found, dimension = unit(text, where=f"{where}: {place}.unit"), unit(table.unit(name)).dimension
-        if found.dimension not in (dimension, "ratio"):
-            raise _other_unit(f"{where}: {place}.unit", found, dimension, f"{table.unit(name)!r}, or '%' or "
-                              "'ppm' of the applied load")  # fmt: skip
+def _check_unit(where: str, text: str, load_unit: str, *alternatives: str) -> None:
+    stated, dimension = unit(text, where=where), unit(load_unit).dimension
+    if stated.dimension not in (dimension, *alternatives):
+        share = ", or '%' or 'ppm' of the applied load" if alternatives else ""
+        raise _other_unit(where, stated, dimension, f"{load_unit!r}{share}")

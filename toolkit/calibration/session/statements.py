@@ -16,9 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.calibration.session.indications import bridge_of, bridges_of
-from toolkit.calibration.session.readings import Scope
-from toolkit.calibration.session.settings import preloads_of, quantity, zero_readings
+from toolkit.calibration.session.readings import (
+    CreepEntry,
+    Scope,
+    ZeroEntry,
+    creep_entries,
+    scope_of_entries,
+    zero_entries,
+)
+from toolkit.calibration.session.session_file import Reference as ReferenceEntries
+from toolkit.calibration.session.session_file import stated_entries
 from toolkit.calibration.session.statement_checks import temperature_effect
 from toolkit.units import unit
 
@@ -26,6 +33,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.session.session_file import BetweenRuns as BetweenEntries
+    from toolkit.calibration.session.session_file import (
+        CellEntries,
+        Stated,
+        StatedEntries,
+        Uncertainty,
+    )
 
 
 _NONE: Mapping[str, float] = MappingProxyType({})
@@ -131,7 +145,7 @@ class CellStatement:
 
     ``found``: the resolution is not stated, it is the step that the readings show (`fit.reading_steps`).
     ``span_per_K`` [1/K] and ``zero_per_K`` [unit/K] are its temperature coefficients, None where not stated.
-    ``column_unit`` is the unit of the stored data, and of bare numbers in ``scale``.
+    ``column_unit`` is the unit of the stored data.
     """
 
     name: str
@@ -139,7 +153,6 @@ class CellStatement:
     serial: str | None
     resolution: float | None
     u: float | None
-    scale: Any
     column_unit: str
     span_per_K: float | None
     zero_per_K: float | None
@@ -153,7 +166,7 @@ class CellStatement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statements:
-    """``zero`` and ``creep`` are the entries of [[zero]] and [[creep]] as written, in their order.
+    """``entries`` as written, and the ``scope`` that its readings are read against.
 
     ``preloads`` to the largest load before the first run (ISO 376); None where not stated.
     """
@@ -163,11 +176,21 @@ class Statements:
     phase: str | None
     reference: Reference
     cells: tuple[CellStatement, ...]
-    zero: tuple[Mapping[str, Any], ...]
-    creep: tuple[Mapping[str, Any], ...]
+    entries: StatedEntries
+    scope: Scope
     certificate: Mapping[str, Any]
     preloads: int | None = None
     between_runs: tuple[BetweenRuns, ...] = ()
+
+    @property
+    def zero(self) -> tuple[ZeroEntry, ...]:
+        """The readings of [[zero]]."""
+        return zero_entries(self.entries.zero_readings, self.scope)
+
+    @property
+    def creep(self) -> tuple[CreepEntry, ...]:
+        """The readings of [[creep]]."""
+        return creep_entries(self.entries.creep, self.scope)
 
     def between(self, load: str) -> BetweenRuns | None:
         """Return what is stated of a load's differences between runs; None where nothing is."""
@@ -180,33 +203,25 @@ class Statements:
 
 def statements_of(record: CalibrationRecord) -> Statements:
     """Return what a record's session stated; a legacy record has stated nothing."""
-    units = dict(zip(record.indications, record.indication_units, strict=True))
-    columns = {cell.name: cell.column_unit or cell.unit for cell in record.cells}
     return parse_statements(
-        json.loads(record.settings),
-        indications=units,
+        record.settings,
+        indications=dict(zip(record.indications, record.indication_units, strict=True)),
         loads={load.load: load.unit for load in record.loads},
         largest={load.load: load.largest for load in record.loads},
         date=dt.date.fromisoformat(record.date),
         where=record.id,
-        columns=columns,
+        columns={cell.name: cell.column_unit or cell.unit for cell in record.cells},
         steps={cell.name: cell.step for cell in record.cells if cell.step is not None},
     )
 
 
-def scope_of(record: CalibrationRecord) -> Scope:
-    """Return what the zero, shunt and creep entries of a record's settings are read against."""
-    cells = json.loads(record.settings).get("cells", {})
-    return Scope(
-        bridges=bridges_of(cells, record.indications, where=record.id),
-        columns={cell.name: cell.column_unit or cell.unit for cell in record.cells},
-        loads={load.load: load.unit for load in record.loads},
-        where=record.id,
-    )
+def entries_of(record: CalibrationRecord) -> StatedEntries:
+    """Return the entries of a record's session, as written."""
+    return stated_entries(record.settings, record.id)
 
 
 def parse_statements(
-    settings: Mapping[str, Any],
+    settings: str,
     *,
     indications: Mapping[str, str],
     loads: Mapping[str, str],
@@ -216,53 +231,49 @@ def parse_statements(
     largest: Mapping[str, float],
     steps: Mapping[str, float] = _NONE,
 ) -> Statements:
-    """Return the statements of a session's settings.
+    """Return the statements of a session's settings (JSON).
 
     ``indications`` and ``loads`` are name to unit of the fit, ``columns`` name to unit of the data where an
     indication was converted, ``largest`` name to the largest absolute load of the fit, ``steps`` name to the
     step of readings whose resolution is not stated.
     """
-    entry = settings.get("reference", {})
-    due = entry.get("due")
-    cells = settings.get("cells", {})
-    temperature = settings.get("temperature")
-    zero, creep = zero_readings(settings), settings.get("creep", [])
+    entries, written = stated_entries(settings, where), json.loads(settings)
+    scope = scope_of_entries(entries, columns=columns or indications, loads=loads, where=where)
+    reference, temperature = entries.reference or ReferenceEntries(), entries.temperature
+    stated = written.get("reference", {})
     return Statements(
         date=date,
         temperature_C=None
         if temperature is None
-        else quantity(temperature, "temperature", f"{where}: temperature") - 273.15,
-        phase=settings.get("phase"),
+        else temperature.si("temperature", f"{where}: temperature") - 273.15,
+        phase=entries.phase,
         reference=Reference(
-            standard=None if "standard" not in entry else str(entry["standard"]),
-            certificate=None if "certificate" not in entry else str(entry["certificate"]),
-            due=None if due is None else dt.date.fromisoformat(str(due)),
-            shared_group=entry.get("shared_group"),
+            standard=reference.standard,
+            certificate=reference.certificate,
+            due=None if reference.due is None else dt.date.fromisoformat(reference.due),
+            shared_group=stated.get("shared_group"),
             uncertainties=tuple(
-                _reference(name, one, loads[name], largest[name])
-                for name, one in entry.get("uncertainty", {}).items()
+                _reference(name, uncertainty, loads[name], largest[name])
+                for name, uncertainty in reference.uncertainty
             ),
-            digital=_digital(entry.get("dcc")),
+            digital=_digital(stated.get("dcc")),
         ),
         cells=tuple(
-            _cell(name, text, (columns or indications)[name], cells.get(name, {}), where, steps.get(name))
+            _cell(name, text, entries.cell(name), scope, steps.get(name))
             for name, text in indications.items()
         ),
-        zero=tuple(zero) if isinstance(zero, list) else (),
-        creep=tuple(creep) if isinstance(creep, list) else (),
-        certificate=settings.get("certificate", {}),
-        preloads=preloads_of(settings, where),
-        between_runs=tuple(
-            _between(name, between_run, loads[name])
-            for name, between_run in settings.get("between_runs", {}).items()
-        ),
+        entries=entries,
+        scope=scope,
+        certificate=written.get("certificate", {}),
+        preloads=None if entries.standard is None else entries.standard.preloads,
+        between_runs=tuple(_between(name, between, loads[name]) for name, between in entries.between_runs),
     )
 
 
 def _digital(entry: Any) -> DigitalSource | None:
     if not isinstance(entry, Mapping):
         return None
-    places = [(load, taken["xpath"]) for load, taken in entry["taken"].items()]
+    places = [(load, point["xpath"]) for load, point in entry["taken"].items()]
     return DigitalSource(
         file=entry["file"],
         sha256=entry["sha256"],
@@ -274,39 +285,36 @@ def _digital(entry: Any) -> DigitalSource | None:
     )
 
 
-def _between(load: str, entry: Mapping[str, Any], text: str) -> BetweenRuns:
-    factor = unit(str(entry["unit"])).factor / unit(text).factor
-    return BetweenRuns(load=load, zero=float(entry["zero"]) * factor, gain=float(entry["gain"]) * factor)
+def _between(load: str, entry: BetweenEntries, text: str) -> BetweenRuns:
+    factor = unit(entry.unit).factor / unit(text).factor
+    return BetweenRuns(load=load, zero=entry.zero * factor, gain=entry.gain * factor)
 
 
-def _reference(load: str, entry: Mapping[str, Any], text: str, largest: float) -> ReferenceUncertainty:
-    U, k, found = float(entry["U"]), float(entry["k"]), unit(str(entry["unit"]))
-    if found.dimension == "ratio":
-        relative = U * found.factor
-        return ReferenceUncertainty(load=load, U=relative * largest, k=k, relative=relative)
-    return ReferenceUncertainty(load=load, U=U * (found.factor / unit(text).factor), k=k)
+def _reference(load: str, entry: Uncertainty, text: str, largest: float) -> ReferenceUncertainty:
+    scale = unit(entry.unit)
+    if scale.dimension == "ratio":
+        relative = entry.U * scale.factor
+        return ReferenceUncertainty(load=load, U=relative * largest, k=entry.k, relative=relative)
+    return ReferenceUncertainty(load=load, U=entry.U * (scale.factor / unit(text).factor), k=entry.k)
 
 
-def _cell(
-    name: str, text: str, column: str, entry: Mapping[str, Any], where: object, step: float | None
-) -> CellStatement:
-    bridge = bridge_of(name, entry, where=where)
+def _cell(name: str, text: str, entries: CellEntries, scope: Scope, step: float | None) -> CellStatement:
+    bridge, column = scope.bridges[name], scope.columns[name]
 
-    def number(key: str) -> float | None:
-        if key not in entry:
+    def number(entry: Stated | None, key: str) -> float | None:
+        if entry is None:
             return None
-        return bridge.stated(entry[key], f"cells.{name}.{key}", column=column, target=text)
+        return bridge.stated(entry, f"cells.{name}.{key}", column=column, target=text)
 
-    resolution = number("resolution")
-    span, zero = temperature_effect(entry.get("temperature_coefficient"), bridge, column, text)
+    resolution = number(entries.resolution, "resolution")
+    span, zero = temperature_effect(entries, bridge, column, text)
     return CellStatement(
         name=name,
         unit=text,
-        serial=None if entry.get("serial") is None else str(entry["serial"]),
+        serial=entries.serial,
         resolution=step if resolution is None else resolution,
         found=resolution is None and step is not None,
-        u=number("u"),
-        scale=entry.get("scale"),
+        u=number(entries.u, "u"),
         column_unit=column,
         span_per_K=span,
         zero_per_K=zero,

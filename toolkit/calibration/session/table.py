@@ -75,7 +75,7 @@ class Table:
     @property
     def direction(self) -> tuple[str, ...] | None:
         """The column ``direction`` in words."""
-        return None if self.up is None else tuple("up" if one else "down" for one in self.up.tolist())
+        return None if self.up is None else tuple("up" if rising else "down" for rising in self.up.tolist())
 
     def has(self, name: str) -> bool:
         """Tell whether the file has a numeric column."""
@@ -231,7 +231,7 @@ def _numbers(
     cells: Cells, at: Sequence[int], faults: list[tuple[int, int, SessionError]]
 ) -> NDArray[np.float64]:
     """Return the numbers of columns (columns, rows), NaN with a fault in place of what is none."""
-    columns = [cells.columns[one] for one in at]
+    columns = [cells.columns[index] for index in at]
     if cells.separator == ",":
         text = "".join(map("".join, columns))
         try:
@@ -257,7 +257,9 @@ def _numbers(
 def _decimal(cells: Cells, at: Sequence[int]) -> str:
     from toolkit.recording.csvfile import decimal_sign
 
-    texts = [cell for cell in chain.from_iterable(cells.columns[one] for one in at) if isinstance(cell, str)]
+    texts = [
+        cell for cell in chain.from_iterable(cells.columns[place] for place in at) if isinstance(cell, str)
+    ]
     try:
         # Texts of a worksheet are numbers that somebody pasted: their commas are judged as a text file's.
         decimal = decimal_sign(texts, cells.separator or ";", where=Path(cells.where))

@@ -9,14 +9,11 @@ its deflection, and that is a reason against a class.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.indications import bridges_of
-from toolkit.calibration.session.readings import Scope, creep_entries, zero_entries
 from toolkit.errors import SessionError
 from toolkit.units import unit
 
@@ -36,11 +33,10 @@ _CREEP_SECONDS = (30.0, 300.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CellSource:
-    """A session's data as fitted: its rows, statements, settings (JSON), zero and names of the loads."""
+    """A session's data as fitted: its rows, statements, zero and names of the loads."""
 
     table: Table
     statements: Statements
-    settings: str
     zero: Zero
     loads: tuple[str, ...]
     indications: tuple[str, ...]
@@ -181,19 +177,9 @@ def _run(
     )
 
 
-def _scope(source: CellSource) -> Scope:
-    cells = json.loads(source.settings).get("cells", {})
-    return Scope(
-        bridges=bridges_of(cells, source.indications, where=source.where),
-        columns={name: source.statements.cell(name).column_unit for name in source.indications},
-        loads={name: source.table.unit(name) for name in source.loads},
-        where=source.where,
-    )
-
-
 def _stated_zeros(source: CellSource, indication: str) -> tuple[float | None, float | None]:
     zeros: dict[str, float] = {}
-    for entry in zero_entries(list(source.statements.zero), _scope(source)):
+    for entry in source.statements.zero:
         zeros |= {entry.when.casefold(): dict(entry.values)[indication]} if indication in dict(
             entry.values
         ) else {}  # fmt: skip
@@ -202,7 +188,7 @@ def _stated_zeros(source: CellSource, indication: str) -> tuple[float | None, fl
 
 def _creep(source: CellSource, load: str, indication: str) -> tuple[float, float] | None:
     readings: dict[str, dict[float, float]] = {}
-    for entry in creep_entries(list(source.statements.creep), _scope(source)):
+    for entry in source.statements.creep:
         indicated = dict(entry.values)
         if indication in indicated and (entry.load not in source.loads or entry.load == load):
             readings.setdefault(entry.load, {})[entry.seconds] = indicated[indication]

@@ -191,14 +191,14 @@ def evaluate_e74(
             "an indication of one sign, zero taken off", "take the zero off and evaluate each sense apart",
         )  # fmt: skip
     levels, at = np.unique(f, return_inverse=True)
-    most = min(MAX_DEGREE, len(levels) - 1, len(f) - 2)
-    if most < max(degree or 1, 1):
+    highest = min(MAX_DEGREE, len(levels) - 1, len(f) - 2)
+    if highest < max(degree or 1, 1):
         raise _refused(
             "too few forces for the degree", f"{len(f)} points at {len(levels)} forces",
             f"more forces than a degree of {degree or 1}", "apply more forces",
         )  # fmt: skip
     ratio = float(np.mean(f / d))
-    curves = tuple(_curve(f, d, m, abs(ratio), at, len(levels)) for m in range(1, most + 1))
+    curves = tuple(_curve(f, d, m, abs(ratio), at, len(levels)) for m in range(1, highest + 1))
     steps: tuple[DegreeStep, ...] = ()
     chosen = degree
     if chosen is None:

@@ -107,7 +107,6 @@ def source_of(fit: SessionFit) -> CellSource:
     return CellSource(
         table=session.table,
         statements=session_statements(session),
-        settings=session.settings,
         zero=session.zero,
         loads=tuple(load.name for load in session.loads),
         indications=session.indications,

@@ -141,12 +141,12 @@ def budgets_of_rows(
     RecordError
         the record has no such load
     """
-    one = _fitted(record, load)
-    terms = term_matrix(one.terms, dict(zip(record.indications, indications.T, strict=True)))
-    values = terms @ np.asarray(one.coefficients)
-    scatter = scatter_of(record, loads, one)
+    fitted = _fitted(record, load)
+    terms = term_matrix(fitted.terms, dict(zip(record.indications, indications.T, strict=True)))
+    values = terms @ np.asarray(fitted.coefficients)
+    scatter = scatter_of(record, loads, fitted)
     return tuple(
-        _budget(record, loads, check, one, float(value), point, None, PROBABILITY, scatter)
+        _budget(record, loads, check, fitted, float(value), point, None, PROBABILITY, scatter)
         if math.isfinite(value)
         else None
         for value, point in zip(values.tolist(), indications, strict=True)

@@ -28,7 +28,6 @@ the record alone; they stand in the budget. Resolution averages out over a block
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,9 +35,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.readings import creep_entries, zero_entries
-from toolkit.calibration.session.settings import zero_readings
-from toolkit.calibration.session.statements import scope_of, statements_of
+from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 
 if TYPE_CHECKING:
@@ -99,8 +96,7 @@ def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
     The last reading whose ``when`` begins with *after* is held against the first that begins with *before*;
     without such words the last reading against the first. Readings with the shunt connected are no zeros.
     """
-    scope = scope_of(record)
-    entries = [e for e in zero_entries(zero_readings(json.loads(record.settings)), scope) if not e.shunt]
+    entries = [entry for entry in statements_of(record).zero if not entry.shunt]
     if len(entries) < 2:
         return "no zero before and after the session is stated"
     moments = [entry.when.casefold() for entry in entries]
@@ -134,7 +130,7 @@ def creep(record: CalibrationRecord, load: LoadFit) -> float | str:
     """
     series: dict[str, list[tuple[float, float]]] = {}
     slope = None
-    for entry in creep_entries(json.loads(record.settings).get("creep", []), scope_of(record)):
+    for entry in statements_of(record).creep:
         if entry.load != load.load and len(record.loads) > 1:
             continue
         if entry.shown is not None:

@@ -147,9 +147,9 @@ def _of_rows_around(loads: Table, load: LoadFit, value: float) -> float:
     if u is None:
         return load.reference_u or 0.0
     level, place = np.unique(np.abs(loads.column(load.load)), return_inverse=True)
-    most = np.zeros(len(level))
-    np.maximum.at(most, place.ravel(), u)
-    return float(np.interp(abs(value), level, most))
+    largest = np.zeros(len(level))
+    np.maximum.at(largest, place.ravel(), u)
+    return float(np.interp(abs(value), level, largest))
 
 
 def _fit(record: CalibrationRecord, load: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:
@@ -231,9 +231,9 @@ def _resolution(record: CalibrationRecord, statements: Statements, slope: NDArra
         return _absent("resolution", "no indication's resolution is stated", "session")
     # Half a digit, rectangular (GUM F.2.2.1), in each reading that the indication is made of.
     parts = [c * e.half_width / ROOT3 * math.sqrt(e.readings) for c, e in zip(slope, errors, strict=True)]
-    found = [cell.name for cell in statements.cells if cell.found]
+    from_steps = [cell.name for cell in statements.cells if cell.found]
     text = f"half a digit, rectangular, in {errors[0].readings} reading(s) an indication" + _without(silent)
-    text += f"; of {', '.join(found)} the step of the readings" if found else ""
+    text += f"; of {', '.join(from_steps)} the step of the readings" if from_steps else ""
     u = math.sqrt(sum(part * part for part in parts))
     return _part("resolution", text, "B", "rectangular", u, math.inf, "session")
 
@@ -289,18 +289,18 @@ def _temperature(
         return _absent("temperature", why, "conditions of use")
     if temperature.coefficient_per_K is not None:
         per_K = temperature.coefficient_per_K * value
-        what = f"{temperature.coefficient_per_K:.3g} /K of the load"
+        source = f"{temperature.coefficient_per_K:.3g} /K of the load"
     elif cells:
         rates = [
             (c.span_per_K or 0.0) * x + (c.zero_per_K or 0.0)
             for c, x in zip(statements.cells, point, strict=True)
         ]
         per_K = float(slope @ np.asarray(rates))
-        what = f"coefficients of {', '.join(cell.name for cell in cells)}: {per_K:.3g} a kelvin"
+        source = f"coefficients of {', '.join(cell.name for cell in cells)}: {per_K:.3g} a kelvin"
     else:
         return _absent("temperature", f"no temperature coefficient is stated; {session}", "conditions of use")
     u = abs(per_K) * temperature.half_range_K / ROOT3
-    text = f"{what}, +-{temperature.half_range_K:g} K rectangular; {session}"
+    text = f"{source}, +-{temperature.half_range_K:g} K rectangular; {session}"
     return _part("temperature", text, "B", "rectangular", u, math.inf, "conditions of use")
 
 

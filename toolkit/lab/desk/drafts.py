@@ -20,8 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.registry.clock import begun
-from toolkit.calibration.session.session_file import SessionFile
-from toolkit.calibration.session.settings import INSTRUMENT, INSTRUMENT_FORM
+from toolkit.calibration.session.session_file import INSTRUMENT, INSTRUMENT_FORM, SessionFile
 from toolkit.days import parse_day
 from toolkit.declared import attempt, toml_text
 from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError

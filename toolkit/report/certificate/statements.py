@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from toolkit.calibration.session.session_file import TEXTS, certificate_faults, rule_of
+from toolkit.calibration.session.certificate import TEXTS, certificate_faults, rule_of
 from toolkit.days import parse_day
 from toolkit.declared import Fault
 from toolkit.errors import ConfigError
