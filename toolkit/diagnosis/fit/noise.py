@@ -131,7 +131,7 @@ def fit_noise(
         return Autoregression(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
     reflection: list[float] = []
     best, best_score = 0, math.log(max(variance, 1e-300))
-    usable = [segment for segment in where.segments if segment.stop - segment.start >= NOISE.fewest]
+    usable = _telling(where)
     if usable:
         forward = [residual[segment].copy() for segment in usable]
         backward = [residual[segment].copy() for segment in usable]
@@ -142,7 +142,7 @@ def fit_noise(
                 forward[i], backward[i] = f[1:], b[:-1]
                 top += float(forward[i] @ backward[i])
                 bottom += float(forward[i] @ forward[i]) + float(backward[i] @ backward[i])
-            if bottom <= 0:
+            if bottom <= 0 or sum(map(len, forward)) < NOISE.fewest - order:
                 break
             k = max(min(2 * top / bottom, 0.9999), -0.9999)
             for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
@@ -164,6 +164,17 @@ def fit_noise(
             else sd_of_innovations,
         )
     return Autoregression(reflection=coefficients, sd=max(sd_of_innovations, floor))
+
+
+def _telling(where: Layout) -> list[slice]:
+    """Return the segments that tell a noise's colour: the long ones, or all where those are the fewer rows.
+
+    A recording with a pause every few rows has its longest segments where it stood still, and what is
+    left there has not the colour of the rest.
+    """
+    long = [segment for segment in where.segments if segment.stop - segment.start >= NOISE.fewest]
+    held = sum(segment.stop - segment.start for segment in long)
+    return list(where.segments) if 0 < held < NOISE.telling * where.n else long
 
 
 def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
