@@ -96,6 +96,7 @@ class _Noise:
     gap: float = _set(3.0, "median steps of time", "beyond, a series begins anew: its past tells nothing")
     fewest: int = _set(24, "values of a segment", "below, nothing can be told of its colour")
     telling: float = _set(0.5, "of all values", "what fewer show is not the colour of the rest")
+    paused: int = _set(3, "segments of a run", "that many short ones are one series with pauses")
     orders: int = _set(8, "orders of the autoregression", "the highest that BIC may choose")
     mismatch: float = _set(3.0, "times a stated noise", "a larger residual is mostly no noise")
     absorbed: float = _set(

@@ -71,14 +71,15 @@ def test_a_gap_begins_a_new_segment_and_a_masked_row_splits_nothing_else():
     assert where.n == 99
 
 
-def test_the_colour_is_that_of_all_rows_where_a_pause_stands_after_every_few():
-    """Read in bursts: the long segments are those at rest, whose residual is one constant."""
+@pytest.mark.parametrize("rests", [True, False])
+def test_the_colour_is_that_of_all_rows_where_a_pause_stands_after_every_few(rests):
+    """Read in bursts: the long segments, if any, are those at rest, whose residual is one constant."""
     rng = np.random.default_rng(5)
     burst, rest, phi = 6, 30, 0.6
     t, values = [], []
     clock = 0.0
     for k in range(200):
-        if k % 40 == 0:
+        if rests and k % 40 == 0:
             values += [0.3] * rest
             t += (clock + np.arange(rest)).tolist()
             clock += rest + 10

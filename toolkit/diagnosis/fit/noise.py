@@ -72,11 +72,13 @@ def autocovariance(noise: Autoregression, count: int) -> NDArray[np.float64]:
 class Layout:
     """Where the values of one output stand in all its runs: segments without a gap, and what is masked.
 
-    ``index`` are places of the kept values among all rows of all runs; ``segments`` slices of them.
+    ``index`` are places of the kept values among all rows of all runs; ``segments`` slices of them; ``runs``
+    is how many runs have any.
     """
 
     index: NDArray[np.int64]
     segments: tuple[slice, ...]
+    runs: int = 1
 
     @property
     def n(self) -> int:
@@ -105,7 +107,7 @@ def layout(times: Sequence[NDArray[np.float64]], counted: Sequence[NDArray[np.bo
             index.append(at + offset)
         offset += len(t)
     places = np.concatenate(index) if index else np.zeros(0, dtype=np.int64)
-    return Layout(places.astype(np.int64), tuple(segments))
+    return Layout(places.astype(np.int64), tuple(segments), len(index))
 
 
 def fit_noise(
@@ -169,12 +171,14 @@ def fit_noise(
 def _telling(where: Layout) -> list[slice]:
     """Return the segments that tell a noise's colour: the long ones, or all where those are the fewer rows.
 
-    A recording with a pause every few rows has its longest segments where it stood still, and what is
-    left there has not the colour of the rest.
+    A recording with a pause after every few rows has its longest segments where it stood still, and what is
+    left there has not the colour of the rest. Short runs without a pause tell none: what each leaves about
+    its own zero is a scatter of the runs (`run_scatter`).
     """
     long = [segment for segment in where.segments if segment.stop - segment.start >= NOISE.fewest]
     held = sum(segment.stop - segment.start for segment in long)
-    return list(where.segments) if 0 < held < NOISE.telling * where.n else long
+    paused = len(where.segments) >= NOISE.paused * where.runs
+    return list(where.segments) if held < NOISE.telling * where.n and (held or paused) else long
 
 
 def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
