@@ -332,13 +332,25 @@ def unit_examples(text: str) -> tuple[str, ...]:
     return tuple(name for name, parts in _EXACT.items() if parts[3] == dimension)
 
 
-# Units that laboratories read for each other: a number in one, taken for the other, is off by their ratio.
-_TAKEN_FOR = {
-    "force": ("N", "lbf", "kgf", "kN"),
-    "moment": ("N*m", "lbf*ft", "lbf*in", "kgf*m", "kN*m", "N*mm"),
-    "bridge_ratio": ("mV/V", "µV/V", "V/V"),
-}
+# Units in which people record, beside those of the machine's own files: a number in one, taken for another of
+# its dimension, is off by their ratio.
+_RECORDED_IN = (
+    *_EXACT, "kgf", "MN", "lbf*in", "kgf*m", "kN*m", "N*mm", "µV/V", "g", "kg", "cm", "µm", "km", "inch", "ft",
+    "min", "h", "µs", "mph", "cm/s", "mm/s", "cm/s^2", "m/s^2", "standard_gravity", "MPa", "mbar", "hPa", "atm",
+    "mmHg", "mV", "V", "kV", "mA", "A", "mW", "W", "kW", "turn", "mrad", "%", "rad/s", "rpm", "ml", "liter",
+    "m^3", "l/min", "m^3/h",
+)  # fmt: skip
 _SAME_RATIO = 0.01
+
+
+def units_alike(text: str) -> tuple[str, ...]:
+    """Return units of the same dimension in which people record, those of this field first.
+
+    >>> units_alike("bar")
+    ('Pa', 'kPa', 'bar', 'psi', 'MPa', 'mbar', 'hPa', 'atm', 'mmHg')
+    """
+    dimension = unit(text).dimension
+    return tuple(name for name in _RECORDED_IN if unit(name).dimension == dimension)
 
 
 def ratio_of_units(ratio: float, text: str) -> str | None:
@@ -349,9 +361,9 @@ def ratio_of_units(ratio: float, text: str) -> str | None:
     >>> ratio_of_units(0.2249, "N"), ratio_of_units(4.45, "N"), ratio_of_units(1.3, "N")
     ('lbf against N', 'N against lbf', None)
     """
-    names = _TAKEN_FOR.get(unit(text).dimension, ())
     if not ratio > 0:
         return None
+    names = units_alike(text)
     pairs = [(right, wrong) for right in names for wrong in names if right != wrong]
     pairs.sort(key=lambda pair: _canonical(text) != pair[1])
     for right, wrong in pairs:

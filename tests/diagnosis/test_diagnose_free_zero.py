@@ -13,12 +13,12 @@ NOISE = 1.5  # N; the zero is off by 1.2 N at the first row
 CASE = cell_case(0.002, 'T = { unit = "degC", role = "covariate" }\n')
 
 
-def recording(draw, run):
+def recording(draw, run, zeroed=18.5):
     rng = np.random.default_rng([draw, run])
     t = np.arange(120) * 10.0
     load = 400 + 300 * np.sin(0.013 * t + run) + 100 * np.sin(0.037 * t)
     T = 20 + run + 2 * (1 - np.cos(0.05 * t))
-    force = load + COEFFICIENT * (T - 18.5) + rng.normal(0, NOISE, 120)
+    force = load + COEFFICIENT * (T - zeroed) + rng.normal(0, NOISE, 120)
     return pd.DataFrame({"t": t, "L": load, "T": T, "F": force})
 
 
@@ -36,3 +36,14 @@ def test_the_interval_holds_the_coefficient_and_no_zero_is_named_beside_it(tmp_p
         low, high = made.effects[0].parameters[0].ci95
         held += low < COEFFICIENT < high
     assert held >= least
+
+
+def test_a_drift_is_seen_beside_a_zero_that_is_larger_than_all_that_it_does(tmp_path):
+    """Zeroed at 70 degC, recorded between 20 and 25: by the first row's temperature alone the drift is unlike."""
+    frames = {f"r{run}__csv": recording(7, run, zeroed=70.0) for run in range(2)}
+    case = read_case(write_case(tmp_path, CASE + TWO, simulator=CELL, **frames))
+    made = diagnose(case, None).diagnosis
+    drift = next(effect for effect in made.effects if effect.name == "thermal_drift")
+    assert {effect.name for effect in made.effects} <= {"thermal_drift", "zero_offset"}
+    low, high = drift.parameters[0].ci95
+    assert low < COEFFICIENT < high

@@ -95,6 +95,8 @@ class _Noise:
 
     gap: float = _set(3.0, "median steps of time", "beyond, a series begins anew: its past tells nothing")
     fewest: int = _set(24, "values of a segment", "below, nothing can be told of its colour")
+    telling: float = _set(0.5, "of all values", "what fewer show is not the colour of the rest")
+    paused: int = _set(3, "segments of a run", "that many short ones are one series with pauses")
     orders: int = _set(8, "orders of the autoregression", "the highest that BIC may choose")
     mismatch: float = _set(3.0, "times a stated noise", "a larger residual is mostly no noise")
     absorbed: float = _set(
@@ -105,9 +107,7 @@ class _Noise:
     absorbed_by_chance: float = _set(
         3.0, "independent rows for each parameter", "what the plain fit takes of the noise by its parameters"
     )
-    apart: float = _set(
-        2.0, "sd of the difference", "a larger one of the coloured and the plain solution is none of chance"
-    )
+    apart: float = _set(2.0, "sd of the difference", "a larger one of the two solutions is none of chance")
     as_known: float = _set(
         1.1, "times the sensor's noise", "certificates and repeats are round: a residual is no more than it"
     )

@@ -71,6 +71,33 @@ def test_a_gap_begins_a_new_segment_and_a_masked_row_splits_nothing_else():
     assert where.n == 99
 
 
+@pytest.mark.parametrize("rests", [True, False])
+def test_the_colour_is_that_of_all_rows_where_a_pause_stands_after_every_few(rests):
+    """Read in bursts: the long segments, if any, are those at rest, whose residual is one constant."""
+    rng = np.random.default_rng(5)
+    burst, rest, phi = 6, 30, 0.6
+    t, values = [], []
+    clock = 0.0
+    for k in range(200):
+        if rests and k % 40 == 0:
+            values += [0.3] * rest
+            t += (clock + np.arange(rest)).tolist()
+            clock += rest + 10
+        x = rng.standard_normal() / np.sqrt(1 - phi**2)
+        for _ in range(burst):
+            values.append(x)
+            x = phi * x + rng.standard_normal()
+        t += (clock + np.arange(burst)).tolist()
+        clock += burst + 10
+    r = np.array(values)
+    where = layout([np.array(t)], [np.ones(len(t), dtype=bool)])
+
+    noise = fit_noise(r, where, floor=1e-9)
+
+    assert noise.marginal_sd == pytest.approx(float(np.sqrt(np.mean(r**2))), rel=0.1)
+    assert noise.reflection[0] == pytest.approx(phi, abs=0.1)
+
+
 def test_whitening_columns_is_whitening_each():
     rng = np.random.default_rng(3)
     noise = Autoregression(reflection=(0.8, 0.1), sd=2.0)

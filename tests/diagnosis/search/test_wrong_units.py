@@ -102,3 +102,14 @@ def test_a_simulation_that_is_only_a_little_wrong_is_asked_for_no_unit(tmp_path)
     problem = problem_of(case, model_of(case, None, None))
     declared = _as_declared(problem)
     assert wrong_units(problem, (declared, declared)) == ()
+
+
+def test_an_input_that_lost_its_sign_is_named_though_it_drives_little_of_the_output(tmp_path):
+    simulator = PISTON.replace("0.0 * inputs", "8.0 * inputs")
+    runs = {}
+    for seed in (0, 1):
+        frame = piston(seed)
+        frame["F"] -= 8.0 * frame["x"]  # recorded against the way of the simulation
+        runs[f"r{seed}__csv"] = frame
+    answer = diagnose(read_case(write_case(tmp_path, HEAD, simulator=simulator, **runs)), None).diagnosis
+    assert [(effect.name, effect.key.channel) for effect in answer.effects] == [("channel_sign", "x")]

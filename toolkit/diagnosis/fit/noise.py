@@ -72,11 +72,13 @@ def autocovariance(noise: Autoregression, count: int) -> NDArray[np.float64]:
 class Layout:
     """Where the values of one output stand in all its runs: segments without a gap, and what is masked.
 
-    ``index`` are places of the kept values among all rows of all runs; ``segments`` slices of them.
+    ``index`` are places of the kept values among all rows of all runs; ``segments`` slices of them; ``runs``
+    is how many runs have any.
     """
 
     index: NDArray[np.int64]
     segments: tuple[slice, ...]
+    runs: int = 1
 
     @property
     def n(self) -> int:
@@ -105,7 +107,7 @@ def layout(times: Sequence[NDArray[np.float64]], counted: Sequence[NDArray[np.bo
             index.append(at + offset)
         offset += len(t)
     places = np.concatenate(index) if index else np.zeros(0, dtype=np.int64)
-    return Layout(places.astype(np.int64), tuple(segments))
+    return Layout(places.astype(np.int64), tuple(segments), len(index))
 
 
 def fit_noise(
@@ -131,7 +133,7 @@ def fit_noise(
         return Autoregression(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
     reflection: list[float] = []
     best, best_score = 0, math.log(max(variance, 1e-300))
-    usable = [segment for segment in where.segments if segment.stop - segment.start >= NOISE.fewest]
+    usable = _telling(where)
     if usable:
         forward = [residual[segment].copy() for segment in usable]
         backward = [residual[segment].copy() for segment in usable]
@@ -142,7 +144,7 @@ def fit_noise(
                 forward[i], backward[i] = f[1:], b[:-1]
                 top += float(forward[i] @ backward[i])
                 bottom += float(forward[i] @ forward[i]) + float(backward[i] @ backward[i])
-            if bottom <= 0:
+            if bottom <= 0 or sum(map(len, forward)) < NOISE.fewest - order:
                 break
             k = max(min(2 * top / bottom, 0.9999), -0.9999)
             for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
@@ -164,6 +166,19 @@ def fit_noise(
             else sd_of_innovations,
         )
     return Autoregression(reflection=coefficients, sd=max(sd_of_innovations, floor))
+
+
+def _telling(where: Layout) -> list[slice]:
+    """Return the segments that tell a noise's colour: the long ones, or all where those are the fewer rows.
+
+    A recording with a pause after every few rows has its longest segments where it stood still, and what is
+    left there has not the colour of the rest. Short runs without a pause tell none: what each leaves about
+    its own zero is a scatter of the runs (`run_scatter`).
+    """
+    long = [segment for segment in where.segments if segment.stop - segment.start >= NOISE.fewest]
+    held = sum(segment.stop - segment.start for segment in long)
+    paused = len(where.segments) >= NOISE.paused * where.runs
+    return list(where.segments) if held < NOISE.telling * where.n and (held or paused) else long
 
 
 def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:

@@ -99,10 +99,20 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CandidateEffect:
-    """An effect at a place, and how a search may start."""
+    """An effect at a place, and how a search may start.
+
+    ``zero`` is a constant beside which it is seen and fitted, where its size depends on a free one: nobody
+    recorded from which temperature a drift counts.
+    """
 
     active: AppliedEffect
     starts: tuple[Start, ...]
+    zero: AppliedEffect | None = None
+
+    def zero_beside(self, active: Sequence[AppliedEffect]) -> tuple[AppliedEffect, ...]:
+        """Return its constant where none of some effects is one at its channel, else nothing."""
+        there = any(each.effect.is_zero and each.channel == self.active.channel for each in active)
+        return () if self.zero is None or there else (self.zero,)
 
     @property
     def discrete(self) -> bool:
@@ -137,7 +147,8 @@ def candidates(
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
             on_inputs = effect.on_channel is not None and "input" in effect.on_channel.where
-            if on_inputs and channel in inputs and channel not in problem.model.capability.cells:
+            of_many = bool(effect.parameters) and channel not in problem.model.capability.cells
+            if on_inputs and channel in inputs and of_many:
                 continue  # asked where the declared simulation is grossly wrong: `wrong_units`
             case = view(problem, channel, source)
             confined = effect.in_case(case)
@@ -145,7 +156,20 @@ def candidates(
             for runs in subsets if starts else ():
                 active = AppliedEffect(effect=confined, channel=channel, source=source, runs=runs)
                 listed.append(CandidateEffect(active=active, starts=starts))
-    return tuple(listed)
+    zeros = {
+        candidate.active.channel: dataclasses.replace(
+            candidate.active,
+            values=candidate.starts[0].values | dict.fromkeys(candidate.active.effect.names, 0.0),
+        )
+        for candidate in listed
+        if candidate.active.effect.is_zero and candidate.active.runs is None
+    }
+    return tuple(
+        dataclasses.replace(candidate, zero=zeros.get(candidate.active.channel))
+        if candidate.active.effect.frees_zero
+        else candidate
+        for candidate in listed
+    )
 
 
 def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:

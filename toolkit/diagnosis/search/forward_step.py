@@ -103,8 +103,9 @@ def joint_fits(
     looked_at = {scored.candidate.key for scored in promising}
     joints = [joint for joint in beside if joint.scored.candidate.key not in looked_at]
     for scored in promising:
-        dear = cost(problem, (scored.active,))
-        fitted = joint_fit(problem, base, (scored.active,), begin=scored.p, least=least + dear)
+        added = (*scored.candidate.zero_beside(base.active), scored.active)
+        dear = cost(problem, added)
+        fitted = joint_fit(problem, base, added, begin=scored.p, least=least + dear)
         if fitted is not None and fitted.log_posterior - dear >= least:
             score = fitted.log_posterior - dear
             joints.append(Joint(scored=scored, fit=fitted, score=score, past=past_gain(problem, fitted)))

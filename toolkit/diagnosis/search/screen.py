@@ -151,7 +151,7 @@ class LinearisedFit:
             ):
                 continue
             directions = {name: np.nan_to_num(columns) for name, columns in directions.items()}
-            gain, block = self.quick(directions, fixed=candidate.discrete)
+            gain, block = self.quick(directions, fixed=candidate.discrete, beside=self._zero(candidate))
             active = replace(candidate.active, values=start.values)
             trials.append(
                 Scored(
@@ -217,18 +217,35 @@ class LinearisedFit:
             at = columns.stop
             yield {name: -response[:, columns] for name, response in moved.items()}
 
-    def quick(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, NDArray[np.float64]]:
-        """Return twice the gain at a fixed noise, the better of two, and the responses' orthonormal block."""
+    def _zero(self, candidate: CandidateEffect) -> Stacked | None:
+        """Return the response to the constant beside which a candidate is seen, None where there is none."""
+        if not candidate.zero_beside(self.base.active):
+            return None
+        channel = candidate.active.channel
+        return {name: np.full((self.problem.rows, 1), float(name == channel)) for name in self.problem.names}
+
+    def quick(
+        self, directions: Stacked, *, fixed: bool = False, beside: Stacked | None = None
+    ) -> tuple[float, NDArray[np.float64]]:
+        """Return twice the gain at a fixed noise, the better of two, and the responses' orthonormal block.
+
+        ``beside`` is a response that is free with and without them.
+        """
         gains, blocks = [], []
         for under in (self.coloured, self.white):
-            raw = self._rows(directions, under.noise)
+            raw, left = self._rows(directions, under.noise), under.left
             raw = raw - under.span @ (under.span.T @ raw)
+            if beside is not None:
+                free = self._rows(beside, under.noise)
+                free = _orthonormal(free - under.span @ (under.span.T @ free))
+                raw, left = raw - free @ (free.T @ raw), left - free @ (free.T @ left)
             block = _orthonormal(raw)
+            rest = float(left @ left)
             if fixed:
-                remaining = float(np.sum((under.left - raw.sum(axis=1)) ** 2))
+                remaining = float(np.sum((left - raw.sum(axis=1)) ** 2))
             else:
-                remaining = under.rest - float(np.sum((block.T @ under.left) ** 2))
-            gains.append(self.n * math.log(under.rest / max(remaining, 1e-12 * under.rest)))
+                remaining = rest - float(np.sum((block.T @ left) ** 2))
+            gains.append(self.n * math.log(rest / max(remaining, 1e-12 * rest)))
             blocks.append(block)
         # White noise overrates what is smooth; as a first look that is what is wanted.
         return (max(gains) if self._is_coloured else gains[0]), blocks[0]
@@ -272,7 +289,13 @@ class LinearisedFit:
         return [*sharp, *(replace(scored, gain=min(scored.gain, least)) for scored in later)]
 
     def _exact(self, trial: Scored) -> Scored:
-        gain, coefficients, trust = self.gain(trial.directions, fixed=trial.candidate.discrete)
+        beside = self._zero(trial.candidate)
+        if beside is None:
+            gain, coefficients, trust = self.gain(trial.directions, fixed=trial.candidate.discrete)
+        else:
+            both = {name: np.hstack([trial.directions[name], column]) for name, column in beside.items()}
+            gain, coefficients, trust = self.gain(both)
+            gain, coefficients = gain - max(self.gain(beside)[0], 0.0), coefficients[:-1]
         if trial.candidate.discrete:
             return replace(trial, gain=gain, trust=trust)
         reached = trial.valued(coefficients)

@@ -69,12 +69,12 @@ def refined(
 
 def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[AppliedEffect, ...]:
     """Return effects without one of them; a drift with the temperature goes with its zero."""
-    zero = (effect.channel, None, None)
 
-    def belongs(effect: AppliedEffect) -> bool:
-        return effect.effect.frees_zero and effect.effect.is_zero and effect.key[1:] == zero
+    def goes(applied: AppliedEffect) -> bool:
+        its_zero = effect.effect.frees_zero and applied.effect.is_zero
+        return applied.key == effect.key or (its_zero and applied.key[1:] == (effect.channel, None, None))
 
-    return tuple(applied for applied in active if applied.key != effect.key and not belongs(applied))
+    return tuple(applied for applied in active if not goes(applied))
 
 
 def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | None, least: float) -> Fit:
@@ -89,15 +89,8 @@ def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | Non
 
 
 def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[AppliedEffect, ...] | None:
-    there = {applied.channel for applied in base.active if applied.effect.is_zero}
-    free_zeros = {applied.channel for applied in base.active if applied.effect.frees_zero} - there
-    zeros = tuple(
-        replace(channel.active, values=channel.starts[0].values | {channel.active.effect.names[0]: 0.0})
-        for channel in listed
-        if channel.active.effect.is_zero
-        and channel.active.channel in free_zeros
-        and channel.active.runs is None
-    )
+    present = {applied.key for applied in base.active}
+    zeros = [zero for each in listed if each.key in present for zero in each.zero_beside(base.active)]
     return (*base.active, *zeros) if zeros else None
 
 

@@ -101,7 +101,8 @@ def _fitted(problem: Problem, base: Fit, view: Look) -> list[tuple[Scored, Fit]]
         starts += [(screen.base, trial) for trial in likely]
     best: dict[object, tuple[Scored, Fit]] = {}
     for begin, trial in starts:
-        made = joint_fit(problem, begin, (trial.active,), plain=True)
+        zero = trial.candidate.zero_beside(begin.active)
+        made = joint_fit(problem, begin, (*zero, trial.active), plain=True)
         if made is None or only_bends(problem, made):
             continue
         before = best.get(trial.candidate.key)

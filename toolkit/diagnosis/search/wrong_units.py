@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.effects.effect import Effect
 
 
 def wrong_units(problem: Problem, fits: Sequence[Fit]) -> tuple[CandidateEffect, ...]:
@@ -125,13 +126,19 @@ def _ratios(problem: Problem) -> Iterator[AppliedEffect]:
         for channel, source in problem.model.places(effect):
             if channel not in problem.names and channel not in inputs:
                 continue
-            try:
-                ratios = unit_ratios(channel_unit(problem.case, problem.model, channel))
-            except UnitError:
-                continue
-            for ratio in ratios.values():
-                values = {effect.names[0]: ratio}
+            for values in _values(problem, effect, channel):
                 yield AppliedEffect(effect=effect, channel=channel, source=source, values=values)
+
+
+def _values(problem: Problem, effect: Effect, channel: str) -> list[dict[str, float]]:
+    """Return the values that an effect may have at a channel: its ratios of units, or none where it has none."""
+    if not effect.names:
+        return [{}]
+    try:
+        ratios = unit_ratios(channel_unit(problem.case, problem.model, channel))
+    except UnitError:
+        return []
+    return [{effect.names[0]: ratio} for ratio in ratios.values()]
 
 
 def _left(problem: Problem, made: Fit, applied: AppliedEffect, names: Sequence[str]) -> float | None:

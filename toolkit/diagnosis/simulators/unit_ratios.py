@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from toolkit.units import is_unit, unit, unit_examples
+from toolkit.units import is_unit, unit, units_alike
 
-# Further units that people record in, beside those of the machine's own files.
-_ALSO = (
-    "kgf", "g", "kg", "MN", "cm", "µm", "km", "inch", "ft", "min", "h", "µs", "mph", "MPa", "mbar", "hPa",
-    "atm", "mmHg", "N*mm", "lbf*in", "kgf*m", "mV", "V", "kV", "mA", "A", "mW", "W", "kW", "turn", "mrad",
-    "%", "rad/s", "rpm", "ml", "liter", "m^3", "l/min", "m^3/h", "cm/s", "mm/s", "cm/s^2", "m/s^2",
-    "standard_gravity",
-)  # fmt: skip
 _TENS = range(1, 7)
 _ALIKE = 1e-3  # two ratios of units as near as that are told apart by no recording
 
@@ -33,10 +26,8 @@ def unit_ratios(text: str) -> dict[str, float]:
         if all(abs(ratio / known - 1) > _ALIKE for known in (1.0, *ratios.values())):
             ratios[name] = ratio
 
-    others = () if stated.offset else (*unit_examples(text), *_ALSO)
-    for other in others:
-        right = unit(other)
-        if right.dimension == stated.dimension and not right.offset:
+    for right in () if stated.offset else map(unit, units_alike(text)):
+        if not right.offset:
             add(f"{right.text} read as {stated.text}", stated.factor / right.factor)
             add(f"{stated.text} read as {right.text}", right.factor / stated.factor)
     for power in () if stated.is_interval else _TENS:
