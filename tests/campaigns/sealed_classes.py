@@ -124,7 +124,8 @@ def carried_out(
         base, name="next.csv", fine=fine, rows=base.rows + later, conditions=run.conditions
     )
     alone = dataclasses.replace(s, runs=(there,))
-    before = draw._before_converter(alone, s.true_parameters(), drawn.effects)
+    p = s.true_parameters()
+    before = draw._before_converter(alone, p, drawn.effects, [s.truth(there, p, drawn.effects)])
     if s.driven:
         there = s.driven(there, drawn.effects)
     return there, draw._recorded(alone, before[0], drawn.effects, 0.0, rng)

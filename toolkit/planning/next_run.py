@@ -141,7 +141,7 @@ class RunSearch:
         for name in self._names:
             factors += self._courses(change, name)
         names = [name for name in self._names if name not in dict(change.drives)]
-        rates = RATES if names else ()
+        rates = RATES if names else (change.rate,)
         of_courses = tuple(entry for entry in change.sizes if entry[0] not in names)
         # Faster, and where a rate of change is limited, as much less far.
         factors.append(tuple(dataclasses.replace(change, rate=rate) for rate in rates))
@@ -182,7 +182,7 @@ class RunSearch:
         recorded = dataclasses.replace(change, drives=others)
         return [
             (recorded, *itertools.chain.from_iterable(paces)),
-            tuple(itertools.chain.from_iterable(shapes)) if name in dict(change.drives) else (),
+            tuple(itertools.chain.from_iterable(shapes)) if name in dict(change.drives) else (change,),
         ]
 
     def judge(self, change: Change) -> NextRun | None:
