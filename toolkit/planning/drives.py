@@ -74,14 +74,12 @@ class Pace:
 
 
 def driven(t: Array, drive: Drive, start: float, ends: tuple[float, float], pace: Pace) -> Array:
-    """Return a course (n,) from a start over levels between two ends, at times (n,) [s]."""
+    """Return a course (n,) from a start to the first of two ends and on over levels, at times (n,) [s]."""
     between = 2 * (drive.levels - 1)
-    count = max(round(between * drive.cycles), 2)
+    count = max(round(between * drive.cycles), 1) + 1
     lengths = np.geomspace(1.0, _SHORTEST, count) if drive.swept else np.ones(count)
     edges = t[0] + (t[-1] - t[0]) * np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
-    # From the middle upward: a start is seldom at an end.
-    place = np.arange(count) + drive.levels // 2
-    order = drive.levels - 1 - np.abs((place + 1) % between - (drive.levels - 1))
+    order = drive.levels - 1 - np.abs(np.arange(count) % between - (drive.levels - 1))
     targets = ends[0] + (ends[1] - ends[0]) * order / (drive.levels - 1)
     column, here = np.full(len(t), start), start
     for target, begin, end in zip(targets.tolist(), edges[:-1].tolist(), edges[1:].tolist(), strict=True):
