@@ -60,11 +60,21 @@ def test_a_swept_course_goes_ever_faster() -> None:
     assert (np.diff(np.diff(crossings)) < 0).all()
 
 
-def test_what_is_too_far_for_its_time_is_left_out() -> None:
+def test_what_is_too_far_for_the_time_is_left_out() -> None:
+    # 17 moves at 0.1 a second: from the start to one end, and to and fro.
     slow = driven(T, Drive(cycles=8.0, levels=2), 0.0, ENDS, Pace(rate=0.1))
-    each = 0.1 * (40.0 / 17) / (15 / 8)
-    assert np.ptp(slow) == pytest.approx(each, rel=1e-9)
-    np.testing.assert_array_equal(driven(T, Drive(cycles=1.0), 0.3, ENDS, Pace(rate=0.0)), np.full(len(T), 0.3))
+    whole = 2.0 + 16 * 4.0
+    assert np.abs(np.diff(slow)).sum() == pytest.approx(0.1 * 40.0 / (15 / 8), rel=1e-6)
+    assert np.ptp(slow) == pytest.approx(4.0 / whole * 0.1 * 40.0 / (15 / 8), rel=1e-6)
+    np.testing.assert_array_equal(
+        driven(T, Drive(cycles=1.0), 0.3, ENDS, Pace(rate=0.0)), np.full(len(T), 0.3)
+    )
+
+
+def test_every_level_is_reached_where_the_whole_way_takes_less_than_the_time() -> None:
+    # From the upper end down to the lower and up again: 12 in 40 s, as nearly half of it as may be.
+    column = driven(T, Drive(cycles=1.0, levels=5), 2.0, ENDS, Pace(rate=12.0 * (15 / 8) / 39.0))
+    assert (column.min(), column.max()) == pytest.approx(ENDS)
 
 
 @pytest.mark.parametrize(("rate", "acceleration"), [(2.0, math.inf), (2.0, 3.0), (9.0, 0.5)])

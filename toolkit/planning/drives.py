@@ -3,7 +3,7 @@
 One family of few numbers: over how many levels, how often up and down, evenly or ever faster, with rests or
 without. Steps, a staircase that rests, a slow way through zero and a sweep of frequencies are members of it.
 Every move is the smoothest there is (of least jerk: Flash and Hogan, J. Neurosci. 5 (1985) 1688), so that
-rates of change are continuous too. What a move cannot reach in its time it leaves out.
+rates of change are continuous too. What cannot be reached in the time of a run is left out.
 """
 
 from __future__ import annotations
@@ -74,22 +74,57 @@ class Pace:
 
 
 def driven(t: Array, drive: Drive, start: float, ends: tuple[float, float], pace: Pace) -> Array:
-    """Return a course (n,) from a start to the first of two ends and on over levels, at times (n,) [s]."""
+    """Return a course (n,) from a start to the nearer of two ends and on over levels, at times (n,) [s]."""
     between = 2 * (drive.levels - 1)
     count = max(round(between * drive.cycles), 1) + 1
-    lengths = np.geomspace(1.0, _SHORTEST, count) if drive.swept else np.ones(count)
-    edges = t[0] + (t[-1] - t[0]) * np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
     order = drive.levels - 1 - np.abs(np.arange(count) % between - (drive.levels - 1))
-    targets = ends[0] + (ends[1] - ends[0]) * order / (drive.levels - 1)
-    column, here = np.full(len(t), start), start
-    for target, begin, end in zip(targets.tolist(), edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        reach = pace.farthest(end - begin)
-        move = min(max(target - here, -reach), reach)
-        seconds = pace.shortest(abs(move)) if drive.rests else end - begin
+    first, last = sorted(ends, key=lambda end: abs(end - start))
+    targets = first + (last - first) * order / (drive.levels - 1)
+    span = float(t[-1] - t[0])
+    column, begin = np.full(len(t), start), float(t[0])
+    if pace.rate <= 0 or span <= 0:
+        return column
+    lengths = _swept(targets, start, span, pace) if drive.swept else _even(targets, start, span, pace)
+    for move, needed, length in lengths:
+        seconds = needed if drive.rests else length
         share = np.clip((t - begin) / seconds, 0.0, 1.0) if seconds > 0 else (t > begin).astype(float)
         column += move * share**3 * (10 - 15 * share + 6 * share**2)
-        here += move
+        begin += length
     return np.asarray(column)
+
+
+def _even(targets: Array, start: float, span: float, pace: Pace) -> list[tuple[float, float, float]]:
+    """Return moves, each with the time that it needs and has [s]: smaller ones where the time is too short.
+
+    Each has what it needs and as much of what is left over as any other.
+    """
+    moves = np.diff(targets, prepend=start)
+
+    def needed(share: float) -> Array:
+        return np.array([pace.shortest(share * abs(move)) for move in moves.tolist()])
+
+    share = 1.0
+    if needed(1.0).sum() > span:
+        low, high = 0.0, 1.0
+        for _ in range(50):
+            share = (low + high) / 2
+            low, high = (share, high) if needed(share).sum() <= span else (low, share)
+        share = low
+    seconds = needed(share)
+    lengths = seconds + (span - seconds.sum()) / len(moves)
+    return list(zip((share * moves).tolist(), seconds.tolist(), lengths.tolist(), strict=True))
+
+
+def _swept(targets: Array, start: float, span: float, pace: Pace) -> list[tuple[float, float, float]]:
+    """Return moves in ever less time, each as far toward its level as the time lets it come."""
+    lengths = np.geomspace(1.0, _SHORTEST, len(targets))
+    moves, here = [], start
+    for target, length in zip(targets.tolist(), (span * lengths / lengths.sum()).tolist(), strict=True):
+        reach = pace.farthest(length)
+        move = min(max(target - here, -reach), reach)
+        moves.append((move, pace.shortest(abs(move)), length))
+        here += move
+    return moves
 
 
 def fastest(t: Array, column: Array) -> float:

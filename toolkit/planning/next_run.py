@@ -157,9 +157,9 @@ class RunSearch:
                 tuple(dataclasses.replace(change, sizes=(*sizes, (name, size))) for size in _SIZES)
             )
             others = tuple(entry for entry in change.mirrored if entry != name)
-            factors.append(
-                tuple(dataclasses.replace(change, mirrored=turned) for turned in (others, (*others, name)))
-            )
+            # A course goes to either side by itself.
+            signs = (others, (*others, name)) if name in names else (others,)
+            factors.append(tuple(dataclasses.replace(change, mirrored=turned) for turned in signs))
             flat = tuple(entry for entry in change.levels if entry[0] != name)
             moved = (dataclasses.replace(change, levels=(*flat, (name, level))) for level in _LEVELS)
             factors.append((dataclasses.replace(change, levels=flat), *moved))

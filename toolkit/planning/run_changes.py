@@ -84,7 +84,9 @@ class Change:
                 statements.append(
                     f"{name} held at its middle" if size == 0 else f"{name} {size:g} times as far"
                 )
-        statements += [f"{name} with its sign turned" for name in self.mirrored]
+        statements += [
+            f"{name} with its sign turned" for name in self.mirrored if name not in dict(self.drives)
+        ]
         statements += [f"{name} as {level} as its limits allow" for name, level in self.levels]
         statements += [f"{key}: {value}" for key, value in self.conditions]
         return tuple(statements)
@@ -157,8 +159,7 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
             if source is None:
                 ends = _ends(low, high, sizes.get(name, 1.0), levels.get(name))
                 pace = _pace(problem, name, sources, limits)
-                turned = ends[::-1] if name in change.mirrored else ends
-                column = driven(run.t, drives[name], float(column[0]), turned, pace)
+                column = driven(run.t, drives[name], float(column[0]), ends, pace)
             else:
                 column = _gain(run, source, name) * np.gradient(columns[source], run.t)
         else:
