@@ -6,7 +6,7 @@ Kinds of classes are those that the sealed batches left (`proof/*.jsonl.gz`), as
 case of the kind is drawn anew, diagnosed, and counts where the answer has a class that holds a true effect.
 `plan next` proposes a run; beside it stand a random change within the same limits and a repeat. The
 generator's truth answers each, later than all recordings, with noise of its own; then the members are fitted
-to all recordings. Named is the one that is ahead of all others by what a diagnosis asks for.
+to all recordings, each from where it was. Named is the one that is ahead of all others by what a diagnosis asks for.
 
 Runs are planned within limits as a laboratory would know them of its machine.
 They were fixed before any outcome by them was seen, with these reasons:
@@ -46,6 +46,7 @@ from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.simulators.build_simulator import model_of
@@ -150,6 +151,12 @@ def random_change(search: RunSearch, rng: np.random.Generator) -> Change:
             return change
 
 
+def fitted_again(more: Problem, members: tuple[Member, ...]) -> tuple[Member, ...]:
+    """Return members fitted to all recordings, each from where it was, the likeliest first."""
+    again = [Member(label=member.label, fit=fit(more, member.fit.active)) for member in members]
+    return tuple(sorted(again, key=lambda member: -member.fit.log_posterior))
+
+
 def named(members: tuple[Member, ...]) -> str | None:
     """Return the effect of the member that is ahead of all others by what a diagnosis asks for."""
     first, second = members[:2]
@@ -219,7 +226,7 @@ def after_one_more(
         assert run is not None
         more = with_run(drawn, run, change.run, case.parents[1] / label, rng)
         try:
-            names[label] = named(members_of(more, diagnosis, class_of(diagnosis, case)))
+            names[label] = named(fitted_again(more, members))
         except ToolkitError:
             names[label] = None
     return Outcome(

@@ -186,3 +186,16 @@ def test_the_rate_of_a_course_is_its_channel_and_keeps_its_limits(tmp_path: Path
     assert run.columns["u"].max() == pytest.approx(2.0)
     assert -1.0 <= run.columns["a"].min() < run.columns["a"].max() <= 1.0 + 1e-9
     np.testing.assert_allclose(run.columns["a"], np.gradient(run.columns["u"], run.t), rtol=0.01, atol=1e-9)
+
+
+def test_a_course_begins_within_the_limits_and_only_where_something_was_recorded(tmp_path: Path) -> None:
+    posed = problem(steady_slide(tmp_path))
+    change = Change(run="r0.csv", drives=(("u", Drive(cycles=0.5)),))
+    # The recordings begin at 1 mm/s, and go from 0.5 to 1.5.
+    run = changed(posed, change, RunLimits(values={"u": (-2.0, 0.9), "a": (-2.0, 2.0)}))
+    assert run is not None
+    assert run.columns["u"][0] == 0.9
+    assert run.columns["u"].min() == pytest.approx(-2.0)
+    assert changed(posed, change, RunLimits(values={"u": (1.6, 3.0), "a": (-2.0, 2.0)})) is None
+    # An acceleration that never is zero leaves no course at all.
+    assert changed(posed, change, RunLimits(values={"u": (1.0, 2.0), "a": (0.5, 1.0)})) is None

@@ -73,11 +73,11 @@ class RunSearch:
 
     def best(self) -> Change:
         """Return the change of a recording that parts the members furthest."""
-        start = Change(run=self.problem.runs[0].name)
-        if self._run(start) is None:
-            # Of several inputs beyond their limits none can be changed alone.
-            courses = tuple((name, Drive(cycles=1.0)) for name in self._names)
-            start = dataclasses.replace(start, drives=courses)
+        recorded = Change(run=self.problem.runs[0].name)
+        # Of several inputs beyond their limits none can be changed alone.
+        courses = tuple((name, Drive(cycles=1.0)) for name in self._names)
+        driven = dataclasses.replace(recorded, drives=courses)
+        start = next((change for change in (recorded, driven) if self._run(change) is not None), recorded)
         factors = range(len(self.factors(start)))
         return exchanged(start, self._alternatives, lambda: factors, sweeps=_ROUNDS)
 

@@ -157,9 +157,13 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
         low, high = limits.values.get(name, reach(problem, name))
         if root in drives:
             if source is None:
+                recorded = reach(problem, name)
+                if recorded[1] < low or recorded[0] > high:
+                    return None  # the members are known nowhere there
                 ends = _ends(low, high, sizes.get(name, 1.0), levels.get(name))
                 pace = _pace(problem, name, sources, limits)
-                column = driven(run.t, drives[name], float(column[0]), ends, pace)
+                start = min(max(float(column[0]), low), high)
+                column = driven(run.t, drives[name], start, ends, pace)
             else:
                 column = _gain(run, source, name) * np.gradient(columns[source], run.t)
         else:
