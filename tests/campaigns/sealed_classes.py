@@ -6,7 +6,8 @@ Kinds of classes are those that the sealed batches left (`proof/*.jsonl.gz`), as
 case of the kind is drawn anew, diagnosed, and counts where the answer has a class that holds a true effect.
 `plan next` proposes a run; beside it stand a random change within the same limits and a repeat. The
 generator's truth answers each, later than all recordings, with noise of its own; then the members are fitted
-to all recordings, each from where it was. Named is the one that is ahead of all others by what a diagnosis asks for.
+to all recordings, each from where it was. Named is the one that is ahead of all others by what a diagnosis
+asks for.
 
 Runs are planned within limits as a laboratory would know them of its machine.
 They were fixed before any outcome by them was seen, with these reasons:
