@@ -37,6 +37,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import PchipInterpolator
 
 from proof import draw, proof_file
 from proof import model as generated
@@ -118,7 +119,14 @@ def carried_out(
     later = float(run.t[0] - base.rows[0])  # as the plan has it: after all that was recorded
     for channel, declared in s.channels.items():
         if declared.role in ("input", "covariate") and channel in fine and channel in run.columns:
-            fine[channel] = np.interp(fine["t"], run.t - later, run.columns[channel])
+            rows, values = run.t - later, run.columns[channel]
+            # Between rows as the generator has its own runs: a tire's actuators move smoothly, all other
+            # inputs go straight.
+            fine[channel] = (
+                PchipInterpolator(rows, values)(np.clip(fine["t"], rows[0], rows[-1]))
+                if s.family.startswith("tire")
+                else np.interp(fine["t"], rows, values)
+            )
     if s.family == "drive-force":  # the path is not recorded: it follows the velocity
         fine["x"] = np.cumsum(fine["v"]) * (fine["t"][1] - fine["t"][0])
     fine["t"] = fine["t"] + later

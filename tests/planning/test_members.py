@@ -16,7 +16,7 @@ from toolkit.planning.members import Predicted, class_of, expected_log_evidence,
 
 
 def gaussian(mean: np.ndarray, spread: np.ndarray) -> Predicted:
-    return Predicted(outputs={"F": mean}, spread={"F": spread})
+    return Predicted(outputs={"F": mean}, spread={"F": spread}, between={"F": np.zeros((len(mean), 0))})
 
 
 def member(sd: float) -> Any:

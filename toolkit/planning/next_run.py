@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.planning.drives import Drive
 from toolkit.planning.exchange import Alternatives, exchanged
-from toolkit.planning.members import Member, Predicted, expected_log_evidence, predict
+from toolkit.planning.members import Member, Predicted, denser, expected_log_evidence, predict
 from toolkit.planning.run_changes import RATES, Change, Level, RunLimits, changed, conditions, movable
 
 if TYPE_CHECKING:
@@ -70,6 +70,7 @@ class RunSearch:
     learn: Callable[[Sequence[Run]], None] = lambda _runs: None
     judged: dict[Change, float] = field(default_factory=dict)
     runs: dict[Change, Run | None] = field(default_factory=dict)
+    dense: dict[Run, tuple[Run, Run]] = field(default_factory=dict)
 
     def best(self) -> Change:
         """Return the change of a recording that parts the members furthest."""
@@ -88,14 +89,20 @@ class RunSearch:
         changes = (change, *alternatives)
         runs = [self._run(new) for new in changes if new not in self.judged]
         if self.until() or not self.judged:
-            self.learn([run for run in runs if run is not None])
+            self._learn(runs)
         losses = np.array([-self.value(alternative) for alternative in changes])
         return Alternatives(losses=losses, present=0, design=lambda place: changes[place])
 
     def _run(self, change: Change) -> Run | None:
         if change not in self.runs:
-            self.runs[change] = changed(self.problem, change, self.limits)
+            run = self.runs[change] = changed(self.problem, change, self.limits)
+            if run is not None and self.problem.case.has_time and run.rows > 2:
+                self.dense[run] = denser(run, [channel.name for channel in self.problem.case.drivers])
         return self.runs[change]
+
+    def _learn(self, runs: Iterable[Run | None]) -> None:
+        known = [run for run in runs if run is not None]
+        self.learn([*known, *(dense for run in known for dense in self.dense.get(run, ()))])
 
     def value(self, change: Change) -> float:
         """Return the expected log-evidence of all pairs, each up to certainty; -inf where a run cannot be."""
@@ -114,7 +121,9 @@ class RunSearch:
         return float(np.mean([_CERTAIN * (1 - math.exp(-max(gain, 0.0) / _CERTAIN)) for gain in apart]))
 
     def _predictions(self, run: Run) -> tuple[Predicted, ...] | None:
-        predictions = tuple(predict(self.problem, member, run) for member in self.members)
+        predictions = tuple(
+            predict(self.problem, member, run, self.dense.get(run, ())) for member in self.members
+        )
         known = tuple(predicted for predicted in predictions if predicted is not None)
         return known if len(known) == len(predictions) else None
 
@@ -190,7 +199,7 @@ class RunSearch:
         new = change not in self.runs
         run = self._run(change)
         if new and run is not None:
-            self.learn([run])
+            self._learn([run])
         predictions = None if run is None else self._predictions(run)
         if run is None or predictions is None:
             return None
