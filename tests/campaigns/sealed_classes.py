@@ -37,7 +37,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import Akima1DInterpolator
 
 from proof import draw, proof_file
 from proof import model as generated
@@ -123,7 +123,7 @@ def carried_out(
             # Between rows as the generator has its own runs: a tire's actuators move smoothly, all other
             # inputs go straight.
             fine[channel] = (
-                PchipInterpolator(rows, values)(np.clip(fine["t"], rows[0], rows[-1]))
+                Akima1DInterpolator(rows, values)(np.clip(fine["t"], rows[0], rows[-1]))
                 if s.family.startswith("tire")
                 else np.interp(fine["t"], rows, values)
             )

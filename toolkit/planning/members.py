@@ -130,12 +130,12 @@ def _fits(problem: Problem, place: CandidateEffect, others: Sequence[AppliedEffe
 
 def denser(run: Run, drivers: Sequence[str]) -> tuple[Run, Run]:
     """Return a run with a row between each two, twice: its drivers straight between rows, and smooth."""
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import Akima1DInterpolator
 
     t = np.insert(run.t, np.arange(1, run.rows), (run.t[1:] + run.t[:-1]) / 2)
     straight = {name: np.interp(t, run.t, column) for name, column in run.columns.items()}
     smooth = {
-        name: np.asarray(PchipInterpolator(run.t, run.columns[name])(t))
+        name: np.asarray(Akima1DInterpolator(run.t, run.columns[name])(t))
         for name in drivers
         if name in run.columns
     }
