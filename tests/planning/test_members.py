@@ -100,6 +100,6 @@ def test_a_denser_run_has_its_rows_and_one_between_each_two(tmp_path: Path) -> N
         np.testing.assert_allclose(dense.columns["u"][::2], run.columns["u"], atol=1e-12)
     middle = (run.columns["u"][1:] + run.columns["u"][:-1]) / 2
     np.testing.assert_allclose(straight.columns["u"][1::2], middle)
-    # Of a sine of amplitude 2 the chord lies h²/8 of its curvature inside.
+    # Beyond the corner at 1 s: of a sine of amplitude 2 the chord lies h²/8 of its curvature inside.
     least = 2.0 * (2 * np.pi * 0.2) ** 2 * 0.02**2 / 8
-    assert np.abs(smooth.columns["u"][1::2] - middle)[50:].max() == pytest.approx(least, rel=0.15)
+    assert np.abs(smooth.columns["u"][1::2] - middle)[60:].max() == pytest.approx(least, rel=0.15)
