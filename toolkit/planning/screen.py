@@ -69,7 +69,8 @@ class Screen:
 
         ``designs`` (designs, points) are candidates by their numbers.
         """
-        pseudo = np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA)  # (curves, designs, p, points)
+        pseudo = np.asarray(np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA), dtype=np.float64)
+
         weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
         own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
         curves = _between(self.tangents, pseudo, self.variances[:, designs]) / self.closed
@@ -124,7 +125,7 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
             gradients[row, at] = gradient * scales[at]
     fixed = [sum(u * u for source, u in reach.sources if source not in _OWN) for reach in reaches]
     every, own = np.array(tangents), np.array(variances)
-    pseudo = np.linalg.pinv(every, rcond=_NO_DATA)
+    pseudo = np.asarray(np.linalg.pinv(every, rcond=_NO_DATA), dtype=np.float64)
     return Screen(
         tangents=every,
         variances=own,
