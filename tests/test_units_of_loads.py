@@ -11,7 +11,7 @@ from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.session.session_file import Amount
 from toolkit.errors import ToolkitError
-from toolkit.lab.plans.protocol_plan import _quantity
+from toolkit.lab.plans.planned_loads import load_of
 from toolkit.machine import load_machine, read_protocol
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import read_test_folder
@@ -80,7 +80,7 @@ def test_a_plan_of_a_simulation(unit: str, tmp_path: Path) -> None:
 def test_a_load_in_words_and_a_quantity(unit: str) -> None:
     (load,) = stated(unit, 3700.0)
     assert Amount(value=load, unit=unit).si("force", "doctest") == pytest.approx(3700.0, rel=1e-14)
-    assert _quantity(f"{load:.15f} {unit}") == pytest.approx(3700.0, rel=1e-12)
+    assert load_of(f"{load:.15f} {unit}") == pytest.approx(3700.0, rel=1e-12)
 
 
 def response(unit: str, folder: Path) -> tuple[np.ndarray, float]:

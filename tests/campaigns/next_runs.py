@@ -25,7 +25,8 @@ from tests.coverage.rows import exact_interval
 from tests.planning.class_factory import CASE, SIMULATOR, answer, found, problem
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.planning.members import Member, members_of
-from toolkit.planning.next_run import Change, RunSearch, changed
+from toolkit.planning.next_run import RunSearch
+from toolkit.planning.run_changes import Change, RunLimits, changed
 
 EFFECT = found("channel_delay", "filter_lag")
 T = np.arange(500) * 0.02
@@ -117,13 +118,13 @@ def one(number: int, seed: int, folder: Path) -> dict[str, str] | None:
     members = fitted(posed)
     if lead(members) > AHEAD:
         return None
-    search = RunSearch(problem=posed, members=members, limits={})
+    search = RunSearch(problem=posed, members=members, limits=RunLimits())
     best = search.best()
     outcome = {}
     for kind, change in (
         ("proposed", best), ("random", random_change(search, rng)), ("repeat", Change(run=best.run)),
     ):  # fmt: skip
-        run = changed(posed, change, {})
+        run = changed(posed, change, RunLimits())
         assert run is not None
         more = problem(written(folder / kind, plant, [*inputs, run.columns["u"]], rng, case.parent))
         after = fitted(more)

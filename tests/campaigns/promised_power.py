@@ -23,6 +23,7 @@ from tests.campaigns.next_runs import AHEAD, Plant, T, fitted, lead, random_chan
 from tests.coverage.rows import exact_interval
 from tests.planning.class_factory import problem
 from toolkit.planning.next_run import RunSearch
+from toolkit.planning.run_changes import RunLimits
 
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
 RUNS = 3
@@ -42,7 +43,7 @@ def outcomes(number: int, seed: int, folder: Path) -> Iterator[tuple[float, str]
     members = fitted(posed)
     if lead(members) > AHEAD:
         return
-    search = RunSearch(problem=posed, members=members, limits={})
+    search = RunSearch(problem=posed, members=members, limits=RunLimits())
     for run in range(RUNS):
         judged = search.judge(random_change(search, rng))
         if judged is None:

@@ -1,12 +1,24 @@
 """Classes of many kinds, drawn by the sealed generator: does one proposed run name the right member?
 
-    python -m tests.campaigns.sealed_classes [--minutes 30] [--cases 100] [--seed 25]
+    python -m tests.campaigns.sealed_classes [--minutes 30] [--cases 100] [--seed 27] [--recorded]
 
 Kinds of classes are those that the sealed batches left (`proof/*.jsonl.gz`), as often as they left them. A
 case of the kind is drawn anew, diagnosed, and counts where the answer has a class that holds a true effect.
 `plan next` proposes a run; beside it stand a random change within the same limits and a repeat. The
 generator's truth answers each, later than all recordings, with noise of its own; then the members are fitted
-to all recordings. Named is the one that is ahead of all others by what a diagnosis asks for.
+to all recordings, each from where it was. Named is the one that is ahead of all others by what a diagnosis
+asks for.
+
+Runs are planned within limits as a laboratory would know them of its machine.
+They were fixed before any outcome by them was seen, with these reasons:
+
+- an input reaches 1.5 times the span that was recorded, about its middle: a test seldom goes to the ends of
+  its machine. What was never below zero (a heater's power, a valve's flow, the load of a wheel) stays so;
+- it goes at most three times as fast as recorded, and the channel of its rate as far;
+- a chamber or a bath (`T`, `TA`) is set within 15 K of the middle of what was recorded, three times as fast;
+- the drum's speed stays as recorded: the shafts' angles, which are recorded beside it, go with it.
+
+With `--recorded` no limits are stated but that temperatures can be set again, within what was recorded.
 
 Left out, and counted: kinds that no run of such a plan can ask about (`_OUTSIDE`).
 """
@@ -25,26 +37,32 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import Akima1DInterpolator
 
 from proof import draw, proof_file
 from proof import model as generated
 from proof.catalogue import CONFOUNDED
 from proof.files import write_case
 from tests.coverage.rows import exact_interval
-from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis
+from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.errors import ToolkitError
+from toolkit.planning.drives import fastest
 from toolkit.planning.members import Member, class_of, members_of
-from toolkit.planning.next_run import Change, RunSearch, changed
+from toolkit.planning.next_run import RunSearch
+from toolkit.planning.run_changes import Change, RunLimits, changed, movable, reach
 
 PROOFS = Path(__file__).parents[2] / "proof"
 KINDS = ("proposed", "random", "repeat")
-DIAGNOSIS_S, SEARCH_S = 600.0, 20.0  # of the clock; of the processor
+DIAGNOSIS_S, SEARCH_S = 600.0, 30.0  # of the clock; of the processor
+SPAN, PACE, CHAMBER_K = 1.5, 3.0, 15.0
+CHAMBERS, WITH_SHAFTS = ("T", "TA"), ("V",)
 Kind = tuple[str, str, tuple[str, ...]]  # bucket, family or the class it is drawn for, effects
 
 
@@ -101,7 +119,14 @@ def carried_out(
     later = float(run.t[0] - base.rows[0])  # as the plan has it: after all that was recorded
     for channel, declared in s.channels.items():
         if declared.role in ("input", "covariate") and channel in fine and channel in run.columns:
-            fine[channel] = np.interp(fine["t"], run.t - later, run.columns[channel])
+            rows, values = run.t - later, run.columns[channel]
+            # Between rows as the generator has its own runs: a tire's actuators move smoothly, all other
+            # inputs go straight.
+            fine[channel] = (
+                Akima1DInterpolator(rows, values)(np.clip(fine["t"], rows[0], rows[-1]))
+                if s.family.startswith("tire")
+                else np.interp(fine["t"], rows, values)
+            )
     if s.family == "drive-force":  # the path is not recorded: it follows the velocity
         fine["x"] = np.cumsum(fine["v"]) * (fine["t"][1] - fine["t"][0])
     fine["t"] = fine["t"] + later
@@ -109,7 +134,8 @@ def carried_out(
         base, name="next.csv", fine=fine, rows=base.rows + later, conditions=run.conditions
     )
     alone = dataclasses.replace(s, runs=(there,))
-    before = draw._before_converter(alone, s.true_parameters(), drawn.effects)
+    p = s.true_parameters()
+    before = draw._before_converter(alone, p, drawn.effects, [s.truth(there, p, drawn.effects)])
     if s.driven:
         there = s.driven(there, drawn.effects)
     return there, draw._recorded(alone, before[0], drawn.effects, 0.0, rng)
@@ -134,6 +160,12 @@ def random_change(search: RunSearch, rng: np.random.Generator) -> Change:
             return change
 
 
+def fitted_again(more: Problem, members: tuple[Member, ...]) -> tuple[Member, ...]:
+    """Return members fitted to all recordings, each from where it was, the likeliest first."""
+    again = [Member(label=member.label, fit=fit(more, member.fit.active)) for member in members]
+    return tuple(sorted(again, key=lambda member: -member.fit.log_posterior))
+
+
 def named(members: tuple[Member, ...]) -> str | None:
     """Return the effect of the member that is ahead of all others by what a diagnosis asks for."""
     first, second = members[:2]
@@ -154,7 +186,7 @@ class Outcome:
     steps: str
 
 
-def one(kind: Kind, number: int, seed: int, folder: Path) -> Outcome | str:
+def one(kind: Kind, number: int, seed: int, folder: Path, *, recorded: bool) -> Outcome | str:
     """Return the outcome of a case, or why it does not count."""
     bucket, family, effects = kind
     # Of one effect the sizes of two: a tenth of the noise, as a single one may be, leaves no answer.
@@ -163,26 +195,31 @@ def one(kind: Kind, number: int, seed: int, folder: Path) -> Outcome | str:
     write_case(drawn.scenario, drawn.measured, folder / "before")
     case = folder / "before" / "CASE.toml"
     diagnosis = diagnose(read_case(case), None, budget_s=DIAGNOSIS_S, limits=None).diagnosis
+    return after_one_more(
+        kind, drawn, diagnosis, case, np.random.default_rng([seed, number, 1]), recorded=recorded
+    )
+
+
+def after_one_more(
+    kind: Kind,
+    drawn: draw.Drawn,
+    diagnosis: Diagnosis,
+    case: Path,
+    rng: np.random.Generator,
+    *,
+    recorded: bool,
+) -> Outcome | str:
+    """Return what is named after one more run of each kind, or why the case does not count."""
     found = next((effect for effect in diagnosis.effects if effect.equivalent_to), None)
     if found is None:
         return f"no class: {diagnosis.verdict}"
-    true = [name for name in effects if name in (found.name, *found.equivalent_to)]
+    true = [name for name in kind[2] if name in (found.name, *found.equivalent_to)]
     if len(true) != 1:
         return "no true effect in the class"
-    return _after(kind, drawn, diagnosis, class_of(diagnosis, case), true[0], case, seed, number)
-
-
-def _after(
-    kind: Kind, drawn: draw.Drawn, diagnosis: Diagnosis, effect: DiagnosedEffect, true: str, case: Path,
-    seed: int, number: int,
-) -> Outcome | str:  # fmt: skip
-    rng = np.random.default_rng([seed, number, 1])
     posed = problem(case)
-    members = members_of(posed, diagnosis, effect)
+    members = members_of(posed, diagnosis, class_of(diagnosis, case))
     ends = time.process_time() + SEARCH_S
-    # What has a temperature was set in these plants: a limit says that it can be set again.
-    set_again = {"T", "TA"} & {channel.name for channel in posed.case.drivers}
-    limits = {name: _recorded(posed, name) for name in set_again}
+    limits = recorded_limits(posed) if recorded else laboratory_limits(posed)
     search = RunSearch(
         problem=posed, members=members, limits=limits, until=lambda: time.process_time() < ends
     )
@@ -194,25 +231,43 @@ def _after(
     for label, change in zip(
         KINDS, (best, random_change(search, rng), Change(run=best.run)), strict=True
     ):  # fmt: skip
-        run = changed(posed, change, limits)
+        run = changed(posed, change, RunLimits() if label == "repeat" else limits)
         assert run is not None
         more = with_run(drawn, run, change.run, case.parents[1] / label, rng)
         try:
-            names[label] = named(members_of(more, diagnosis, effect))
+            names[label] = named(fitted_again(more, members))
         except ToolkitError:
             names[label] = None
     return Outcome(
-        kind=kind, members=tuple(member.fit.active[-1].effect.name for member in members), true=true,
+        kind=kind, members=tuple(member.fit.active[-1].effect.name for member in members), true=true[0],
         power=chosen.power, together=chosen.together, named=names, steps="; ".join(best.words()),
     )  # fmt: skip
 
 
-def _recorded(posed: Problem, name: str) -> tuple[float, float]:
-    columns = [run.columns[name] for run in posed.case.runs]
-    return min(float(np.nanmin(c)) for c in columns), max(float(np.nanmax(c)) for c in columns)
+def recorded_limits(posed: Problem) -> RunLimits:
+    """Return no limits but that what has a temperature can be set again."""
+    chambers = {*CHAMBERS} & {channel.name for channel in posed.case.drivers}
+    return RunLimits(values={name: reach(posed, name) for name in chambers})
 
 
-def outcomes(cases: int, minutes: float, seed: int) -> Iterator[Outcome | str]:
+def laboratory_limits(posed: Problem) -> RunLimits:
+    """Return what a laboratory would state of its machine, beyond what it recorded."""
+    values, rates = {}, {}
+    for name, source in movable(posed, recorded_limits(posed)):
+        low, high = reach(posed, name)
+        if name in WITH_SHAFTS:
+            continue
+        middle, half = (low + high) / 2, (high - low) / 2
+        wide = CHAMBER_K if name in CHAMBERS else half * (SPAN if source is None else PACE)
+        floor = 0.0 if low >= 0 and name not in CHAMBERS else -np.inf
+        values[name] = max(middle - wide, floor), middle + wide
+        if source is None:
+            runs = [run for run in posed.case.runs if name in run.columns]
+            rates[name] = PACE * max(fastest(run.t, run.columns[name]) for run in runs)
+    return RunLimits(values=values, rates=rates)
+
+
+def outcomes(cases: int, minutes: float, seed: int, *, recorded: bool) -> Iterator[Outcome | str]:
     """Yield the outcomes of drawn cases, until so many count or the processor has had its minutes."""
     listed, _ = kinds()
     ends = time.process_time() + 60 * minutes
@@ -220,7 +275,7 @@ def outcomes(cases: int, minutes: float, seed: int) -> Iterator[Outcome | str]:
     while counted < cases and time.process_time() < ends:
         kind = listed[int(np.random.default_rng([seed, number]).integers(len(listed)))]
         with tempfile.TemporaryDirectory() as folder:
-            outcome = one(kind, number, seed, Path(folder))
+            outcome = one(kind, number, seed, Path(folder), recorded=recorded)
         number += 1
         counted += isinstance(outcome, Outcome)
         yield outcome
@@ -245,13 +300,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.campaigns.sealed_classes", description=__doc__)
     parser.add_argument("--cases", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=30.0)
-    parser.add_argument("--seed", type=int, default=25)
+    parser.add_argument("--seed", type=int, default=27)
+    parser.add_argument("--recorded", action="store_true")
     given = parser.parse_args()
     listed, absent = kinds()
     sys.stdout.write(f"{len(listed)} classes of sealed batches; left out: {dict(absent)}\n")
     rows: list[Outcome] = []
     uncounted: Counter[str] = Counter()
-    for outcome in outcomes(given.cases, given.minutes, given.seed):
+    for outcome in outcomes(given.cases, given.minutes, given.seed, recorded=given.recorded):
         if isinstance(outcome, str):
             uncounted[outcome] += 1
             sys.stdout.write(f"  not counted: {outcome}\n")

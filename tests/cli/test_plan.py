@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import re
 import shutil
@@ -141,7 +142,7 @@ def test_the_next_run_is_written_with_what_each_member_predicts(run, diagnosed, 
     assert len(rows) == 500
     predicted = (tmp_path / "n" / "predictions.csv").read_text().splitlines()[0]
     assert set(predicted.split(",")) == {"t", "F_channel_delay_on_F", "F_filter_lag_on_F"}
-    assert re.search(r"times as fast", (tmp_path / "n" / "operator.txt").read_text())
+    assert re.search(r"as fast as", (tmp_path / "n" / "operator.txt").read_text())
 
 
 @pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
@@ -168,6 +169,10 @@ def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
         (["--limit", "u=2..1"], "NAME=LOW..HIGH"),
         (["--limit", "w=1..2"], "of u"),
         (["--limit", "u=a..b"], "NAME=LOW..HIGH"),
+        (["--limit", "u=0..inf"], "NAME=LOW..HIGH"),
+        (["--rate", "u=0"], "NAME=MOST"),
+        (["--rate", "u=1..2"], "NAME=MOST"),
+        (["--rate", "w=1"], "of u"),
     ],
 )
 def test_a_limit_that_cannot_be_read(run, diagnosed, arguments, part):
@@ -205,6 +210,14 @@ def test_a_limit_below_what_was_recorded_is_kept_and_the_repeat_is_still_that_of
     assert -1.2 <= min(inputs) < max(inputs) <= 1.2
     free = json.loads(run("plan", "next", diagnosed, "--json").stdout)
     assert json.loads(planned.stdout)["power_of_repeat"] == pytest.approx(free["power_of_repeat"], abs=0.2)
+
+
+def test_a_rate_that_is_stated_is_kept(run, diagnosed, tmp_path):
+    planned = run("plan", "next", diagnosed, "--rate", "u=1.5", "--limit", "u=-4..4", "--out", "n", "--json")
+    assert planned.return_value == 0, planned
+    rows = [row.split(",") for row in (tmp_path / "n" / "next.csv").read_text().splitlines()[1:]]
+    t, u = ([float(row[place]) for row in rows] for place in (0, 1))
+    assert max(abs(b - a) for a, b in itertools.pairwise(u)) <= 1.5 * (t[1] - t[0]) * (1 + 1e-6)
 
 
 def test_limits_that_no_run_keeps_name_the_nearest_that_one_does(run, diagnosed, tmp_path):

@@ -12,11 +12,11 @@ import pytest
 from tests.planning.class_factory import DELAY, answer, found, problem, write_case
 from toolkit.diagnosis.fit.noise import Autoregression
 from toolkit.errors import ConfigError
-from toolkit.planning.members import Predicted, class_of, expected_log_evidence, members_of
+from toolkit.planning.members import Predicted, class_of, denser, expected_log_evidence, members_of
 
 
 def gaussian(mean: np.ndarray, spread: np.ndarray) -> Predicted:
-    return Predicted(outputs={"F": mean}, spread={"F": spread})
+    return Predicted(outputs={"F": mean}, spread={"F": spread}, between={"F": np.zeros((len(mean), 0))})
 
 
 def member(sd: float) -> Any:
@@ -76,3 +76,30 @@ def test_a_class_of_which_one_member_can_be_fitted_is_refused(tmp_path: Path) ->
     with pytest.raises(ConfigError) as error:
         members_of(posed, answer(posed.case.sha256, effect), effect)
     assert error.value.rule == "plan-next"
+
+
+def test_what_rows_leave_open_is_evidence_for_neither() -> None:
+    pattern = np.sin(np.arange(40.0))
+    run: Any = SimpleNamespace(t=np.arange(40.0), rows=40)
+    open_to_one = Predicted(
+        outputs={"F": 5 * pattern}, spread={"F": np.zeros((40, 0))}, between={"F": 3 * pattern[:, None]}
+    )
+    nothing = gaussian(np.zeros(40), np.zeros((40, 0)))
+    both = (member(1.0), member(1.0))
+    free = expected_log_evidence(run, both, gaussian(5 * pattern, np.zeros((40, 0))), nothing)
+    assert free == pytest.approx(12.5 * float(pattern @ pattern))
+    for pair in ((open_to_one, nothing), (nothing, open_to_one)):
+        assert 0 < expected_log_evidence(run, both, *pair) < 0.5 * (5 / 3) ** 2
+
+
+def test_a_denser_run_has_its_rows_and_one_between_each_two(tmp_path: Path) -> None:
+    run = problem(write_case(tmp_path)).runs[0]
+    straight, smooth = denser(run, ["u"])
+    for dense in (straight, smooth):
+        np.testing.assert_array_equal(dense.t[::2], run.t)
+        np.testing.assert_allclose(dense.columns["u"][::2], run.columns["u"], atol=1e-12)
+    middle = (run.columns["u"][1:] + run.columns["u"][:-1]) / 2
+    np.testing.assert_allclose(straight.columns["u"][1::2], middle)
+    # Beyond the corner at 1 s: of a sine of amplitude 2 the chord lies h²/8 of its curvature inside.
+    least = 2.0 * (2 * np.pi * 0.2) ** 2 * 0.02**2 / 8
+    assert np.abs(smooth.columns["u"][1::2] - middle)[60:].max() == pytest.approx(least, rel=0.15)

@@ -13,7 +13,14 @@ from tests.planning.planning_factory import LOADS, earlier
 from toolkit.errors import ConfigError
 from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import Design, Pace, standard
-from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan, load_sets
+from toolkit.planning.protocol_search import (
+    Judged,
+    ProtocolSearch,
+    Question,
+    least_plan,
+    load_sets,
+    refuse_too_short,
+)
 from toolkit.planning.screen import criterion
 from toolkit.planning.tread import Tread
 
@@ -183,3 +190,57 @@ def test_no_plan_leaves_a_curve_open_between_its_slip_angles() -> None:
     assert planned.feasible
     assert planned.openness <= 1
     assert judged(-10, -7, -3, 0, 3, 7, 10).openness < 2
+
+
+def still_about_zero() -> tuple[Question, Tread]:
+    """A tire whose conditions hardly scatter where the wheel runs straight, and what is asked of it."""
+    known = earlier(LOADS[2:3])
+    curves = {}
+    for key, curve in known.curves.items():
+        still = np.where(np.abs(curve.SA) < math.radians(0.5), 1e-6, 1.0)
+        squares = {name: square * still for name, square in curve.squares.items()}
+        curves[key] = dataclasses.replace(curve, squares=squares)
+    tire = dataclasses.replace(known, curves=curves, variances=1e-9 * known.variances, load_spread=0.0)
+    asked = Question(tires=(tire,), demands=(parse_demand("slope_cornering=3 %"),), loads_N=LOADS[2:3])
+    return asked, dataclasses.replace(tread(), tires=(tire,))
+
+
+def test_every_slip_angle_leaves_no_curve_open_however_still_one_of_them_is() -> None:
+    asked, bears = still_about_zero()
+    search = ProtocolSearch(asked, bears, LOADS[2:3])
+    screen = search._screens[0]
+    assert (screen.closed > 2 * screen.variances).any()
+    # The curve comes to where hardly anything scatters through all that does.
+    everything = search.judged(search._full)
+    assert everything.openness == pytest.approx(0.5)
+    assert everything.feasible
+    gaps = [i for i, angle in enumerate(search.candidates) if not 0.02 < abs(angle) < 0.12]
+    assert search.judged(search.design(tuple(gaps))).openness > 2 * everything.openness
+
+
+def test_a_time_in_which_curves_stay_open_is_refused_with_the_least_that_closes_them() -> None:
+    here = LOADS[2:3]
+    # Every angle on one side: with one more on the other the curve is open about zero.
+    asked = question(*[f"FY@{angle}deg=900 N" for angle in range(-10, 0)], loads=here, measured=here)
+    bears = tread(measured=here)
+    eleven, twelve = (
+        PACE.minutes(Design(slip_angles_rad=(0.0,) * count, loads_N=here, rotations=("forward",)))
+        for count in (11, 12)
+    )
+    with pytest.raises(ConfigError) as error:
+        least_plan(asked, bears, minutes=(eleven + twelve) / 2)
+    assert error.value.rule == "plan-infeasible"
+    assert f"{twelve:g} min at least: 12 slip angles" in str(error.value.expected)
+    assert least_plan(asked, bears, minutes=twelve).feasible
+
+
+def test_a_time_that_holds_no_test_is_refused_before_anything_is_known_of_a_tire() -> None:
+    demands = (parse_demand("conicity=2 N"), parse_demand("slope_cornering=3 %"))
+    smallest = Design(slip_angles_rad=(0.0,) * 7, loads_N=LOADS, rotations=("forward", "reverse"))
+    refuse_too_short(demands, LOADS, PACE, PACE.minutes(smallest))
+    with pytest.raises(ConfigError) as error:
+        refuse_too_short(demands, LOADS, PACE, 0.99 * PACE.minutes(smallest))
+    assert error.value.rule == "plan-infeasible"
+    assert f"{math.ceil(10 * PACE.minutes(smallest)) / 10} min" in str(error.value.expected)
+    # One direction alone takes half of the time.
+    refuse_too_short(demands[1:], LOADS, PACE, 0.5 * PACE.minutes(smallest))

@@ -92,6 +92,11 @@ def following(
         "What an input may reach, in its unit; repeatable; default: what was recorded.",
         Mark(metavar="NAME=LOW..HIGH"),
     ] = None,
+    rate: Annotated[
+        list[str] | None,
+        "How fast an input may change, in its unit a second; repeatable; default: four times as recorded.",
+        Mark(metavar="NAME=MOST"),
+    ] = None,
     budget: Annotated[float, "Seconds of the search.", Mark(min=1.0)] = 45.0,
     out: Annotated[
         Path | None, "Folder for the inputs, what each member predicts, and the steps.", INTO_FOLDER
@@ -105,8 +110,9 @@ def following(
     """Propose the run that tells the members of a diagnosis' class apart.
 
     Each member is fitted to the recordings in the others' place. Runs are those that were made, with inputs
-    faster or slower, larger or smaller, one alone, and conditions changed: the one is proposed in which the
-    members' predictions are furthest apart beyond noise and what is open of their parameters.
+    faster or slower, larger or smaller, one alone, on new courses within the limits, and conditions changed:
+    the one is proposed in which the members' predictions are furthest apart beyond noise and what is open of
+    their parameters.
 
     Example: toolkit plan next answer --out next
     """
@@ -116,8 +122,8 @@ def following(
     opened = document_template(template, out)
     with output.progress("planning") as step:
         planned, text = plan_next(
-            source, out, case=case, limits=tuple(limit or ()), budget_s=budget,
-            calibrations=place.calibrations, home=place.home, worker=worker.limits(), template=opened,
-            tell=step,
+            source, out, case=case, limits=tuple(limit or ()), rates=tuple(rate or ()),
+            budget_s=budget, calibrations=place.calibrations, home=place.home, worker=worker.limits(),
+            template=opened, tell=step,
         )  # fmt: skip
     return answered(planned, text, output)

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _STARTS = 3  # of each place, from the first to the last
 _STEP = 1e-4
+_BETWEEN = 3.0  # sd of what rows leave open, in what a row between each two changes: the next ones add to it
 _WIDEST = 3.0  # sd of a parameter that the recordings leave open, in its own size
 
 
@@ -48,11 +49,13 @@ class Member:
 class Predicted:
     """What a member says of a run: ``outputs`` by name (n,), and what is open of them.
 
-    ``spread`` by name (n, parameters): the change by one standard deviation of each independent parameter.
+    ``spread`` by name (n, parameters): the change by one standard deviation of each independent parameter;
+    ``between`` by name (n, k): by what inputs may do between rows, whichever member is true.
     """
 
     outputs: dict[str, Array]
     spread: dict[str, Array]
+    between: dict[str, Array]
 
 
 def class_of(diagnosis: Diagnosis, where: object) -> DiagnosedEffect:
@@ -125,8 +128,31 @@ def _fits(problem: Problem, place: CandidateEffect, others: Sequence[AppliedEffe
             continue
 
 
-def predict(problem: Problem, member: Member, run: Run) -> Predicted | None:
-    """Return what a member says of a run; None where its simulation gives no number."""
+def denser(run: Run, drivers: Sequence[str]) -> tuple[Run, Run]:
+    """Return a run with a row between each two, twice: its drivers straight between rows, and smooth."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    t = np.insert(run.t, np.arange(1, run.rows), (run.t[1:] + run.t[:-1]) / 2)
+    straight = {name: np.interp(t, run.t, column) for name, column in run.columns.items()}
+    smooth = {
+        name: np.asarray(Akima1DInterpolator(run.t, run.columns[name])(t))
+        for name in drivers
+        if name in run.columns
+    }
+    return (
+        dataclasses.replace(run, t=t, columns=straight),
+        dataclasses.replace(run, t=t, columns=straight | smooth),
+    )
+
+
+def predict(problem: Problem, member: Member, run: Run, dense: Sequence[Run] = ()) -> Predicted | None:
+    """Return what a member says of a run; None where its simulation gives no number.
+
+    Parameters
+    ----------
+    dense : the run with twice the rows (`denser`): what each changes is what rows leave open. Of effects that
+        are shorter than a row, predictions differ by what inputs do between rows, which no recording shows.
+    """
     fitted = member.fit
     centre = _simulated(problem, run, fitted.p, fitted.active)
     if centre is None:
@@ -150,7 +176,18 @@ def predict(problem: Problem, member: Member, run: Run) -> Predicted | None:
             slopes[output][:, at] = (column - centre[output]) / step
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return Predicted(outputs=centre, spread={name: columns @ root for name, columns in slopes.items()})
+    spread = {name: columns @ root for name, columns in slopes.items()}
+    finer = [_simulated(problem, other, fitted.p, fitted.active) for other in dense]
+    known = [outputs for outputs in finer if outputs is not None]
+    if len(known) < len(finer):
+        return None
+    between = {
+        name: np.array([_BETWEEN * (outputs[name][::2] - column) for outputs in known])
+        .reshape(-1, run.rows)
+        .T
+        for name, column in centre.items()
+    }
+    return Predicted(outputs=centre, spread=spread, between=between)
 
 
 def _tamed(fitted: Fit, places: Sequence[tuple[int | None, str]]) -> Array:
@@ -182,7 +219,7 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
 
     The divergence of two Gaussians with covariances I + W W^T in the noise's standard deviations (Woodbury's
     identity). Each fit has taken what it does not explain for noise: the noise counts under which the two
-    are less apart.
+    are less apart. What rows leave open by either is open to both.
 
     Parameters
     ----------
@@ -193,7 +230,10 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
 
 def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, rival: Predicted) -> float:
     gap = _white(run, {name: true.outputs[name] - column for name, column in rival.outputs.items()}, noise)
-    own, rivals = _white(run, true.spread, noise), _white(run, rival.spread, noise)
+    open_to_both = [_white(run, predicted.between, noise) for predicted in (true, rival)]
+    own, rivals = (
+        np.hstack([_white(run, predicted.spread, noise), *open_to_both]) for predicted in (true, rival)
+    )
     inner, of_own = (np.eye(w.shape[1]) + w.T @ w for w in (rivals, own))
     through, crossed = rivals.T @ gap, rivals.T @ own
     squares = float(gap @ gap - through @ np.linalg.solve(inner, through))

@@ -22,7 +22,7 @@ from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import by_name
 from toolkit.errors import ConfigError
 from toolkit.planning.demands import Demand
-from toolkit.planning.design import Design, steps_of
+from toolkit.planning.design import Design, Pace, steps_of
 from toolkit.planning.exchange import Points, PointSearch
 from toolkit.planning.reach import Reach, is_of, worst
 from toolkit.planning.screen import Screen, criterion, openness, screen_of
@@ -77,8 +77,7 @@ class Question:
     @property
     def rotations(self) -> tuple[Rotation, ...]:
         """The directions that the demands need: forward alone where none is of both."""
-        both = any(by_name()[demand.characteristic].scope == "load" for demand in self.demands)
-        return ROTATIONS if both else ROTATIONS[:1]
+        return rotations_of(self.demands)
 
     @cached_property
     def candidates_rad(self) -> tuple[float, ...]:
@@ -303,7 +302,7 @@ def least_plan(
     Raises
     ------
     ConfigError
-        ``plan-infeasible``: the time does not hold the smallest design
+        ``plan-infeasible``: the time does not hold the smallest design, or none that leaves no curve open
     """
     met, missed, shortest = None, None, math.inf
     for loads in load_sets(question):
@@ -321,13 +320,49 @@ def least_plan(
             nearer = missed is None or _distance(nearest) < _distance(missed)
             missed = nearest if nearer else missed
     if met is None and missed is None:
-        raise ConfigError(
-            "no test fits into the time", where="--minutes", got=f"{minutes + beside:g} min",
-            expected=f"{math.ceil(10 * (shortest + beside)) / 10:g} min at least: {MIN_POINTS} slip angles, "
-            f"the fewest of a curve{', and the sweeps' * (beside > 0)}",
-            next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
-        )  # fmt: skip
+        raise _too_short(minutes, shortest, beside)
+    if met is None and missed is not None and missed.openness > 1 >= missed.worst and minutes < math.inf:
+        longer = least_plan(question, tread, beside=beside, tell=tell)
+        if longer.feasible:
+            count = len(longer.design.slip_angles_rad)
+            raise _too_short(minutes, longer.minutes, beside, count, "the fewest that leave no curve open")
     return met or cast("Judged", missed)
+
+
+def refuse_too_short(demands: Sequence[Demand], loads_N: Sequence[float], pace: Pace, minutes: float) -> None:
+    """Refuse a time that does not hold the smallest design, before anything is known of a tire.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-infeasible``, with the least time
+    """
+    smallest = Design(
+        slip_angles_rad=(0.0,) * MIN_POINTS, loads_N=tuple(loads_N), rotations=rotations_of(demands)
+    )
+    if pace.minutes(smallest) > minutes:
+        raise _too_short(minutes, pace.minutes(smallest), 0.0)
+
+
+def _too_short(
+    minutes: float,
+    shortest: float,
+    beside: float,
+    points: int = MIN_POINTS,
+    why: str = "the fewest of a curve",
+) -> ConfigError:
+    return ConfigError(
+        "no test fits into the time", where="--minutes", got=f"{minutes + beside:g} min",
+        expected=f"{math.ceil(10 * (shortest + beside)) / 10:g} min at least: {points} slip angles, "
+        f"{why}{', and the sweeps' * (beside > 0)}",
+        next_step="allow more time, or ask for fewer loads", rule="plan-infeasible",
+    )  # fmt: skip
+
+
+def rotations_of(demands: Sequence[Demand]) -> tuple[Rotation, ...]:
+    """Return the directions that demands need: forward alone where none is of both."""
+    both = any(by_name()[demand.characteristic].scope == "load" for demand in demands)
+    return ROTATIONS if both else ROTATIONS[:1]
 
 
 def _distance(judged: Judged) -> tuple[float, float]:

@@ -41,7 +41,8 @@ _STEP = 1e-4  # of a parameter's size
 _NO_DATA = 1e-8
 _COVERAGE = 1.96
 _POWER = 16
-# The standard uncertainty of a curve, anywhere in its range, in that of a condition there, at most.
+# The standard uncertainty of a curve, anywhere in its range, at most: in that of a condition there, or of
+# what the design of every candidate leaves there, which no other design makes smaller.
 _OPEN = 2.0
 
 
@@ -50,12 +51,14 @@ class Screen:
     """Demands on the curves of a list of candidate slip angles.
 
     ``tangents`` (curves, candidates, parameters), scaled, and ``variances`` (curves, candidates) of their
-    conditions; ``gradients`` (readings, curves, parameters) in the same scale; ``fixed`` (readings,) the
+    conditions; ``closed`` (curves, candidates) the variances of a curve that no slip angle leaves open;
+    ``gradients`` (readings, curves, parameters) in the same scale; ``fixed`` (readings,) the
     variances that stay, ``limits`` (readings,) of the expanded uncertainty.
     """
 
     tangents: Array
     variances: Array
+    closed: Array
     gradients: Array
     fixed: Array
     limits: Array
@@ -66,12 +69,18 @@ class Screen:
 
         ``designs`` (designs, points) are candidates by their numbers.
         """
-        pseudo = np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA)  # (curves, designs, p, points)
+        pseudo = np.asarray(np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA), dtype=np.float64)
+
         weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
         own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
-        between = self.tangents[:, None] @ pseudo  # (curves, designs, candidates, points)
-        curves = np.einsum("cdkn,cdn->dck", between**2, self.variances[:, designs]) / self.variances
+        curves = _between(self.tangents, pseudo, self.variances[:, designs]) / self.closed
         return _COVERAGE * np.sqrt(self.fixed + own) / self.limits, np.sqrt(curves.max(axis=2)) / _OPEN
+
+
+def _between(tangents: Array, pseudo: Array, variances: Array) -> Array:
+    """Return the variances of curves at every candidate (designs, curves, candidates)."""
+    between = tangents[:, None] @ pseudo  # (curves, designs, candidates, points)
+    return np.asarray(np.einsum("cdkn,cdn->dck", between**2, variances))
 
 
 def criterion(screens: Sequence[Screen], designs: NDArray[np.intp]) -> Array:
@@ -115,9 +124,12 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
             at = places[direction.group.load_N, direction.group.rotation, channel]
             gradients[row, at] = gradient * scales[at]
     fixed = [sum(u * u for source, u in reach.sources if source not in _OWN) for reach in reaches]
+    every, own = np.array(tangents), np.array(variances)
+    pseudo = np.asarray(np.linalg.pinv(every, rcond=_NO_DATA), dtype=np.float64)
     return Screen(
-        tangents=np.array(tangents),
-        variances=np.array(variances),
+        tangents=every,
+        variances=own,
+        closed=np.maximum(own, _between(every, pseudo[:, None], own[:, None])[0]),
         gradients=gradients,
         fixed=np.array(fixed),
         limits=np.array([reach.limit for reach in reaches]),

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.planning.members import Member
     from toolkit.planning.next_run import NextRun
+    from toolkit.planning.run_changes import RunLimits
     from toolkit.report.content import Plot
     from toolkit.report.word.package import Template
     from toolkit.worker.posix import Limits
@@ -48,6 +49,7 @@ def plan_next(
     *,
     case: Path | None = None,
     limits: Sequence[str] = (),
+    rates: Sequence[str] = (),
     budget_s: float = 60.0,
     calibrations: Path | None = None,
     home: Path | None = None,
@@ -61,7 +63,7 @@ def plan_next(
     ----------
     source : folder of ``toolkit diagnose --out``, or its diagnosis.json
     case : the case file; by default the one that the answer's model names
-    limits : ``NAME=LOW..HIGH`` in the channel's unit
+    limits, rates : ``NAME=LOW..HIGH`` in the channel's unit, ``NAME=MOST`` in that a second
     budget_s : seconds of the search over runs
     worker : limits of the case's own code; None runs it in this process
     template : of the sheet that stands in ``out`` beside the other files; None for none
@@ -82,7 +84,8 @@ def plan_next(
     from toolkit.lab.plans.plan_sheets import next_sheet, sheet_text, write_plan
     from toolkit.lab.studies.diagnosis import machine_registry
     from toolkit.planning.members import class_of, members_of
-    from toolkit.planning.next_run import Change, RunSearch
+    from toolkit.planning.next_run import RunSearch
+    from toolkit.planning.run_changes import Change, RunLimits
 
     stated = None if case is None else read_case(case)
     diagnosis, file = read_answer(source)
@@ -98,7 +101,7 @@ def plan_next(
         if code is not None:
             code.until = time.monotonic() + 10 * budget_s
         problem = problem_of(read, model_of(read, registry, code))
-        reach = _limits(limits, read)
+        reach = _limits(limits, rates, read)
         tell("the members of the class")
         members = members_of(problem, diagnosis, effect)
         tell("runs")
@@ -112,7 +115,7 @@ def plan_next(
         if chosen is None and reach:
             raise _infeasible(problem, reach)
         # A repeat was made once: limits of the next run are none of it.
-        recorded = dataclasses.replace(search, limits={}, judged={}, runs={}) if reach else search
+        recorded = dataclasses.replace(search, limits=RunLimits(), judged={}, runs={}) if reach else search
         repeat = recorded.judge(Change(run=best.run))
     if chosen is None or repeat is None:
         raise _wrong("no run can be simulated", read.path, best.run, "a run of the case",
@@ -144,21 +147,29 @@ def _case_of(file: Path) -> Path:
     return Path(os.path.normpath(file.parent / named))
 
 
-def _limits(texts: Sequence[str], case: Case) -> dict[str, tuple[float, float]]:
+def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits:
+    from toolkit.planning.run_changes import RunLimits
+
     names = [channel.name for channel in case.drivers]
-    limits = {}
-    for text in texts:
-        name, _, span = text.partition("=")
-        low, _, high = span.partition("..")
+
+    def read(text: str, option: str, form: str, count: int) -> tuple[str, tuple[float, ...]]:
+        name, _, numbers = text.partition("=")
         try:
-            ends = (float(low), float(high))
+            ends = tuple(float(number) for number in numbers.split(".."))
         except ValueError:
-            ends = (1.0, 0.0)
-        if name.strip() not in names or not ends[0] < ends[1]:
-            raise _wrong("a limit cannot be read", "--limit", text,
-                         f"NAME=LOW..HIGH of {', '.join(names)}", "write for example SA=-10..10")  # fmt: skip
-        limits[name.strip()] = ends
-    return limits
+            ends = ()
+        rising = len(ends) == count and all(map(math.isfinite, ends)) and (ends[0] < ends[-1] or count == 1)
+        if name.strip() not in names or not rising or (count == 1 and ends[0] <= 0):
+            raise _wrong("a limit cannot be read", option, text, f"{form} of {', '.join(names)}",
+                         f"write for example SA={'-10..10' if count > 1 else '5'}")  # fmt: skip
+        return name.strip(), ends
+
+    values = dict(read(text, "--limit", "NAME=LOW..HIGH", 2) for text in spans)
+    fastest = dict(read(text, "--rate", "NAME=MOST, above 0,", 1) for text in rates)
+    return RunLimits(
+        values={name: (low, high) for name, (low, high) in values.items()},
+        rates={name: most for name, (most,) in fastest.items()},
+    )
 
 
 def _plan(
@@ -294,17 +305,22 @@ def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in conditions.items() if key != "file"}
 
 
-def _infeasible(problem: Problem, limits: Mapping[str, tuple[float, float]]) -> ConfigError:
+def _infeasible(problem: Problem, limits: RunLimits) -> ConfigError:
     """Return the error of limits that no change of a recording keeps, with the nearest."""
-    from toolkit.planning.next_run import nearest_limits
+    from toolkit.planning.run_changes import nearest_limits
 
     run, nearest = nearest_limits(problem, limits)
+
     # Rounded outward: the recording itself lies on the limit.
-    wide = " ".join(f"--limit {name}={_ends(*span)}" for name, span in nearest.items())
+    def stated(of: RunLimits, ends: Callable[[float, float], str]) -> str:
+        spans = [f"--limit {name}={ends(*span)}" for name, span in of.values.items()]
+        return " ".join(spans + [f"--rate {name}={ends(0.0, most)[3:]}" for name, most in of.rates.items()])
+
     return ConfigError(
-        "no run stays within the limits", where="--limit",
-        got=" ".join(f"{name}={low:g}..{high:g}" for name, (low, high) in limits.items()),
-        expected=f"nearest: what was recorded in {run}", next_step=f"ask with {wide}; nothing was written",
+        "no run stays within the limits", where="--limit, --rate",
+        got=stated(limits, lambda low, high: f"{low:g}..{high:g}"),
+        expected=f"nearest: what was recorded in {run}",
+        next_step=f"ask with {stated(nearest, _ends)}; nothing was written",
         rule="plan-infeasible",
     )  # fmt: skip
 

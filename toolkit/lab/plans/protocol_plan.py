@@ -17,11 +17,13 @@ from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.findings import FindingEntry
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
+from toolkit.lab.plans.planned_loads import load_of, nominal_loads
 from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
 from toolkit.planning.protocol_plan import ProtocolPlan
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
+    from toolkit.planning.demands import Demand
     from toolkit.planning.expectation import EarlierTest
     from toolkit.planning.printed_units import PrintedUnits
     from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
@@ -45,7 +47,6 @@ class PlanTestAnswer(ProtocolPlan):
 PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
 DEMANDS = ("slope_cornering", "conicity", "plysteer", "peak")
 _SIMULATED = 3  # tests of a tire file: the scatter of one alone is not sure
-_NEAR = 0.15  # a load that is asked for is the nominal one within this part of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +99,7 @@ def plan_test(
     labels = [demand.label for demand in demands]
     _refuse_doubled(labels, where="--u", what="a characteristic has two demands")
     _refuse_endless(order)
-    _refuse_strange_loads(order)
+    _refuse_before_a_test(order, demands)
     tell("the earlier test")
     tires, like, tire = _tires(order, spread)
     own = tires[0].machine
@@ -107,7 +108,7 @@ def plan_test(
         energy_J=1e3 * order.sliding_kJ, rise_K=order.rise_K,
     )  # fmt: skip
     plan = plan_protocol(
-        tires, demands, _loads(order.loads, shared_loads(tires)), machine=own, like=like,
+        tires, demands, nominal_loads(order.loads, shared_loads(tires)), machine=own, like=like,
         minutes=order.minutes, tread=tread, tell=tell,
     )  # fmt: skip
     if not plan.feasible:
@@ -260,53 +261,26 @@ def _within_its_loads(plan: Plan, like: Path) -> Plan:
     return dataclasses.replace(plan, loads_N=loads)
 
 
-def _loads(texts: Sequence[str], known_N: Sequence[float]) -> tuple[float, ...]:
-    """Return the nominal loads that are asked for, of those that are known [N]; all by default."""
-    from toolkit.units import in_both
+def _refuse_before_a_test(order: ProtocolOrder, demands: Sequence[Demand]) -> None:
+    """Refuse loads that cannot be read, or that no test simulated for the plan has, and a time that holds no
+    test at them: before any is simulated.
+    """
+    from toolkit.planning.design import pace_of
+    from toolkit.planning.protocol_search import refuse_too_short
 
-    if not texts:
-        return tuple(known_N)
-    loads = []
-    for text in texts:
-        asked = _quantity(text)
-        nearest = min(known_N, key=lambda load: abs(load - asked))
-        if abs(nearest - asked) > _NEAR * nearest:
-            raise _wrong_load(text, in_both(list(known_N), "lbf", ".0f"))
-        loads.append(nearest)
-    return tuple(sorted(set(loads)))
-
-
-def _refuse_strange_loads(order: ProtocolOrder) -> None:
-    """Refuse loads that cannot be read, or that no test simulated for the plan has: before any is made."""
     for text in order.loads:
-        _quantity(text)
-    if not order.loads:
+        load_of(text)
+    if not order.loads and math.isinf(order.minutes):
         return
+    known: list[set[float]] = []
     for like in order.like or (None,):
-        if like is None or like.suffix.lower() in _TIRE_FILES:
-            _loads(order.loads, _virtual_plan(like).loads_N)
-
-
-def _quantity(text: str) -> float:
-    import re
-
-    from toolkit.errors import UnitError
-    from toolkit.units import si_scale
-
-    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(\S.*?)\s*", text)
-    if match is None:
-        raise _wrong_load(text, "a number with its unit: '833 lbf', '3700 N'")
-    try:
-        return float(match[1]) * si_scale(match[2], "force", where="--load")
-    except UnitError as error:
-        raise _wrong_load(text, "a force with its unit: '833 lbf', '3700 N'") from error
-
-
-def _wrong_load(actual: str, expected: str) -> ConfigError:
-    return ConfigError(
-        "a load cannot be planned", where="--load", got=actual, expected=expected,
-        next_step="name a load that the earlier test measured, or another test", rule="plan-load",
-    )  # fmt: skip
+        if like is not None and like.suffix.lower() not in _TIRE_FILES:
+            continue
+        plan = _virtual_plan(like)
+        known.append(set(nominal_loads(order.loads, plan.loads_N)))
+        if len(known) == max(len(order.like), 1) and (shared := set.intersection(*known)):
+            pace = pace_of(plan.machine, between_files_s=order.between_files_s)
+            refuse_too_short(demands, sorted(shared), pace, order.minutes)
 
 
 def _beyond(plan: ProtocolPlan, order: ProtocolOrder) -> ConfigError | None:
@@ -350,17 +324,12 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
     limit = "" if math.isinf(minutes) else f" in {minutes:g} min"
     if not missed:
         asked = ", ".join(dict.fromkeys(value.name for value in plan.values))
-        loads = ", ".join(f"{load:.0f} N" for load in plan.plan.loads_N)
         return ConfigError(
-            f"no test{limit} knows its curves between the slip angles",
-            where="--minutes" if limit else "--like, --u, --load",
-            got=f"{asked} at {loads}, of {plan.like}; {len(plan.plan.slip_angles_deg)} slip angles are tried",
+            f"no test{limit} within the limits knows its curves between the slip angles",
+            where="--minutes, --sliding, --rise",
+            got=f"{asked}; {len(plan.plan.slip_angles_deg)} slip angles are nearest",
             expected="slip angles that leave no part of a curve open",
-            next_step="allow more time, or ask for fewer loads"
-            if limit
-            else "the machine has no angles between: ask for fewer loads or characteristics, or plan by a "
-            "test of a tire whose curves its steps follow",
-            rule="plan-infeasible",
+            next_step="allow more of what is limited, or ask for fewer loads", rule="plan-infeasible",
         )  # fmt: skip
     angles = ", ".join(f"{angle:g}" for angle in sorted(plan.plan.slip_angles_deg))
     swept = "" if plan.sweeps is None else f" and {len(plan.sweeps.recordings)} sweeps"

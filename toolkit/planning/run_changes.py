@@ -1,0 +1,285 @@
+"""What can be changed of a run that was made, within limits, and the inputs that this gives.
+
+A run is a recording of the case with factors changed: how fast its inputs go, how far, which way, which of
+them alone moves, a new course of an input (`drives`), a condition such as the way the drum turns or how the
+tire stands on its hub. Inputs stay within what was recorded, or within limits that are given. A channel that
+is another one's rate of change stays that. A covariate is measured and not set: it goes on as it was
+recorded, unless a limit is given, which says that it can be set.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.setting import pauses
+from toolkit.planning.drives import Drive, Pace, driven, fastest
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Run
+    from toolkit.diagnosis.fit.problem import Problem
+
+    Array = NDArray[np.float64]
+
+Level = Literal["low", "high"]
+
+RATES = (0.25, 0.5, 1.0, 2.0, 4.0)
+"""How many times as fast as recorded a run may be."""
+_OF_A_RECORDING = ("phase", "date", "order", "repeat_of", "file")  # and of no other run
+_IS_RATE = 0.98  # of the variance of a channel that another one's derivative explains
+_SLACK = 1e-9
+# What else can be done with a tire on a drum, beside the conditions that the recordings have.
+_TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunLimits:
+    """What the machine allows, by channel in its unit: ``values`` (low, high), ``rates`` a second.
+
+    What is not stated is as recorded: the span of values, and up to four times the rate.
+    """
+
+    values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    rates: Mapping[str, float] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        """Tell whether anything is stated."""
+        return bool(self.values or self.rates)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """What is changed of a recording: nothing by default.
+
+    ``rate`` of the inputs, ``sizes`` of each about its middle, ``mirrored`` those whose sign is turned, rates
+    of change with them, ``levels`` of those that are moved to an end of their limits, ``drives`` those that
+    have a course of their own between their limits, ``conditions`` that differ.
+    """
+
+    run: str
+    rate: float = 1.0
+    sizes: tuple[tuple[str, float], ...] = ()
+    mirrored: tuple[str, ...] = ()
+    levels: tuple[tuple[str, Level], ...] = ()
+    drives: tuple[tuple[str, Drive], ...] = ()
+    conditions: tuple[tuple[str, str], ...] = ()
+
+    def words(self) -> tuple[str, ...]:
+        """Return what an operator has to do, one statement each."""
+        statements = [f"drive the inputs of {self.run}"]
+        if self.rate != 1.0:
+            statements.append(f"{self.rate:g} times as fast")
+        at_rest = {name for name, size in self.sizes if size == 0}
+        statements += [f"{name} {drive.words()}" for name, drive in self.drives if name not in at_rest]
+        for name, size in self.sizes:
+            if size != 1.0:
+                statements.append(
+                    f"{name} held at its middle" if size == 0 else f"{name} {size:g} times as far"
+                )
+        statements += [
+            f"{name} with its sign turned" for name in self.mirrored if name not in dict(self.drives)
+        ]
+        statements += [f"{name} as {level} as its limits allow" for name, level in self.levels]
+        statements += [f"{key}: {value}" for key, value in self.conditions]
+        return tuple(statements)
+
+
+def conditions(problem: Problem) -> dict[str, tuple[str, ...]]:
+    """Return the values that each condition may have: those of the recordings, and turns of tire and drum."""
+    values: dict[str, tuple[str, ...]] = {}
+    for run in problem.case.runs:
+        for key, value in run.conditions.items():
+            if key not in _OF_A_RECORDING:
+                values[key] = tuple(dict.fromkeys((*values.get(key, ()), value)))
+    if problem.case.simulation.kind == "machine":
+        values |= _TURNS
+    return values
+
+
+def movable(problem: Problem, limits: RunLimits) -> tuple[tuple[str, str | None], ...]:
+    """Return the channels that a run may move, each with the one whose rate of change it is.
+
+    Inputs that go up and down, what they are the rates of change of or have for one, and what has a limit. A
+    channel that only grows, such as a shaft's angle, goes on as it was recorded.
+    """
+    run = max(problem.runs, key=lambda run: run.rows)
+    present = [channel for channel in problem.case.drivers if channel.name in run.columns]
+    stated = {*limits.values, *limits.rates}
+    names = [c.name for c in present if c.name in stated or _goes_back(run.columns[c.name])]
+    sources = {name: _source(run, name, names) for name in names}
+    settable = {c.name for c in present if c.role == "input" or c.name in stated}
+    families = {_root(name, sources) for name in settable.intersection(names)}
+    return tuple((name, sources[name]) for name in names if _root(name, sources) in families)
+
+
+def _goes_back(column: Array) -> bool:
+    steps = np.diff(column)
+    return bool((steps > 0).any() and (steps < 0).any())
+
+
+def _source(run: Run, name: str, names: Sequence[str]) -> str | None:
+    """Return the channel of which another one is the rate of change; None for none."""
+    column = run.columns[name] - run.columns[name].mean()
+    for source in names:
+        if source == name or run.rows < 3:
+            continue
+        rate = np.gradient(run.columns[source], run.t)
+        rate = rate - rate.mean()
+        size = float(np.sum(rate**2) * np.sum(column**2))
+        # Of a sine the rate's rate is the sine again, with its sign turned: it is not what drives it.
+        follows = float(np.sum(rate * column))
+        if size > 0 and follows > 0 and follows**2 / size > _IS_RATE:
+            return source
+    return None
+
+
+def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
+    """Return the recording as changed; None where an input leaves what it may reach, or is too fast."""
+    run = next(run for run in problem.runs if run.name == change.run)
+    # Faster inputs come again within the same time, there and back.
+    span = run.t[-1] - run.t[0]
+    phase = np.mod((run.t - run.t[0]) * change.rate / span, 2.0) if span > 0 else np.zeros(run.rows)
+    back = phase > 1.0
+    at = run.t[0] + span * np.where(back, 2.0 - phase, phase)
+    sizes, levels, drives = dict(change.sizes), dict(change.levels), dict(change.drives)
+    columns = dict(run.columns)
+    sources = dict(movable(problem, limits))
+    for name, depth in sorted(_depths(sources).items(), key=lambda entry: entry[1]):
+        column, source, root = run.columns[name], sources[name], _root(name, sources)
+        low, high = limits.values.get(name, reach(problem, name))
+        if root in drives:
+            if source is None:
+                recorded = reach(problem, name)
+                if recorded[1] < low or recorded[0] > high:
+                    return None  # the members are known nowhere there
+                ends = _ends(low, high, sizes.get(name, 1.0), levels.get(name))
+                pace = _pace(problem, name, sources, limits)
+                start = min(max(float(column[0]), low), high)
+                column = driven(run.t, drives[name], start, ends, pace)
+            else:
+                column = _gain(run, source, name) * np.gradient(columns[source], run.t)
+        else:
+            middle = 0.0 if depth else float(np.median(column))
+            turn = np.where(back, -1.0, 1.0) ** depth * change.rate**depth
+            column = middle + sizes.get(root, 1.0) * (np.interp(at, run.t, column) * turn - middle)
+            if root in change.mirrored:
+                column = -column
+            if name in levels:
+                column = column + (low - column.min() if levels[name] == "low" else high - column.max())
+        columns[name] = column
+        slack = _SLACK * max(abs(low), abs(high), 1e-300)
+        if column.min() < low - slack or column.max() > high + slack:
+            return None
+        if name in limits.rates and fastest(run.t, column) > limits.rates[name] * (1 + _SLACK):
+            return None
+    later = _later(problem, run)
+    for channel in problem.case.channels:
+        if channel.role == "time":
+            columns[channel.name] = run.columns[channel.name] + later / unit(channel.unit).factor
+    unchanged = {key: value for key, value in run.conditions.items() if key not in _OF_A_RECORDING}
+    return dataclasses.replace(
+        run, name="next.csv", t=run.t + later, columns=columns,
+        conditions=unchanged | dict(change.conditions), declared={**run.declared, **dict(change.conditions)},
+    )  # fmt: skip
+
+
+def _depths(sources: Mapping[str, str | None]) -> dict[str, int]:
+    """Return of each channel how many rates of change it is away from what drives it."""
+    depths = {}
+    for name in sources:
+        depth, source = 0, sources[name]
+        while source is not None and depth < len(sources):
+            depth, source = depth + 1, sources[source]
+        depths[name] = depth
+    return depths
+
+
+def _ends(low: float, high: float, size: float, level: Level | None) -> tuple[float, float]:
+    """Return the ends of a course: a part of what an input may reach, about its middle or at one end."""
+    span = size * (high - low)
+    if level is not None:
+        return (low, low + span) if level == "low" else (high - span, high)
+    return (low + high - span) / 2, (low + high + span) / 2
+
+
+def _pace(problem: Problem, name: str, sources: Mapping[str, str | None], limits: RunLimits) -> Pace:
+    """Return how fast an input may change: as stated, by the limits of its rates, or as it was recorded."""
+    runs = [run for run in problem.case.runs if name in run.columns]
+    recorded = max(fastest(run.t, run.columns[name]) for run in runs)
+    paces = [limits.rates.get(name, RATES[-1] * recorded), math.inf]
+    child: str | None = name
+    for order in range(2):
+        source = child
+        child = next((rate for rate, of in sources.items() if of == source), None)
+        if child is None or source is None:
+            break
+        low, high = limits.values.get(child, reach(problem, child))
+        gain = max((_gain(run, source, child) for run in runs), default=1.0)
+        paces[order] = min(paces[order], max(min(-low, high), 0.0) / gain)
+    return Pace(rate=paces[0], acceleration=paces[1])
+
+
+def _gain(run: Run, source: str, name: str) -> float:
+    """Return a channel over the rate of change that it is: 1 where their units fit."""
+    rate = np.gradient(run.columns[source], run.t)
+    size = float(np.sum(rate**2))
+    return float(np.sum(rate * run.columns[name])) / size if size > 0 else 1.0
+
+
+def _later(problem: Problem, run: Run) -> float:
+    """Return how much later than a recording the next run is [s]; 0 where each run has a clock of its own.
+
+    After the last one, by the pause that runs had on average.
+    """
+    runs = problem.case.runs
+    between = pauses(runs)
+    if between is None or not len(between):
+        return 0.0
+    return float(runs[-1].t[-1] + np.median(between) - run.t[0])
+
+
+def _root(name: str, sources: Mapping[str, str | None]) -> str:
+    for _ in sources:
+        source = sources[name]
+        if source is None:
+            break
+        name = source
+    return name
+
+
+def reach(problem: Problem, name: str) -> tuple[float, float]:
+    """Return the smallest and largest recorded value of a channel."""
+    columns = [run.columns[name] for run in problem.case.runs if name in run.columns]
+    return min(float(np.nanmin(c)) for c in columns), max(float(np.nanmax(c)) for c in columns)
+
+
+def nearest_limits(problem: Problem, limits: RunLimits) -> tuple[str, RunLimits]:
+    """Return the recording that leaves the limits least, and the limits widened as far as it goes.
+
+    The farthest of its inputs counts, in widths of that input's limits, or times its rate.
+    """
+    excess: dict[str, float] = {}
+    widened: dict[str, RunLimits] = {}
+    for run in problem.runs:
+        values = {
+            name: (min(low, float(np.min(run.columns[name]))), max(high, float(np.max(run.columns[name]))))
+            for name, (low, high) in limits.values.items()
+        }
+        rates = {name: max(rate, fastest(run.t, run.columns[name])) for name, rate in limits.rates.items()}
+        widened[run.name] = RunLimits(values=values, rates=rates)
+        spans = {name: limits.values[name][1] - limits.values[name][0] for name in values}
+        excess[run.name] = max(
+            *((high - low) / spans[name] for name, (low, high) in values.items()),
+            *(rate / limits.rates[name] for name, rate in rates.items()),
+            1.0, 1.0,
+        )  # fmt: skip
+    nearest = min(excess, key=lambda name: excess[name])
+    return nearest, widened[nearest]
