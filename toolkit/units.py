@@ -335,10 +335,10 @@ def unit_examples(text: str) -> tuple[str, ...]:
 # Units in which people record, beside those of the machine's own files: a number in one, taken for another of
 # its dimension, is off by their ratio.
 _RECORDED_IN = (
-    *_EXACT, "kgf", "MN", "lbf*in", "kgf*m", "kN*m", "N*mm", "µV/V", "g", "kg", "cm", "µm", "km", "inch", "ft",
-    "min", "h", "µs", "mph", "cm/s", "mm/s", "cm/s^2", "m/s^2", "standard_gravity", "MPa", "mbar", "hPa", "atm",
-    "mmHg", "mV", "V", "kV", "mA", "A", "mW", "W", "kW", "turn", "mrad", "%", "rad/s", "rpm", "ml", "liter",
-    "m^3", "l/min", "m^3/h",
+    *_EXACT, "kgf", "MN", "lbf*in", "kgf*m", "kN*m", "N*mm", "µV/V", "g", "kg", "cm", "µm", "km", "inch",
+    "ft", "min", "h", "µs", "mph", "cm/s", "mm/s", "cm/s^2", "m/s^2", "standard_gravity", "MPa", "mbar",
+    "hPa", "atm", "mmHg", "mV", "V", "kV", "mA", "A", "mW", "W", "kW", "turn", "mrad", "%", "rad/s", "rpm",
+    "ml", "liter", "m^3", "l/min", "m^3/h",
 )  # fmt: skip
 _SAME_RATIO = 0.01
 

@@ -39,7 +39,7 @@ def test_the_interval_holds_the_coefficient_and_no_zero_is_named_beside_it(tmp_p
 
 
 def test_a_drift_is_seen_beside_a_zero_that_is_larger_than_all_that_it_does(tmp_path):
-    """Zeroed at 70 degC, recorded between 20 and 25: by the first row's temperature alone the drift is unlike."""
+    """Zeroed at 70 degC, recorded between 20 and 25: counted from the first row the drift is unlike."""
     frames = {f"r{run}__csv": recording(7, run, zeroed=70.0) for run in range(2)}
     case = read_case(write_case(tmp_path, CASE + TWO, simulator=CELL, **frames))
     made = diagnose(case, None).diagnosis

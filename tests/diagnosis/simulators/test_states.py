@@ -1,10 +1,15 @@
 """Which states of an equation an effect of a motion can act on: velocities, places, and no temperatures."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from tests.diagnosis.cases import write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.case_code import running
 from toolkit.diagnosis.simulators.simulator import Output
-from toolkit.diagnosis.simulators.states import declared_dimensions, dimensions, fitting
+from toolkit.diagnosis.simulators.states import declared_dimensions, dimensions, fitting, shown_alone
 from toolkit.effects.catalogue import effects
 
 FRICTION = ("coulomb_friction", "viscous_damping", "quadratic_drag")
@@ -17,13 +22,13 @@ def test_units_are_told_by_outputs_that_show_one_state_alone():
     outputs = [
         Output(name=n, unit=u, sd=None) for n, u in zip("ABCD", ("deg", "m", "m", "degC"), strict=True)
     ]
-    assert dimensions(x, shown, outputs) == {0: "angle", 3: "temperature"}
+    assert dimensions(shown_alone(x, shown, outputs)) == {0: "angle", 3: "temperature"}
 
 
 def test_a_state_that_stands_still_or_is_a_bare_number_tells_nothing():
     x = np.array([np.full(9, 20.0), np.arange(9.0)])
     outputs = [Output(name="T", unit="degC", sd=None), Output(name="N", unit="1", sd=None)]
-    assert dimensions(x, {"T": x[0], "N": x[1]}, outputs) == {}
+    assert dimensions(shown_alone(x, {"T": x[0], "N": x[1]}, outputs)) == {}
 
 
 @pytest.mark.parametrize("name", FRICTION)
@@ -81,3 +86,48 @@ def test_the_unit_of_a_missing_term_tells_what_its_state_is(unit, friction, stif
 
 def test_a_term_of_a_bare_number_may_be_of_anything():
     assert declared_dimensions({0: "1/s"}) == {}
+
+
+SPRING = """
+def initial(p):
+    return [0.0, 0.0]
+def rhs(t, x, u, p):
+    return [x[1], (u["F"] - 6.0 * x[1] - p["k"] * x[0]) / 2.0]
+def outputs(x, u, p):
+    return {"x": 1000.0 * x[0]}
+"""
+IN_MILLIMETRES = """schema = 1
+[simulation]
+kind = "ode"
+path = "sim.py"
+states = ["x", "v"]
+force_terms = { v = "N/kg" }
+[simulation.parameters.k]
+value = 800.0
+unit = "N/m"
+sd = 16.0
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+F = { unit = "N", role = "input" }
+x = { unit = "mm", role = "output" }
+[[recording.run]]
+file = "r0.csv"
+[[recording.run]]
+file = "r1.csv"
+"""
+
+
+@pytest.mark.parametrize(
+    ("factor", "units"),
+    [(1000.0, ("N/kg", "m/s", "m")), (1.0, ("N/kg", "m/s", "mm")), (-1e6, ("N/kg", "m/s", "km"))],
+)
+def test_a_state_that_an_output_of_its_name_shows_in_another_unit_keeps_its_own(tmp_path, factor, units):
+    """A spring in metres that shows millimetres; or one in kilometres, the other way round."""
+    t = np.arange(50) * 0.01
+    frame = pd.DataFrame({"t": t, "F": 60.0 * np.sin(9.0 * t), "x": np.zeros(50)})
+    spring = SPRING.replace("1000.0", str(factor))
+    case = read_case(write_case(tmp_path, IN_MILLIMETRES, simulator=spring, r0__csv=frame, r1__csv=frame))
+    with running(case, None):
+        assert model_of(case, None, None).capability.motion.units("v") == units

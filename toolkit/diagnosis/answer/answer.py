@@ -161,7 +161,7 @@ class DiagnosedLaw:
 
     place: LawPlace
     form: Annotated[str, Entry("static, mode, loop, event or tone")]
-    acts: Literal["adds", "multiplies"]
+    acts: Annotated[Literal["adds", "multiplies"], Entry("an output, or the rate of a state")]
     variables: tuple[str, ...]
     memory_s: float | None
     formula: Annotated[str | None, Entry("null of a curve")]
@@ -183,7 +183,7 @@ class DiagnosedLaw:
         place = f"{channel} = {channel}_model"
         law = self.formula or f"a curve of {' and '.join(self.variables)}"
         if self.place.kind == "state":
-            text = f"in the equation of {channel}: d{channel}/dt = ... - ({law})"
+            text = f"in the equation of {channel}: d{channel}/dt = ... + {law}"
         elif self.acts == "multiplies":
             text = f"{place} * (1 + {law})"
         else:

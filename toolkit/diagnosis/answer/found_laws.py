@@ -16,6 +16,7 @@ from toolkit.diagnosis.answer.answer import (
     LawPlace,
     ResembledEffect,
 )
+from toolkit.diagnosis.law.trial import amplitudes
 from toolkit.diagnosis.policy import LAWS, VERDICT
 from toolkit.effects.law import formula
 
@@ -49,7 +50,10 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
     fitted = next(same, law.applied)
     covariance = _covariance(search, fitted)
     reach = _quantile(search) * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-    values = [fitted.values[name] for name in fitted.effect.names]
+    # In an equation a law stands as what resists; an answer has what is added to the rate.
+    turned = amplitudes(fitted) if trial.acts == "enters" else ()
+    signs = [-1.0 if name in turned else 1.0 for name in fitted.effect.names]
+    values = [sign * fitted.values[name] for sign, name in zip(signs, fitted.effect.names, strict=True)]
     runs = None if fitted.runs is None else tuple(sorted(fitted.runs))
     shaped = trial.shape.text.startswith("spline(")
     plain = formula(fitted.effect.name.split(": ", 1)[1]).plain(fitted.channel)
@@ -134,6 +138,7 @@ def _curve(
         with np.errstate(all="ignore"):
             return np.broadcast_to(curve({"x": counted}, values), LAWS.points).astype(float)
 
+    sign = -1.0 if trial.acts == "enters" else 1.0
     values = dict(fitted.values)
     y, slopes = at(values), []
     for name, sd in zip(fitted.effect.names, np.sqrt(np.clip(np.diag(covariance), 0, None)), strict=True):
@@ -141,6 +146,7 @@ def _curve(
         slopes.append((at({**values, name: values[name] + step}) - y) / step)
     J = np.stack(slopes, axis=1)
     half = quantile * np.sqrt(np.clip(np.einsum("ij,jk,ik->i", J, covariance, J), 0.0, None))
+    y = sign * y
     return LawCurve(
         x=tuple(x.tolist()), y=tuple(y.tolist()),
         band95=(tuple((y - half).tolist()), tuple((y + half).tolist())), unit=trial.unit,

@@ -131,7 +131,7 @@ def _ratios(problem: Problem) -> Iterator[AppliedEffect]:
 
 
 def _values(problem: Problem, effect: Effect, channel: str) -> list[dict[str, float]]:
-    """Return the values that an effect may have at a channel: its ratios of units, or none where it has none."""
+    """Return the values that an effect may have at a channel: its ratios of units, or nothing to choose."""
     if not effect.names:
         return [{}]
     try:

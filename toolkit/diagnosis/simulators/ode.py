@@ -30,6 +30,8 @@ from toolkit.diagnosis.simulators.states import (
     dimensions,
     fitting,
     is_speed,
+    shown_alone,
+    state_units,
     term_places,
 )
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
@@ -132,7 +134,9 @@ class OdeModel:
         self.equation.try_columns(runs[0], np.repeat(first[:, None], runs[0].rows, axis=1), p)
         states = [self.integrated(run, p, ()) for run in runs]
         self.equation.try_columns(runs[0], states[0], p)
-        self._dimensions = dimensions(states[0], self.equation.shown(runs[0], p, states[0]), self.outputs)
+        alone = shown_alone(states[0], self.equation.shown(runs[0], p, states[0]), self.outputs)
+        self._dimensions = dimensions(alone)
+        self._units = state_units(self.states, alone, (np.ptp(states[0], axis=1) > 0).tolist(), self.case)
         x = np.concatenate(states, axis=1)
         rates = [
             np.gradient(state, run.t, axis=1) if run.rows > 2 else np.zeros_like(state)
@@ -178,23 +182,17 @@ class OdeModel:
         )  # fmt: skip
 
     def _motion_units(self, channel: str | None) -> tuple[str, str, str]:
-        state, recorded = str(channel), {channel.name: channel.unit for channel in self.case.channels}
-        force = self.force_units.get(state) or f"{recorded.get(state, '1')}/s"
+        state = str(channel)
+        force = self.force_units.get(state) or f"{self._units.get(state, '1')}/s"
         rate = "m/s^2" if force == "N/kg" else force
-
-        def of(name: str, implied: str) -> str:
-            text = recorded.get(name, "1")
-            return implied if text == "1" else text
-
-        speed, position = of(state, reduced(f"{rate}*s")), self.position_of(state)
+        speed, position = self._units.get(state) or reduced(f"{rate}*s"), self.position_of(state)
         if position is not None:
-            return force, speed, of(position, f"{speed}*s")
+            return force, speed, self._units.get(position) or f"{speed}*s"
         # A velocity has its way for a position, even where no state is one; any other state is its own.
         return force, speed, f"{speed}*s" if is_speed(speed) else speed
 
     def _ranges(self) -> tuple[StateRange, ...]:
         """Return the states; one whose unit neither the recording nor a rate of it tells has none."""
-        recorded = {channel.name: channel.unit for channel in self.case.channels}
         implied: dict[str, str] = {}
         for name in self.force_units:
             _, speed, position = self._motion_units(name)
@@ -202,7 +200,7 @@ class OdeModel:
             implied.setdefault(self.position_of(name) or name, position)
         return tuple(
             StateRange(
-                name=name, unit=reduced(implied.get(name) or recorded.get(name, "1")),
+                name=name, unit=reduced(implied.get(name) or self._units.get(name, "1")),
                 quantiles=tuple(levels.tolist()),
             )
             for name, levels in zip(self.states, self._levels, strict=True)

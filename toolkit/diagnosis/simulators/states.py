@@ -6,6 +6,7 @@ out there, under a name that has no meaning.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -14,10 +15,12 @@ import numpy as np
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.setting import dimension
 from toolkit.effects.catalogue import effects
+from toolkit.units import unit, units_alike
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.simulators.simulator import Output
     from toolkit.effects.effect import Effect
     from toolkit.effects.facts import Term
@@ -28,27 +31,67 @@ _PLACES = frozenset({"length", "angle"})
 _OPEN = frozenset({"ratio"})  # a number without unit may be anything
 
 
-def dimensions(
+def shown_alone(
     x: NDArray[np.float64], shown: Mapping[str, NDArray[np.float64]], outputs: Sequence[Output]
-) -> dict[int, str]:
-    """Return the dimension of every state that one of the outputs shows alone, in proportion.
+) -> dict[int, tuple[Output, float]]:
+    """Return of every state the output that shows it alone, and by how much: output = factor * state.
 
     Parameters
     ----------
     x : the states of a run, shape (states, rows)
     shown : the outputs at them, shape (rows,) each
     """
-    meanings = {}
+    proportions = {}
     for output in outputs:
         for i, state in enumerate(x):
             at = int(np.argmax(np.abs(state)))
             if np.ptp(state) == 0 or state[at] == 0:
                 continue
-            ratio = shown[output.name][at] / state[at]
-            off = np.abs(shown[output.name] - ratio * state).max()
-            if ratio and off <= 1e-9 * abs(ratio * state[at]):
-                meanings[i] = dimension(output.unit)
+            factor = float(shown[output.name][at] / state[at])
+            off = np.abs(shown[output.name] - factor * state).max()
+            if factor and off <= 1e-9 * abs(factor * state[at]):
+                proportions[i] = (output, factor)
+    return proportions
+
+
+def dimensions(proportions: Mapping[int, tuple[Output, float]]) -> dict[int, str]:
+    """Return the dimension of every state that an output shows alone."""
+    meanings = {i: dimension(output.unit) for i, (output, _) in proportions.items()}
     return {i: meaning for i, meaning in meanings.items() if meaning not in _OPEN}
+
+
+def state_units(
+    names: Sequence[str], proportions: Mapping[int, tuple[Output, float]], moved: Sequence[bool], case: Case
+) -> dict[str, str]:
+    """Return the units of states, as far as they are told.
+
+    A simulation in metres may show its place in millimetres, under one name. A state that an output shows
+    alone has the unit whose values make the output's; of a state that does not move the name alone tells.
+
+    Parameters
+    ----------
+    moved : of every state, whether it does
+    """
+    stated = {channel.name: channel.unit for channel in case.channels}
+    of_outputs = {output.name for output in case.outputs}
+    units: dict[str, str] = {}
+    for i, name in enumerate(names):
+        if i in proportions:
+            output, factor = proportions[i]
+            units[name] = output.unit if abs(factor) == 1 else _multiple(output.unit, abs(factor))
+        elif name in stated and not (moved[i] and name in of_outputs):
+            units[name] = stated[name]
+    return {name: text for name, text in units.items() if text != "1"}
+
+
+def _multiple(text: str, factor: float) -> str:
+    """Return the unit that is so many times another, "1" where none is known by a name."""
+    own = unit(text)
+    alike = (unit(name) for name in (() if own.offset else units_alike(text)))
+    return next(
+        (each.text for each in alike if not each.offset and math.isclose(each.factor, factor * own.factor)),
+        "1",
+    )
 
 
 def is_speed(text: str) -> bool:
