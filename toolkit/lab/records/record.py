@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
-from toolkit.errors import ColumnError
 from toolkit.lab.faces import Face, Facts
 from toolkit.units import printed
 
@@ -100,7 +99,7 @@ class Record(Face):
         from toolkit.calibration.apply import apply_record
         from toolkit.calibration.registry.clock import today
         from toolkit.calibration.registry.standing import standing
-        from toolkit.lab.quantities import columns_of, value_of
+        from toolkit.lab.quantities import columns_of, tare_of
         from toolkit.units import unit
 
         record = self.result
@@ -108,21 +107,11 @@ class Record(Face):
             self.registry, record.instrument, on=self.on or today(), known_at=self.known_at, named=self.id
         )
         use = stands.use(draft=draft)
-        columns = columns_of(data, record.indications, units=units)
+        columns = columns_of(data, self.indications, units=units)
         values = {name: columns[name].to(text, where=name) for name, text in self.indications.items()}
         zero = None
         if tare is not None:
-            if missing := [name for name in columns if name not in tare]:
-                raise ColumnError(
-                    "the tare lacks an indication", where="tare", got=", ".join(tare) or "nothing",
-                    expected=", ".join(columns), next_step=f"state it of {', '.join(missing)} too",
-                    rule="data-columns",
-                )  # fmt: skip
-            unloaded = {
-                name: value_of(name, value, columns[name].unit)
-                for name, value in tare.items()
-                if name in columns
-            }
+            unloaded = tare_of(tare, columns)
             zero = {
                 name: float(unloaded[name].to(text, where=f"tare of {name}")[0])
                 for name, text in self.indications.items()

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from toolkit.tires.global_model import GlobalModel, ModelFit
     from toolkit.tires.model import CurveFit, Loss, TireModel
     from toolkit.tires.sweeps import Sweeps
+    from toolkit.tires.table import TireTable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +47,7 @@ class Fitted:
 
 
 def fit_table_models(
-    table: Path,
+    table: Path | TireTable,
     names: Sequence[str],
     *,
     axes: str | None,
@@ -57,6 +58,7 @@ def fit_table_models(
 ) -> Fitted:
     """Return the fits of a table, or of a file of the field, which is split by condition and direction.
 
+    ``table`` is its path, or what a notebook gave in place of a file.
     ``axes`` are None for those of the file: SAE for a table, by the sign of the load for a file of the field.
 
     Raises
@@ -72,8 +74,12 @@ def fit_table_models(
     from toolkit.tires.table import read_table
     from toolkit.tires.table_fit import axes_findings, fit_table, repeat_findings, row_findings
 
-    sweeps = split_file(table, axes) if is_field_file(table) else None
-    measured = read_table(table, axes=axes or "SAE") if sweeps is None else sweeps.table
+    path = table if isinstance(table, Path) else table.path
+    sweeps = split_file(table, axes) if isinstance(table, Path) and is_field_file(table) else None
+    if sweeps is not None:
+        measured = sweeps.table
+    else:
+        measured = read_table(table, axes=axes or "SAE") if isinstance(table, Path) else table
     data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
     single, over_loads = _split(names)
     curves: tuple[CurveFit, ...] = ()
@@ -85,12 +91,12 @@ def fit_table_models(
         seconds[model.name] = time.perf_counter() - started
         curves += result.fits
         findings += tuple(finding for finding in result.findings if finding not in findings)
-    fits, fit_findings, seeds = _global(data, over_loads, loss, weights, str(table), seconds)
+    fits, fit_findings, seeds = _global(data, over_loads, loss, weights, str(path), seconds)
     if not single:
         findings += (
             *row_findings(measured),
             *axes_findings(measured, seeds),
-            *size_findings(seeds, table.name),
+            *size_findings(seeds, path.name),
         )
     fitted = _fitted(data, curves, (None,) * len(curves), fits, (*findings, *fit_findings), radius_m, seconds)
     return replace(fitted, sweeps=sweeps)
