@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
+from toolkit.errors import ConfigError
+from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts
 from toolkit.units import printed
 
@@ -60,6 +62,7 @@ class Record(Face):
         """Its state by the ledger: candidate, approved, withdrawn, discarded."""
         return self.registry.status(self.id, known_at=self.known_at)
 
+    @checked
     def apply(
         self,
         data: Columns,
@@ -129,6 +132,7 @@ class Record(Face):
             findings=self._beyond(points),
         )
 
+    @checked
     def budget(self, load: str, at: float | None = None) -> Budget:
         """Return the budget of a load at a value [the record's unit]; default: the largest."""
         from toolkit.calibration.uncertainty.budget import calibration_budget
@@ -253,10 +257,16 @@ class Loads(Face):
                 columns[f"U({name}) [{self.units[name]}]"] = self.U[name]
         return pd.DataFrame(columns, index=self.index)
 
+    @checked
     def quantity(self, load: str) -> Any:
         """Return a load as a pint quantity (rows,) of the toolkit's registry."""
         from toolkit.units import registry
 
+        if load not in self.units:
+            raise ConfigError(
+                "the record gives no such load", where="Loads.quantity, load", got=load,
+                expected=", ".join(self.units), next_step="name one of those expected", rule="wrong-argument",
+            )  # fmt: skip
         return registry().Quantity(self.value[load], self.units[load].replace("*", " * "))
 
     def _facts(self) -> Facts:

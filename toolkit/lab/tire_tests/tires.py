@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts
 from toolkit.lab.quantities import tire_table
 
@@ -72,6 +73,7 @@ class TireFit(Face):
 
         return pd.DataFrame(self.result.comparison.as_dict()["rows"])
 
+    @checked
     def write_tir(self, path: str | Path, *, model: str | None = None, side: str = "UNKNOWN") -> Path:
         """Write the tire property file of a model over all loads; return its path.
 
@@ -125,6 +127,7 @@ class Tire(Face):
 
     result: TirFile
 
+    @checked
     def evaluate(
         self,
         data: Columns,
@@ -212,6 +215,7 @@ class Tire(Face):
         return plots
 
 
+@checked
 def fit_tire(
     source: Processed | Resolved | Columns | str | Path,
     *models: str,
@@ -259,6 +263,7 @@ def fit_tire(
     return TireFit(result=fit_table_models(table, names, axes=axes, **options), source=str(table.path))
 
 
+@checked
 def read_tire(path: str | Path) -> Tire:
     """Read a tire property file.
 
