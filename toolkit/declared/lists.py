@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from toolkit.declared.faults import display
+from toolkit.declared.faults import MOST_TOLD, display
 from toolkit.declared.kinds import REFUSED, Kind, Place
 from toolkit.declared.marks import Distinct, Names, Quantity, Size
 from toolkit.declared.quantities import QuantityKind
@@ -189,7 +189,7 @@ class KeyedKind(Kind):
         for key, entry in value.items():
             item_place = place.at(key)
             if names and key not in names:
-                near = nearest(key, names, value)
+                near = nearest(key, names, value) if len(place.faults) < MOST_TOLD else None
                 item_place.refuse(key, ", ".join(names), kind="unknown", near=near)
                 entries.append((key, REFUSED))
             elif self.by is not None and isinstance(self.item, TableKind):

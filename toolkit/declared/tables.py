@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+from toolkit.declared.faults import MOST_TOLD
 from toolkit.declared.kinds import REFUSED, ChoiceKind, Kind, Place
 from toolkit.declared.marks import Format, Quantity
 from toolkit.declared.quantities import QuantityKind
@@ -105,7 +106,7 @@ class TableKind(Kind):
                 if declared.beside is None:
                     values[declared.name] = declared.kind.read(entry, place.at(key))
             elif key not in keys:
-                near = nearest(str(key), keys, value)
+                near = nearest(str(key), keys, value) if len(place.faults) < MOST_TOLD else None
                 nearest_keys.add(near)
                 place.at(key).refuse(key, ", ".join(sorted(keys)), kind="unknown", near=near)
         for declared in fields:

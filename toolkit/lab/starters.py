@@ -21,6 +21,7 @@ from toolkit.declared import Source, refuse
 from toolkit.declared.describe import asked_of, outline
 from toolkit.declared.text import attempt, value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
+from toolkit.files import toml_entries
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.printable import check_entries
 from toolkit.units import is_unit, split_header
@@ -104,7 +105,7 @@ def entries_of(words: Sequence[str]) -> dict[str, Any]:
 
 def _value(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return toml_entries(f"value = {text}")["value"]
     except (tomllib.TOMLDecodeError, KeyError):
         return text
 
@@ -125,10 +126,10 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     values, cls = {**guess.values, **entries}, form_of(word)
     # What is given is judged as it was given: an unknown entry has no place in the file.
     text = outline(cls, {})
-    stated = {key: entry for key, entry in tomllib.loads(text).items() if key == "schema"} | values
+    stated = {key: entry for key, entry in toml_entries(text).items() if key == "schema"} | values
     refuse([fault for fault in attempt(cls, stated)[1] if fault.kind != "missing"], Source(where=file))
     text = outline(cls, values, {key: note for key, note in guess.notes.items() if key not in entries})
-    _, faults = attempt(cls, tomllib.loads(text))
+    _, faults = attempt(cls, toml_entries(text))
     helps = {fault.name: fault.expected for fault in faults} | asked_of(cls, values)
     return Starter(text=text, guess=guess, helps=helps)
 
