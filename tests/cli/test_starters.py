@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -307,3 +308,26 @@ def test_every_entry_is_accepted_as_it_is_printed_by_the_reader_of_its_command(
             except ToolkitError as error:
                 refused.append((block.table, lines.lines[at], str(error)))
     assert refused == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--from", "../loads.csv"],
+        ["--set", "data=../loads.csv"],
+        ["--from", "loads.csv", "--set", "check=../loads.csv"],
+        ["--from", "link.csv"],
+        ["--from", "loads.csv", "--set", "reference.dcc=../loads.csv"],
+    ],
+)
+def test_a_session_is_not_begun_with_data_that_calibrate_does_not_read(
+    folder: Path, capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    (folder / "loads.csv").write_text(LOADS)
+    (folder / "below").mkdir()
+    (folder / "below" / "loads.csv").write_text(LOADS)
+    (folder / "below" / "link.csv").symlink_to(folder / "loads.csv")
+    os.chdir(folder / "below")
+    code, answer = answered(capsys, "session", "new", "SESSION.toml", *words)
+    assert (code, answer["error"]["rule"]) == (2, "outside")
+    assert not (folder / "below" / "SESSION.toml").exists()

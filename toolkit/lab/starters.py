@@ -16,6 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from toolkit.calibration.session.read import demand_inside
 from toolkit.channels import CHANNELS, channel_of
 from toolkit.declared import Source, refuse
 from toolkit.declared.describe import asked_of, outline
@@ -117,6 +118,8 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     ------
     ConfigError
         every entry that is unknown or cannot be used; ``usage``: nothing can be guessed for this format
+    SessionError
+        ``outside``: a session's data lie where `toolkit calibrate` does not read them
     RecordingError
         the recording cannot be read
     """
@@ -128,6 +131,12 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     text = outline(cls, {})
     stated = {key: entry for key, entry in toml_entries(text).items() if key == "schema"} | values
     refuse([fault for fault in attempt(cls, stated)[1] if fault.kind != "missing"], Source(where=file))
+    if word == "session":
+        reference = values.get("reference")
+        named = {**values, "reference.dcc": reference.get("dcc") if isinstance(reference, dict) else None}
+        for key in ("data", "check", "reference.dcc"):
+            if isinstance(name := named.get(key), str):
+                demand_inside(file, name, key)
     text = outline(cls, values, {key: note for key, note in guess.notes.items() if key not in entries})
     _, faults = attempt(cls, toml_entries(text))
     helps = {fault.name: fault.expected for fault in faults} | asked_of(cls, values)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NoReturn, cast
 
-from toolkit.channels import CHANNELS, channel_of
+from toolkit.channels import CHANNELS, Axes, channel_of
 from toolkit.errors import ColumnError, UnitError
 from toolkit.machine import Machine
 from toolkit.machine.definition import Column, Role
@@ -39,6 +39,7 @@ class _Rig:
     name: str
     columns: tuple[Column, ...]
     simulated: bool = False
+    axes: Axes = "machine"
 
 
 def rig(name: str, units: Mapping[str, str]) -> Machine:
