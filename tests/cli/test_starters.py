@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -331,3 +332,58 @@ def test_a_session_is_not_begun_with_data_that_calibrate_does_not_read(
     code, answer = answered(capsys, "session", "new", "SESSION.toml", *words)
     assert (code, answer["error"]["rule"]) == (2, "outside")
     assert not (folder / "below" / "SESSION.toml").exists()
+
+
+def computed_belt(folder: Path) -> None:
+    """A belt whose own program computes the forces, as a balance does, with a channel of no tire model."""
+    rows = [
+        f"{number / 100},{angle},{load},{-load * 0.9 * math.tanh(angle / 4):.2f},{load * angle / 1e3:.3f},45.2"
+        for load in (2000, 4000)
+        for number, angle in enumerate([angle / 4 for angle in range(-32, 33)])
+    ]
+    header = "time [s],SA [deg],FZ [N],FY [N],MZ [N*m],TST [degC]"
+    (folder / "run_01.csv").write_text("\n".join([header, *rows]) + "\n")
+
+
+def test_a_belt_that_computes_its_forces_is_led_to_a_fit_and_not_to_an_approval(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    computed_belt(folder)
+    code, told = answered(capsys, "machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
+    assert (code, told["open"]) == (0, [])
+    assert any("--machine" in text and "indication" in text for text in told["not_guessed"])
+    assert command("init", ".") == 0
+    assert command("test", "new", "test.toml", "--set", "machine=belt.toml", "--set", "date=2026-03-17") == 0
+    for words in (["process", "."], ["process", ".", "--draft"], ["fit", "."]):
+        code, answer = answered(capsys, *words)
+        assert (code, answer["error"]["rule"]) == (2, "no-indications"), answer
+        assert "toolkit fit run_01.csv --machine" in answer["error"]["next_step"].replace(
+            "FILE", "run_01.csv"
+        )
+
+
+def test_a_recording_of_a_machine_is_fitted_by_its_definition(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    computed_belt(folder)
+    assert command("machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT)) == 0
+    code, answer = answered(capsys, "fit", "run_01.csv")
+    assert (code, answer["error"]["rule"]) == (2, "unknown-column")
+    assert "--machine" in answer["error"]["next_step"]
+    code, answer = answered(capsys, "fit", "run_01.csv", "--machine", "belt.toml")
+    assert code in (0, 1), answer
+    table = (folder / "run_01.csv").read_text().splitlines()
+    (folder / "table.csv").write_text("\n".join(line.rpartition(",")[0] for line in table) + "\n")
+    code, same = answered(capsys, "fit", "table.csv", "--axes", "ISO-W")
+    assert [row["parameters"] for row in answer["fits"]] == [row["parameters"] for row in same["fits"]]
+    code, answer = answered(capsys, "fit", "run_01.csv", "--machine", "belt.toml", "--axes", "SAE")
+    assert (code, answer["error"]["rule"]) == (2, "usage")
+
+
+def test_a_recording_of_no_known_machine_is_led_to_a_definition(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    computed_belt(folder)
+    code, answer = answered(capsys, "inspect", "run_01.csv")
+    assert (code, answer["error"]["rule"]) == (2, "missing-column")
+    assert "toolkit machine new" in answer["error"]["next_step"]

@@ -267,6 +267,11 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
         for role, symbol, what in (("load", "FZ", "the load"), ("slip_angle", "SA", "the slip angle"))
         if entries and role not in stated
     ]
+    if entries and "indication" not in stated:
+        silent.append(
+            "indications: no column is a signal of a cell, and no calibration record computes the forces; "
+            "'toolkit fit FILE --machine' takes them as they are"
+        )
     silent += [
         "axes, rotations, drum and protocol: no header tells them",
         "drum.circumference: without it the road counts as flat, a belt's or a trailer's",

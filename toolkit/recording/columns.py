@@ -210,6 +210,7 @@ def _check_whole(
             where=where,
             got=", ".join(repr(header) for header in headers if header.strip())[:400] or "no header",
             expected=", ".join(repr(c.header) for c in machine.columns if c.role not in _OPTIONAL),
-            next_step=f"check the header row and the machine ({machine.name})",
+            next_step=f"check the header row; the machine here is {machine.name}: define another one with "
+            "'toolkit machine new RIG.toml --from FILE'",
             rule="missing-column",
         )

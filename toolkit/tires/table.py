@@ -254,6 +254,7 @@ def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
             f"{near} [unit]; known are {known}" if near else known,
+            "mend the header row; of a machine's recording --machine names the definition that knows it",
         )  # fmt: skip
     if text is None:
         _refuse(
@@ -322,12 +323,19 @@ def _refuse_impossible(
     )
 
 
-def _refuse(path: Path, rule: str, problem: str, actual: str, expected: str) -> NoReturn:
+def _refuse(
+    path: Path,
+    rule: str,
+    problem: str,
+    actual: str,
+    expected: str,
+    next_step: str = "mend the header row of the table",
+) -> NoReturn:
     raise ColumnError(
         problem,
         where=path,
         got=actual,
         expected=expected,
-        next_step="mend the header row of the table",
+        next_step=next_step,
         rule=rule,
     )

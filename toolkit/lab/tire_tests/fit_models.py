@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
@@ -15,7 +15,7 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.lab.tire_tests.resolve import Resolved
-    from toolkit.machine.definition import Drum
+    from toolkit.machine.definition import Drum, Machine
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import GlobalModel, ModelFit
@@ -100,6 +100,54 @@ def fit_table_models(
         )
     fitted = _fitted(data, curves, (None,) * len(curves), fits, (*findings, *fit_findings), radius_m, seconds)
     return replace(fitted, sweeps=sweeps)
+
+
+def fit_recording(
+    path: Path, machine: str, names: Sequence[str], *, axes: str | None, **options: Any
+) -> Fitted:
+    """Return the fits of a machine's recording by its own forces; ``machine`` is a name or a definition.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: axes beside the definition's; errors as those of a recording and `fit_table_models`
+    """
+    from toolkit.machine import load_machine
+
+    definition = load_machine(machine)
+    if axes is not None:
+        raise ConfigError(
+            "a recording is in the axes of its machine", where="--axes", got=axes,
+            expected=f"--machine alone; its axes are {definition.axes}", next_step="leave --axes out",
+            rule="usage",
+        )  # fmt: skip
+    fitted = fit_table_models(_table_of_recording(path, definition), names, axes=None, **options)
+    return replace(fitted, road=definition.drum)
+
+
+def _table_of_recording(path: Path, machine: Machine) -> TireTable:
+    """Return a machine's recording as a table, in the axes of its definition and with its corrections.
+
+    The forces are those that the file has: what computed them is the machine's own affair.
+
+    Raises
+    ------
+    ToolkitError
+        the file is no recording of this machine, or has not the columns of a table
+    """
+    from toolkit.channels import CHANNELS
+    from toolkit.recording.read import read_recording
+    from toolkit.reduction.corrections import corrected
+    from toolkit.tires.table import table_of
+
+    recording = read_recording(path, machine)
+    columns = {series.symbol: series.si for series in recording.series if series.symbol in CHANNELS}
+    if machine.corrections:
+        columns |= corrected(machine, {name: recording[name].si for name in ("SA", "FZ", "FY", "MZ")})
+    return table_of(
+        [f"{symbol} [{CHANNELS[symbol].si}]" for symbol in columns], list(columns.values()), path=path,
+        axes=machine.axes, required=("SA", "FZ"), measured=True,
+    )  # fmt: skip
 
 
 _NEXT_STEPS = {
