@@ -70,10 +70,11 @@ def machine_of(folder: TestFolder, protocol: Protocol | None = None) -> Machine:
     if not machine.indications:
         raise ConfigError(
             "the machine has no indications: it computes its forces itself",
-            where=machine.name, got=", ".join(f"{column.symbol} ({column.role})" for column in machine.columns),
+            where=machine.name,
+            got=", ".join(f"{column.symbol} ({column.role})" for column in machine.columns),
             expected='columns with role = "indication", from which a calibration record computes FY and MZ',
-            next_step=f"fit each file by its own forces: toolkit fit FILE --machine {folder.info.machine}; or "
-            "record the signals of its cells too, and state them in the definition",
+            next_step="fit each file by its own forces: toolkit fit FILE --machine "
+            f"{folder.info.machine}; or record its cells too, and state them in the definition",
             rule="no-indications",
         )  # fmt: skip
     applied = protocol or folder.protocol

@@ -48,7 +48,7 @@ def command(
     ] = None,
     machine: Annotated[
         str | None,
-        "Machine whose recording the file is: packaged, or its definition; its own forces are fitted.",
+        "Machine whose recording the file is, or its definition; the file's own forces are fitted.",
     ] = None,
     loss: Annotated[str, "linear (least squares) or robust."] = "linear",
     weights: Annotated[str, "Of global models: equal, or noise (each load by its own residuals)."] = "equal",
