@@ -1,20 +1,28 @@
 """Files: whole or not at all."""
 
+import contextlib
 import errno
 import math
 import os
 import stat
+import time
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from toolkit import files
+from toolkit.calibration.session.session_file import SessionFile
+from toolkit.declared.text import read_text
 from toolkit.errors import ConfigError, OutputError
 from toolkit.files import (
+    DEEPEST,
     atomic_path,
     check_keys,
     is_number,
     number_expected,
+    parse_json,
     parse_toml,
     read_toml,
     real_path,
@@ -23,6 +31,7 @@ from toolkit.files import (
     sha256_file,
     write_atomic,
 )
+from toolkit.spelling import nearest
 
 
 def test_write_and_hash(tmp_path: Path) -> None:
@@ -161,3 +170,90 @@ def test_a_number_out_of_reach_is_told_its_reach() -> None:
     assert told == number_expected(10**400, "a finite number") == "a number of at most 1e+100 in size"
     for value in (1e100, math.inf, math.nan, "1e101", None, True):
         assert number_expected(value, "a finite number") == "a finite number"
+
+
+def seconds(text: str) -> float:
+    started = time.perf_counter()
+    with contextlib.suppress(ConfigError):
+        parse_toml(text.encode(), where="x.toml")
+    return time.perf_counter() - started
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "a." * 50_000 + "a = 1\n",
+        "[" + "a." * 50_000 + "a]\nb = 1\n",
+        "[[" + "a." * 50_000 + "a]]\n",
+        "x = {" + "a." * 50_000 + "a = 1}\n",
+        '"\\"". ' * 30_000 + "a = 1\n",
+        "'.' . " * 30_000 + "a = 1\n",
+        'x = """\n"""\n' + "a." * 50_000 + "a = 1\n",
+    ],
+)
+def test_a_key_of_countless_parts_is_refused_at_once(key: str) -> None:
+    """Its length is that of a page of text; the library's reader takes the square of its parts."""
+    started = time.perf_counter()
+    with pytest.raises(ConfigError, match="not TOML") as caught:
+        parse_toml(key.encode(), where="x.toml")
+    assert time.perf_counter() - started < 5
+    assert caught.value.rule == "not-toml"
+    assert "parts (at line" in str(caught.value.got)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'x = "' + "a." * 500 + 'a"\n',
+        "x = '''\n" + "a." * 500 + "a\n'''\n",
+        "# " + "a." * 500 + "a\n",
+        "x = [" + "1.5, " * 500 + "2.5]\n",
+        'x = 1 # """ \'\n' + 'y = "' + "a." * 200 + '"\n',
+        ".".join(f"k{i}" for i in range(DEEPEST)) + " = 1\n",
+    ],
+)
+def test_dots_that_part_no_key_are_read(text: str) -> None:
+    assert parse_toml(text.encode(), where="x.toml") == tomllib.loads(text)
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        lambda n: '"""\\' * n,
+        lambda n: '"\\' * n,
+        lambda n: "'''x" * n,
+        lambda n: "a.a." * 24 + "a = 1\n" + "".join(f"k{i} = 1\n" for i in range(n // 4)),
+        lambda n: "x = [" + "[" * 80 + "]" * 80 + ", 1" * n + "]\n",
+        lambda n: "k" * 4 * n + " = 1\n",
+        lambda n: 'x = "' + "y" * 4 * n + '"\n',
+    ],
+)
+def test_a_text_twice_as_long_takes_about_twice_as_long(page: Callable[[int], str]) -> None:
+    """Linear: four times the text in at most eight times the time, where the square would take sixteen."""
+    short = min(seconds(page(20_000)) for _ in range(3))
+    assert min(seconds(page(80_000)) for _ in range(3)) < 8 * max(short, 0.02)
+
+
+def test_a_name_that_stands_twice_is_found_without_counting_all() -> None:
+    names = [f'"n{i}": 1' for i in range(60_000)]
+    started = time.perf_counter()
+    with pytest.raises(ValueError, match="twice"):
+        parse_json("{" + ", ".join([*names, names[-1]]) + "}")
+    assert time.perf_counter() - started < 5
+
+
+@pytest.mark.parametrize("line", ["k{} = 1\n", "[k{}]\na = 1\n", "[[data]]\nk{} = 1\n", "cells.k{}.a = 1\n"])
+def test_a_file_of_faults_alone_takes_a_time_of_its_length(line: str) -> None:
+    """Each fault asks for its line and for what was meant; five thousand took seven minutes."""
+    text = "".join(line.format(number) for number in range(5000))
+    started = time.perf_counter()
+    with pytest.raises(ConfigError) as caught:
+        read_text(SessionFile, text.encode(), where="SESSION.toml")
+    assert time.perf_counter() - started < 10
+    assert "more" in str(caught.value.got) or "[[data]]" in line
+
+
+def test_a_key_of_a_page_is_no_misspelt_one() -> None:
+    started = time.perf_counter()
+    assert nearest("instrument" * 50_000, ["instrument"]) is None
+    assert time.perf_counter() - started < 1

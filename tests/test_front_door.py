@@ -195,11 +195,24 @@ def test_a_tare_is_taken_off_and_rows_beyond_the_range_are_told(record: toolkit.
     assert record.apply(shifted, tare=stated).value["FY"] == pytest.approx(untared)
     with pytest.raises(ColumnError, match="tare"):
         record.apply(shifted, tare={"D51": 0.05})
-    far = record.apply({f"{name} [mV/V]": [value, 9.0, np.nan] for name, value in INDICATIONS.items()})
+    far = record.apply({f"{name} [mV/V]": [value, 9.0] for name, value in INDICATIONS.items()})
     assert {finding.rule for finding in far.findings} == {"beyond-range"}
-    assert np.isnan(far.value["FY"][2])
-    assert np.isnan(far.U["FY"][2])
     assert record.apply(_plain(), uncertainty=False).U == {}
+
+
+def test_rows_that_are_the_same_have_one_budget_between_them(
+    record: toolkit.Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from toolkit.calibration.uncertainty import budget
+
+    computed = []
+    combine = budget.combine
+    monkeypatch.setattr(budget, "combine", lambda *args, **kw: computed.append(1) or combine(*args, **kw))
+    rows = {f"{name} [mV/V]": [value, 2 * value] * 5 for name, value in INDICATIONS.items()}
+    U = record.apply(rows).U
+    assert len(computed) == 2 * len(record.loads)
+    assert U["FY"].tolist() == U["FY"][:2].tolist() * 5
+    assert U["FY"][0] != U["FY"][1]
 
 
 # --- a test ------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import stat
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -136,11 +137,11 @@ def parse_json(data: bytes | str) -> Any:
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    entries = dict(pairs)
-    if len(entries) != len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"{twice!r} stands twice in one object")
+    entries: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in entries:
+            raise ValueError(f"{name!r} stands twice in one object")
+        entries[name] = value
     return entries
 
 
@@ -169,6 +170,50 @@ def as_written(text: str) -> float:
     return _Beyond(text) if math.isinf(number) and text.lstrip("+-") != "inf" else number
 
 
+DEEPEST = 100
+"""Parts of a key of TOML, ``a.b.c`` of three, that are read: no form of the toolkit has ten."""
+
+# What a text of TOML is made of, in one pass: a text without an end takes all that is left.
+_PIECE = re.compile(
+    r'''"""(?:[^"\\]|\\[\s\S]?|"(?!""))*+(?:"{3,5}|\Z)|'''
+    r"""'''(?:[^']|'(?!''))*+(?:'{3,5}|\Z)|"""
+    r"""(?P<key>"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[A-Za-z0-9_-]++)|(?P<dot>\.)|(?P<space>[ \t]++)|"""
+    r"""["'][\s\S]*|\#[^\n]*+|[\s\S]"""
+)
+
+
+def toml_entries(text: str) -> dict[str, Any]:
+    """Return the entries of a text of TOML, in a time that its length bounds.
+
+    The reader of Python's library takes the square of a key's parts: fifty thousand of them, in 100 kB, would
+    take minutes.
+
+    Raises
+    ------
+    ValueError
+        no TOML, or a key of more than `DEEPEST` parts
+    RecursionError
+        arrays or tables within one another without end
+    """
+    if any(line.count(".") >= DEEPEST for line in text.split("\n")):
+        _demand_short_keys(text)
+    return tomllib.loads(text, parse_float=as_written)
+
+
+def _demand_short_keys(text: str) -> None:
+    parts, after_dot = 0, False
+    for piece in _PIECE.finditer(text):
+        if piece.lastgroup == "key":
+            parts, after_dot = (parts + 1 if after_dot else 1), False
+            if parts > DEEPEST:
+                line = text.count("\n", 0, piece.start()) + 1
+                raise tomllib.TOMLDecodeError(f"a key of more than {DEEPEST} parts (at line {line})")
+        elif piece.lastgroup == "dot":
+            after_dot = parts > 0
+        elif piece.lastgroup != "space":
+            parts, after_dot = 0, False
+
+
 def parse_toml(data: bytes, *, where: object, entered: bool = False) -> dict[str, Any]:
     """Parse the content of a TOML file; ``where`` names it in the message.
 
@@ -183,7 +228,7 @@ def parse_toml(data: bytes, *, where: object, entered: bool = False) -> dict[str
     try:
         # Editors of Windows begin a file with a mark.
         text = data.decode("utf-8-sig")
-        entries = tomllib.loads(text, parse_float=as_written)
+        entries = toml_entries(text)
     except (ValueError, RecursionError) as error:  # a number of thousands of digits, arrays without end
         twice = "Cannot overwrite" in str(error) or "Cannot declare" in str(error)
         raise ConfigError(

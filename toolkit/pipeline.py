@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.model import Characteristics
-from toolkit.errors import RecordingError
+from toolkit.errors import ConfigError, RecordingError
 from toolkit.findings import Finding
 from toolkit.machine import load_machine, own_text
 from toolkit.recording.hidden import hidden_findings
@@ -59,8 +59,24 @@ def read_test(
 
 
 def machine_of(folder: TestFolder, protocol: Protocol | None = None) -> Machine:
-    """Return a test's machine with the protocol that applies: ``protocol``, the test's own, the machine's."""
+    """Return a test's machine with the protocol that applies: ``protocol``, the test's own, the machine's.
+
+    Raises
+    ------
+    ConfigError
+        ``no-indications``: no calibration record can ever compute its forces
+    """
     machine = load_machine(folder.info.machine)
+    if not machine.indications:
+        raise ConfigError(
+            "the machine has no indications: it computes its forces itself",
+            where=machine.name,
+            got=", ".join(f"{column.symbol} ({column.role})" for column in machine.columns),
+            expected='columns with role = "indication", from which a calibration record computes FY and MZ',
+            next_step="fit each file by its own forces: toolkit fit FILE --machine "
+            f"{folder.info.machine}; or record its cells too, and state them in the definition",
+            rule="no-indications",
+        )  # fmt: skip
     applied = protocol or folder.protocol
     return machine if applied is None else dataclasses.replace(machine, protocol=applied)
 

@@ -9,6 +9,9 @@ from collections.abc import Container, Iterable
 LIKE = 0.6
 """Likeness from which a name is suggested: what is less alike is another word."""
 
+LONGEST = 200
+"""Characters of a name that can be a misspelt one: comparing takes the square of them."""
+
 
 def nearest(name: str, candidates: Iterable[str], present: Container[str] = ()) -> str | None:
     """Return the known name that was meant, None where none is alike.
@@ -21,6 +24,9 @@ def nearest(name: str, candidates: Iterable[str], present: Container[str] = ()) 
     >>> nearest("FM_run_6.xlsx", ["FM_run_3.xlsx"]), nearest("FM_rnu_3.xlsx", ["FM_run_3.xlsx"])
     (None, 'FM_run_3.xlsx')
     """
+
+    if len(name) > LONGEST:
+        return None
 
     def likeness(candidate: str) -> tuple[float, bool, str]:
         ratio = difflib.SequenceMatcher(None, name.lower(), candidate.lower()).ratio()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import shutil
 import subprocess
 import sys
@@ -280,3 +282,78 @@ def test_every_entry_is_accepted_as_it_is_printed_by_the_reader_of_its_command(
             except ToolkitError as error:
                 refused.append((block.table, lines.lines[at], str(error)))
     assert refused == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--from", "../loads.csv"],
+        ["--set", "data=../loads.csv"],
+        ["--from", "loads.csv", "--set", "check=../loads.csv"],
+        ["--from", "link.csv"],
+        ["--from", "loads.csv", "--set", "reference.dcc=../loads.csv"],
+    ],
+)
+def test_a_session_is_not_begun_with_data_that_calibrate_does_not_read(
+    folder: Path, words: list[str]
+) -> None:
+    (folder / "loads.csv").write_text(LOADS)
+    (folder / "below").mkdir()
+    (folder / "below" / "loads.csv").write_text(LOADS)
+    (folder / "below" / "link.csv").symlink_to(folder / "loads.csv")
+    os.chdir(folder / "below")
+    code, answer = commands.answer("session", "new", "SESSION.toml", *words)
+    assert (code, answer["error"]["rule"]) == (2, "outside")
+    assert not (folder / "below" / "SESSION.toml").exists()
+
+
+def computed_belt(folder: Path) -> None:
+    """Write the recording of a belt whose own program computes the forces, as a balance does, with a channel of no tire model."""
+    rows = [
+        f"{number / 100},{angle},{load},{-0.9 * load * math.tanh(angle / 4):.2f},{load * angle / 1e3},45.2"
+        for load in (2000, 4000)
+        for number, angle in enumerate([angle / 4 for angle in range(-32, 33)])
+    ]
+    header = "time [s],SA [deg],FZ [N],FY [N],MZ [N*m],TST [degC]"
+    (folder / "run_01.csv").write_text("\n".join([header, *rows]) + "\n")
+
+
+def test_a_belt_that_computes_its_forces_is_led_to_a_fit_and_not_to_an_approval(folder: Path) -> None:
+    computed_belt(folder)
+    code, told = commands.answer("machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))
+    assert (code, told["open"]) == (0, [])
+    assert any("--machine" in text and "indication" in text for text in told["not_guessed"])
+    assert commands.answer("init", ".")[0] == 0
+    assert (
+        commands.answer("test", "new", "test.toml", "--set", "machine=belt.toml", "--set", "date=2026-03-17")[
+            0
+        ]
+        == 0
+    )
+    for words in (["process", "."], ["process", ".", "--draft"], ["fit", "."]):
+        code, answer = commands.answer(*words)
+        assert (code, answer["error"]["rule"]) == (2, "no-indications"), answer
+        assert "toolkit fit FILE --machine" in answer["error"]["next_step"]
+
+
+def test_a_recording_of_a_machine_is_fitted_by_its_definition(folder: Path) -> None:
+    computed_belt(folder)
+    assert commands.answer("machine", "new", "belt.toml", "--from", "run_01.csv", *sets(BELT))[0] == 0
+    code, answer = commands.answer("fit", "run_01.csv")
+    assert (code, answer["error"]["rule"]) == (2, "unknown-column")
+    assert "--machine" in answer["error"]["next_step"]
+    code, answer = commands.answer("fit", "run_01.csv", "--machine", "belt.toml")
+    assert code in (0, 1), answer
+    table = (folder / "run_01.csv").read_text().splitlines()
+    (folder / "table.csv").write_text("\n".join(line.rpartition(",")[0] for line in table) + "\n")
+    code, same = commands.answer("fit", "table.csv", "--axes", "ISO-W")
+    assert [row["parameters"] for row in answer["fits"]] == [row["parameters"] for row in same["fits"]]
+    code, answer = commands.answer("fit", "run_01.csv", "--machine", "belt.toml", "--axes", "SAE")
+    assert (code, answer["error"]["rule"]) == (2, "usage")
+
+
+def test_a_recording_of_no_known_machine_is_led_to_a_definition(folder: Path) -> None:
+    computed_belt(folder)
+    code, answer = commands.answer("inspect", "run_01.csv")
+    assert (code, answer["error"]["rule"]) == (2, "missing-column")
+    assert "toolkit machine new" in answer["error"]["next_step"]

@@ -66,11 +66,13 @@ def write_belt(
     zero: float = 0.0,
     axes: Axes = "SAE",
     angles: tuple[float, ...] = ANGLES,
+    upward: int = 1,
 ) -> Path:
     """Write a machine in ``axes`` and a test in ``folder``, at the slip angles [deg] in SAE of its protocol.
 
     ``turned`` names a cell whose sign is wrong; without ``load`` the machine has no column of its load;
-    ``zero`` [count] is what each cell reads of nothing, and of each file's first rows then.
+    ``zero`` [count] is what each cell reads of nothing, and of each file's first rows then;
+    ``upward`` -1: the load has the sign of a force along z.
     """
     cells = "\n  ".join(
         f'{{ symbol = "{cell}", header = "{cell}", unit = "count", role = "indication" }},' for cell in CELLS
@@ -99,7 +101,7 @@ def write_belt(
             if turned is not None:
                 values[CELLS.index(turned)] *= -1
             for _ in range(40):
-                row = [FZ, SA_sign * angle, *(values + zero + 0.2 * rng.normal(size=6))][not load :]
+                row = [upward * FZ, SA_sign * angle, *(values + zero + 0.2 * rng.normal(size=6))][not load :]
                 lines.append(",".join(f"{value:.4f}" for value in row))
         (test / f"run_{number}.csv").write_text("\n".join(lines) + "\n")
     return test

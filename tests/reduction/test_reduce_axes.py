@@ -10,7 +10,9 @@ import pytest
 from tests.reduction.belt_factory import processed, truth, write_belt
 from tests.reduction.hub_factory import record
 from toolkit.channels import Axes
-from toolkit.pipeline import TestResult
+from toolkit.errors import RecordingError
+from toolkit.pipeline import TestResult, read_test
+from toolkit.recording.folder import read_test_folder
 
 LOPSIDED = (0.5, 1.0, -1.0, 3.0, 6.0, 9.0)  # in SAE: none of 3, 6 and 9 has a step on the other side
 
@@ -69,3 +71,24 @@ def test_a_departure_from_the_protocol_names_the_angles_that_the_machine_shows(
         ("drum forward", f"no file at slip angle {turn * 9} deg"),
         ("run_4.csv", f"slip angle {turn * 6.4:g} deg is out of tolerance of the step {turn * 6} deg"),
     ]
+
+
+def test_a_vertical_force_that_is_negative_in_SAE_J670_is_the_load(tmp_path: Path) -> None:
+    plain = processed(write_belt(tmp_path / "load"), record(1e-4)).reduced
+    along_z = processed(write_belt(tmp_path / "force", upward=-1), record(1e-4)).reduced
+    assert [c.FZ for c in along_z.conditions] == [c.FZ for c in plain.conditions]
+    assert along_z.conditions[0].FZ > 0
+    assert [finding.rule for finding in along_z.findings] == [finding.rule for finding in plain.findings]
+    recording = read_test(read_test_folder(tmp_path / "force" / "test"))[0]
+    assert recording["FZ"].values.max() < 0  # as the file has it
+    assert recording["FZ"].si_of(slice(3)).tolist() == recording["FZ"].si[:3].tolist() == [2000.0] * 3
+
+
+@pytest.mark.parametrize("axes", ["ISO-W", "adapted-SAE"])
+def test_elsewhere_a_negative_load_is_a_wrong_channel_and_the_axes_are_named(
+    tmp_path: Path, axes: Axes
+) -> None:
+    with pytest.raises(RecordingError, match="negative") as caught:
+        processed(write_belt(tmp_path, axes=axes, upward=-1), record(1e-4))
+    assert caught.value.rule == "no-load-block"
+    assert "axes = 'SAE'" in str(caught.value.next_step)

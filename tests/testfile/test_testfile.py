@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import json
+import re
+import string
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -198,7 +202,7 @@ def first_form(found: Characteristics) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def test_a_file_from_before_anything_was_stated_keeps_its_hash(tmp_path: Path, made: Made) -> None:
+def test_a_file_from_before_anything_was_stated_keeps_its_hash(made: Made) -> None:
     """Its hash was made of a reduced test that had no such field."""
     use = dataclasses.replace(made[0].reduced.calibration, draft_reasons=())
     bare = dataclasses.replace(
@@ -217,9 +221,7 @@ def test_a_file_from_before_anything_was_stated_keeps_its_hash(tmp_path: Path, m
     for name in ("draft_reasons", "since", "signature"):
         del content["reduced"]["calibration"][name]
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    digest = write_test_file(tmp_path / "x.xlsx", bare)
-    assert digest == hashlib.sha256(text.encode()).hexdigest()
-    assert read_test_file(tmp_path / "x.xlsx") == bare
+    assert content_hash(bare) == hashlib.sha256(text.encode()).hexdigest()
 
 
 def test_a_result_that_no_registry_was_asked_about_is_a_draft_and_stays_one(
@@ -252,3 +254,102 @@ def test_a_machine_that_is_not_where_the_test_was_reduced_is_an_error_that_says_
         reduced.machine()
     assert caught.value.rule == "unknown-machine"
     assert "process the recordings again" in caught.value.next_step
+
+
+def cells_of(path: Path) -> list[tuple[str, str, str]]:
+    """Return cells of every sheet, as member, reference and text: the last head, number and text of each."""
+    chosen: dict[tuple[str, bool, bool], tuple[str, str, str]] = {}
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.namelist():
+            if not member.startswith("xl/worksheets/sheet"):
+                continue
+            for place, kind, value in CELL.findall(archive.read(member).decode()):
+                if any(letter.isalnum() for letter in value):
+                    chosen[member, place[-2:] in HEADS, kind == "v"] = (member, place, value)
+    return list(chosen.values())
+
+
+HEADS = {f"{letter}1" for letter in string.ascii_uppercase}
+CELL = re.compile(r'<c r="([A-Z]+[0-9]+)"[^>]*>(?:<is>)?<([vt])[^>]*>([^<]+)<')
+
+
+def edited(source: Path, target: Path, member: str, place: str, new: str) -> None:
+    """Write a copy of a workbook in which one cell has other digits or letters, and no other byte differs."""
+    pattern = re.compile(rf'(<c r="{place}"[^>]*>(?:<v>|<is><t[^>]*>))[^<]+<')
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as copy:
+        for name in old.namelist():
+            text = old.read(name)
+            if name == member:
+                text = pattern.sub(rf"\g<1>{new}<", text.decode(), count=1).encode()
+            copy.writestr(name, text)
+
+
+def test_any_changed_cell_of_any_sheet_is_an_edit(tmp_path: Path, made: Made) -> None:
+    one = next(iter(made[1]))
+    short = dataclasses.replace(
+        made[1][one],
+        series=tuple(dataclasses.replace(s, values=s.values[:5]) for s in made[1][one].series),
+    )
+    finding = Finding(rule="no-tare", where="here", message="a text")
+    few = dataclasses.replace(
+        made[0],
+        characteristics=dataclasses.replace(made[0].characteristics, findings=(finding,)),
+    )
+    source, path = tmp_path / "source.xlsx", tmp_path / "edited.xlsx"
+    write_test_file(source, few, {one: short})
+    assert read_test_file(source) == few
+    cells = cells_of(source)
+    assert len({member for member, _, _ in cells}) == len(openpyxl.load_workbook(source).sheetnames)
+    accepted = []
+    for member, place, value in cells:
+        at = next(i for i, letter in enumerate(value) if letter.isalnum())
+        other = str((int(value[at]) + 3) % 10) if value[at].isdigit() else value[at].swapcase()
+        edited(source, path, member, place, value[:at] + other + value[at + 1 :])
+        with contextlib.suppress(RecordingError):
+            read_test_file(path)
+            accepted.append((member, place, value))
+    assert not accepted
+
+
+def test_a_formula_beside_its_value_is_an_edit(tmp_path: Path, light: Path) -> None:
+    """The next program that opens the file computes it, and shows another value than what was read."""
+    path = tmp_path / "x.xlsx"
+    with zipfile.ZipFile(light) as old, zipfile.ZipFile(path, "w") as copy:
+        for name in old.namelist():
+            text = old.read(name)
+            if name == "xl/worksheets/sheet3.xml":
+                assert b"<v>" in text
+                text = text.replace(b"<v>", b"<f>1+1</f><v>", 1)
+            copy.writestr(name, text)
+    with pytest.raises(RecordingError, match="formula") as caught:
+        read_test_file(path)
+    assert caught.value.rule == "test-file-changed"
+
+
+def test_a_file_that_calls_itself_older_is_an_edit(tmp_path: Path, light: Path) -> None:
+    member = f"xl/worksheets/sheet{len(openpyxl.load_workbook(light).sheetnames)}.xml"
+    with zipfile.ZipFile(light) as archive:
+        cells = CELL.findall(archive.read(member).decode())
+    place = next(place for place, _, value in cells if value == "schema")
+    edited(light, tmp_path / "x.xlsx", member, place.replace("A", "B"), "1")
+    with pytest.raises(RecordingError) as caught:
+        read_test_file(tmp_path / "x.xlsx")
+    assert caught.value.rule == "test-file-changed"
+
+
+def test_a_file_saved_again_without_an_edit_is_read(tmp_path: Path, light: Path) -> None:
+    """A program may write numbers in its own form, texts elsewhere and sheets in another order."""
+    path = tmp_path / "x.xlsx"
+    with zipfile.ZipFile(light) as old, zipfile.ZipFile(path, "w") as copy:
+        for name in old.namelist():
+            text = old.read(name).decode()
+            if name.startswith("xl/worksheets/sheet"):
+                text = re.sub(
+                    r'(t="n"[^>]*><v>)(-?[0-9.e+-]+)<', lambda m: f"{m[1]}{float(m[2]):.17E}<", text
+                )
+            if name == "xl/workbook.xml":
+                sheets = re.findall(r"<sheet [^>]*/>", text)
+                text = text.replace("".join(sheets), "".join(reversed(sheets)))
+            copy.writestr(name, text)
+    assert python_calamine.load_workbook(path).sheet_names[-1] == "test"
+    assert read_test_file(path) == read_test_file(light)

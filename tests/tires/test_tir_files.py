@@ -260,3 +260,66 @@ def test_a_file_without_its_kind_says_so():
     with pytest.raises(ConfigError) as caught:
         _ = parse_tir(text, where="x.tir").version
     assert caught.value.got == "no FITTYP, and PROPERTY_FILE_FORMAT = MF_61"
+
+
+PRESSED = "[UNITS]\nLENGTH='{length}'\nFORCE='{force}'\n{more}[OPERATING_CONDITIONS]\nNOMPRES = {pressure}\n"
+
+
+@pytest.mark.parametrize(
+    ("length", "force", "more", "pressure", "expected"),
+    [
+        ("meter", "newton", "", 220e3, 220e3),
+        ("mm", "newton", "", 0.22, 220e3),
+        ("inch", "pound_force", "", 31.908302, 220e3),
+        ("inches", "lbf", "", 31.908302, 220e3),
+        ("feet", "lbf", "", 4594.7956, 220e3),
+        ("mm", "newton", "PRESSURE='bar'\n", 2.2, 220e3),
+        ("meter", "newton", "PRESSURE='kPa'\n", 220, 220e3),
+    ],
+)
+def test_a_pressure_without_a_unit_of_its_own_counts_in_force_over_area(
+    length, force, more, pressure, expected
+):
+    """1 lbf/in^2 = 6894.757 Pa, 1 lbf/ft^2 = 47.88026 Pa (NIST SP 811, appendix B.8)."""
+    size = {"meter": 1.0, "mm": 1e3, "inch": 1 / 0.0254, "inches": 1 / 0.0254, "feet": 1 / 0.3048}[length]
+    load = 4000 / (1.0 if force == "newton" else 4.4482216)
+    units = PRESSED.format(length=length, force=force, more=more, pressure=pressure)
+    tir = made(units, radius=0.3 * size, load=load)
+    assert si_number(tir, "NOMPRES") == pytest.approx(expected, rel=1e-6)
+    converted, _ = in_si(tir)
+    assert si_number(converted, "NOMPRES") == pytest.approx(expected, rel=1e-6)
+    _, findings = evaluate_tir(tir, SA=0.1, FZ=4000.0)
+    rules = [finding.rule for finding in findings]
+    assert "tir-nominal-pressure" not in rules
+    assert ("tir-pressure-unit" in rules) == (not more and (length, force) != ("meter", "newton"))
+
+
+@pytest.mark.parametrize("pressure", [2.2, 220, 31.9, 2.2e8])
+@pytest.mark.parametrize("key", ["NOMPRES", "INFLPRES"])
+def test_a_pressure_of_no_tire_is_told_where_the_file_is_evaluated_and_converted(tmp_path, key, pressure):
+    from toolkit.lab.tire_tests.convert import convert
+
+    text = PRESSED.format(length="meter", force="newton", more="", pressure=pressure).replace("NOMPRES", key)
+    _, findings = evaluate_tir(made(text), SA=0.1, FZ=4000.0)
+    assert "tir-nominal-pressure" in [finding.rule for finding in findings]
+    source = tmp_path / "x.tir"
+    source.write_text(file_text(made(text)))
+    converted = convert(source, tmp_path / "y.tir", axes="ISO-W", resolve=lambda _path: None)
+    (finding,) = converted.findings
+    assert finding.rule == "tir-nominal-pressure"
+    assert key in finding.message
+
+
+def test_masses_and_inertias_leave_their_units():
+    units = "[UNITS]\nLENGTH='mm'\nFORCE='newton'\nMASS='tonne'\n"
+    inertia = "[INERTIA]\nMASS = 0.0093\nBELT_MASS = 0.007\nIXX = 0.4\nIYY = 0.8\nGRAVITY = -9810\n"
+    converted, kept = in_si(made(units + inertia, radius=300))
+    assert kept == ()
+    numbers = list(converted.section("INERTIA").values())
+    assert numbers == pytest.approx([9.3, 7.0, 4e-4, 8e-4, -9.81])
+
+
+def test_a_file_in_utf_16_is_read(tmp_path):
+    path = tmp_path / "x.tir"
+    path.write_bytes(file_text(made()).encode("utf-16"))
+    assert read_tir(path).sections == made().sections

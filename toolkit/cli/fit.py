@@ -45,6 +45,10 @@ def command(
         "Axes of the table: SAE (its default), adapted-SAE, ISO-W, machine; a belt test says them by the "
         "sign of its load.",
     ] = None,
+    machine: Annotated[
+        str | None,
+        "Machine whose recording the file is, or its definition; the file's own forces are fitted.",
+    ] = None,
     loss: Annotated[str, "linear (least squares) or robust."] = "linear",
     weights: Annotated[str, "Of global models: equal, or noise (each load by its own residuals)."] = "equal",
     rated_load: Annotated[float | None, "Rated load [N] of a table's tire: FNOMIN."] = None,
@@ -69,6 +73,7 @@ def command(
     from toolkit.lab.tire_tests.fit_answer import fit_payload, fit_text
     from toolkit.lab.tire_tests.fit_models import (
         fit_options,
+        fit_recording,
         fit_table_models,
         fit_test_models,
         model_choice,
@@ -88,7 +93,12 @@ def command(
     if into is not None or modelled is not None:
         check_side(side.upper())
     refuse_unwritable(figures)
-    if source.suffix.lower() != ".csv" and not in_field_form:
+    if machine is not None:
+        fitted = fit_recording(
+            source, machine, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load,
+            radius_m=radius,
+        )  # fmt: skip
+    elif source.suffix.lower() != ".csv" and not in_field_form:
         refuse_other_files(source)
         fitted = fit_test_models(
             source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius,

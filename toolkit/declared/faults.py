@@ -7,6 +7,7 @@ only text that tomllib has read: the scan follows the grammar of TOML 1.0 and ch
 from __future__ import annotations
 
 import datetime as dt
+import functools
 import json
 import re
 import tomllib
@@ -18,6 +19,8 @@ from toolkit.declared.marks import Format, Path, Quantity
 from toolkit.errors import ConfigError
 
 _LONGEST = 160
+MOST_TOLD = 100
+"""Faults of a file that are told one by one, and looked into for what was meant."""
 _SPACE = re.compile(r"[ \t]*")
 _BLANK = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -146,8 +149,13 @@ class Source:
 
     def excerpt(self, line: int) -> str:
         """Return a line with its number: ``12 | speed = 80``."""
-        text = (self.text or "").replace("\r\n", "\n").split("\n")[line - 1].strip()
+        text = _split(self.text or "")[line - 1].strip()
         return f"{line} | {text if len(text) <= _LONGEST else text[:_LONGEST] + ' ...'}"
+
+
+@functools.lru_cache(maxsize=4)
+def _split(text: str) -> list[str]:
+    return text.replace("\r\n", "\n").split("\n")
 
 
 def refuse(faults: Sequence[Fault], source: Source) -> None:
@@ -190,12 +198,14 @@ def refuse(faults: Sequence[Fault], source: Source) -> None:
 
 def _refuse_all(faults: Sequence[Fault], source: Source) -> None:
     lines = []
-    for fault in faults:
+    for fault in faults[:MOST_TOLD]:
         document, line = source.place(fault.key)
         lines.append(fault.text)
         if line is not None:
             elsewhere = f"{document.where}, " if document is not source else ""
             lines.append(f"  {elsewhere}{document.excerpt(line)}")
+    if len(faults) > MOST_TOLD:
+        lines.append(f"and {len(faults) - MOST_TOLD} more")
     rules = {fault.rule_id for fault in faults}
     raise ConfigError(
         f"{len(faults)} entries cannot be used",
@@ -213,6 +223,7 @@ def _next_step(fault: Fault, act: str | None = None) -> str:
     return (act or first.format(key=fault.name or "the file")) + semicolon + then
 
 
+@functools.lru_cache(maxsize=4)  # the faults of a file ask one after another
 def lines_of(text: str) -> Mapping[Path, int]:
     """Return the line, from 1, of every entry and table of a well-formed TOML text.
 

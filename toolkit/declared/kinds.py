@@ -14,7 +14,7 @@ from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
 from toolkit.days import parse_day
-from toolkit.declared.faults import Fault, display
+from toolkit.declared.faults import MOST_TOLD, Fault, display
 from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Path, Text
 from toolkit.files import is_number, number_expected
 from toolkit.spelling import nearest
@@ -49,7 +49,7 @@ class Place:
         """Tell a key that is not declared, and return the one that was meant; in an accepted file nothing."""
         if self.accepted:
             return None
-        near = nearest(key, known, present)
+        near = nearest(key, known, present) if len(self.faults) < MOST_TOLD else None
         self.at(key).refuse(key, ", ".join(known), kind="unknown", near=near)
         return near
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
+from toolkit.lab.arguments import checked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,6 +46,7 @@ class Face:
         """The names that `plot` knows."""
         return tuple(self._plots())
 
+    @checked
     def plot(self, name: str | None = None) -> Figure:
         """Return a figure of the report, as a matplotlib figure; ``name`` is one of `figures`.
 

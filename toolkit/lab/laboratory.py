@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts, as_path
 from toolkit.lab.home import calibrations_folder, find_home, home_template, open_registry
 from toolkit.lab.records.record import Record, Records
@@ -53,6 +54,7 @@ class Laboratory(Face):
             )
         )
 
+    @checked
     def record(self, record_id: str, *, on: dt.date | None = None, known_at: dt.date | None = None) -> Record:
         """Return a record by its id, to be judged for a day (default: today).
 
@@ -66,6 +68,7 @@ class Laboratory(Face):
         registry = self.registry
         return Record(result=registry.load(record_id), registry=registry, on=on, known_at=known_at)
 
+    @checked
     def in_force(
         self, instrument: str, *, on: dt.date | None = None, known_at: dt.date | None = None
     ) -> Record:
@@ -82,6 +85,7 @@ class Laboratory(Face):
         record = registry.in_force(instrument, on=day, known_at=known_at)
         return Record(result=record, registry=registry, on=day, known_at=known_at)
 
+    @checked
     def verify(self, head: str | None = None) -> Verification:
         """Refit every record from its stored data, and name every file that is not as it was entered.
 
@@ -91,12 +95,14 @@ class Laboratory(Face):
 
         return Verification(tuple(verify_registry(self.registry, head)))
 
+    @checked
     def read_test(self, path: str | Path) -> Test:
         """Return `toolkit.read_test` of a test that this laboratory's records compute."""
         from toolkit.lab.tire_tests.test import read_test
 
         return read_test(path, calibrations=self.calibrations)
 
+    @checked
     def write_report(
         self,
         test: ProcessedTest,
@@ -140,6 +146,7 @@ class Laboratory(Face):
             raise report.outcome
         return Report(result=report.outcome, made=report)
 
+    @checked
     def audit_archive(
         self,
         archive: str | Path,
@@ -176,6 +183,7 @@ class Laboratory(Face):
         answer, written = audit(order)
         return Audit(result=answer, written=written)
 
+    @checked
     def template(self, name: str) -> Path:
         """Return a template of ``report_templates/``; the packaged one where the laboratory has none."""
         return home_template(name, self.home)
@@ -220,6 +228,7 @@ class Verification(Face):
         }
 
 
+@checked
 def open_laboratory(home: str | Path | None = None, *, calibrations: str | Path | None = None) -> Laboratory:
     """Open a laboratory's home: the folder named, else ``TOOLKIT_HOME``, else the nearest folder upward.
 
@@ -246,6 +255,7 @@ def open_laboratory(home: str | Path | None = None, *, calibrations: str | Path 
     return Laboratory(home=nearest, calibrations=nearest / "calibrations")
 
 
+@checked
 def example(name: str) -> Path:
     """Return a packaged example to try things on: nothing in it is written to.
 

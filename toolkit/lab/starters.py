@@ -16,11 +16,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from toolkit.calibration.session.read import demand_inside
 from toolkit.channels import CHANNELS, channel_of
 from toolkit.declared import Source, refuse
 from toolkit.declared.describe import asked_of, outline
 from toolkit.declared.text import attempt, value_text
 from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError, UnitError
+from toolkit.files import toml_entries
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.printable import check_entries
 from toolkit.units import is_unit, split_header
@@ -104,7 +106,7 @@ def entries_of(words: Sequence[str]) -> dict[str, Any]:
 
 def _value(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return toml_entries(f"value = {text}")["value"]
     except (tomllib.TOMLDecodeError, KeyError):
         return text
 
@@ -116,6 +118,8 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     ------
     ConfigError
         every entry that is unknown or cannot be used; ``usage``: nothing can be guessed for this format
+    SessionError
+        ``outside``: a session's data lie where `toolkit calibrate` does not read them
     RecordingError
         the recording cannot be read
     """
@@ -125,10 +129,16 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     values, cls = {**guess.values, **entries}, form_of(word)
     # What is given is judged as it was given: an unknown entry has no place in the file.
     text = outline(cls, {})
-    stated = {key: entry for key, entry in tomllib.loads(text).items() if key == "schema"} | values
+    stated = {key: entry for key, entry in toml_entries(text).items() if key == "schema"} | values
     refuse([fault for fault in attempt(cls, stated)[1] if fault.kind != "missing"], Source(where=file))
+    if word == "session":
+        reference = values.get("reference")
+        named = {**values, "reference.dcc": reference.get("dcc") if isinstance(reference, dict) else None}
+        for key in ("data", "check", "reference.dcc"):
+            if isinstance(name := named.get(key), str):
+                demand_inside(file, name, key)
     text = outline(cls, values, {key: note for key, note in guess.notes.items() if key not in entries})
-    _, faults = attempt(cls, tomllib.loads(text))
+    _, faults = attempt(cls, toml_entries(text))
     helps = {fault.name: fault.expected for fault in faults} | asked_of(cls, values)
     return Starter(text=text, guess=guess, helps=helps)
 
@@ -257,6 +267,11 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
         for role, symbol, what in (("load", "FZ", "the load"), ("slip_angle", "SA", "the slip angle"))
         if entries and role not in stated
     ]
+    if entries and "indication" not in stated:
+        silent.append(
+            "indications: no column is a signal of a cell, and no calibration record computes the forces; "
+            "'toolkit fit FILE --machine' takes them as they are"
+        )
     silent += [
         "axes, rotations, drum and protocol: no header tells them",
         "drum.circumference: without it the road counts as flat, a belt's or a trailer's",

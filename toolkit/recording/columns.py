@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NoReturn, cast
 
-from toolkit.channels import CHANNELS, channel_of
+from toolkit.channels import CHANNELS, Axes, channel_of
 from toolkit.errors import ColumnError, UnitError
 from toolkit.machine import Machine
 from toolkit.machine.definition import Column, Role
@@ -39,6 +39,7 @@ class _Rig:
     name: str
     columns: tuple[Column, ...]
     simulated: bool = False
+    axes: Axes = "machine"
 
 
 def rig(name: str, units: Mapping[str, str]) -> Machine:
@@ -209,6 +210,7 @@ def _check_whole(
             where=where,
             got=", ".join(repr(header) for header in headers if header.strip())[:400] or "no header",
             expected=", ".join(repr(c.header) for c in machine.columns if c.role not in _OPTIONAL),
-            next_step=f"check the header row and the machine ({machine.name})",
+            next_step=f"check the header row; the machine here is {machine.name}: define another one with "
+            "'toolkit machine new RIG.toml --from FILE'",
             rule="missing-column",
         )

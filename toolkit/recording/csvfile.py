@@ -352,11 +352,14 @@ def _iterate_rows(text: str, separator: str, *, where: Path) -> Iterator[list[st
 
 
 def _no_csv(error: csv.Error, separator: str, where: object) -> UnreadableError:
+    long = "field larger" in str(error)
     return UnreadableError(
         "the CSV file cannot be read",
         where=where,
         got=error,
         expected=f"values separated by {SEPARATORS[separator]}",
-        next_step="mend the quotation marks in a copy of the file",
+        next_step="look for a line without separators, or a quotation mark that is not closed"
+        if long
+        else "mend the quotation marks in a copy of the file",
         rule="unreadable",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -27,7 +27,8 @@ class Series:
 
     ``values`` (rows,) float64, read-only, in ``unit`` as the file has them; ``header`` as written there.
     ``half`` (rows,): half the step in which a binary file stores a value, in ``unit``; None where what its
-    digits show is all that is known of its rounding.
+    digits show is all that is known of its rounding. ``sign`` makes the load on the tire of a vertical force
+    that the file has along z: in SI alone.
     """
 
     symbol: str
@@ -36,15 +37,17 @@ class Series:
     role: Role
     values: NDArray[np.float64]
     half: NDArray[np.float64] | None = None
+    sign: Literal[1, -1] = 1
 
     @property
     def si(self) -> NDArray[np.float64]:
         """The values in SI (rows,)."""
-        return to_si(self.values, self.unit)
+        return self.si_of(slice(None))
 
     def si_of(self, rows: slice) -> NDArray[np.float64]:
         """Return the values of some rows in SI."""
-        return to_si(self.values[rows], self.unit)
+        values = to_si(self.values[rows], self.unit)
+        return values if self.sign == 1 else -values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

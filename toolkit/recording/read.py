@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -56,7 +57,9 @@ def read_recording(
             path=path,
             sha256=gated.sha256,
             machine=machine,
-            series=_measurable(path, read_table(read_csv(gated.data, path, machine), machine)),
+            series=_loads(
+                _measurable(path, read_table(read_csv(gated.data, path, machine), machine)), machine
+            ),
             simulated=machine.simulated,
             format="csv",
         )
@@ -66,7 +69,7 @@ def read_recording(
             path=path,
             sha256=gated.sha256,
             machine=machine,
-            series=_measurable(path, series_of(vectors, machine)),
+            series=_loads(_measurable(path, series_of(vectors, machine)), machine),
             simulated=machine.simulated,
             format=gated.kind,
         )
@@ -74,7 +77,7 @@ def read_recording(
     keywords = keywords_of(properties)
     _check_origin(path, keywords, machine)
     sheet, table = read_sheet(gated, header_of(machine))
-    series = _measurable(path, read_table(table, machine))
+    series = _loads(_measurable(path, read_table(table, machine)), machine)
     if reader == "both":
         cross_check(gated, sheet, table)
     return Recording(
@@ -102,6 +105,22 @@ def _measurable(path: Path, series: tuple[Series, ...]) -> tuple[Series, ...]:
                 rule="nan-cell",
             )  # fmt: skip
     return series
+
+
+def _loads(series: tuple[Series, ...], machine: Machine) -> tuple[Series, ...]:
+    """Return the columns, the load on the tire positive.
+
+    In SAE J670 z points down into the road, so that its vertical force is negative; many machines show the
+    load all the same. Both are of the axes that the definition declares, and their sign tells them apart.
+    """
+    if machine.axes != "SAE":
+        return series
+    return tuple(
+        replace(column, sign=-1)
+        if column.role == "load" and -column.values.min() > abs(column.values.max())
+        else column
+        for column in series
+    )
 
 
 def _check_origin(path: Path, keywords: tuple[str, ...], machine: Machine) -> None:

@@ -161,6 +161,12 @@ def check_record(record: CalibrationRecord, machine: Machine) -> None:
     check_hub(record, machine)
 
 
+_NEGATIVE = (
+    "check the load channel and its zero; a machine whose vertical force is negative has axes = 'SAE' in its "
+    "definition"
+)
+
+
 def split_blocks(recording: Recording, machine: Machine) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
     """Return the load blocks and the tare blocks of a recording.
 
@@ -180,7 +186,9 @@ def split_blocks(recording: Recording, machine: Machine) -> tuple[tuple[Block, .
             where=recording.path,
             got=f"FZ from {_lbf(np.min(FZ))} to {_lbf(np.max(FZ))} lbf",
             expected=f"loads such as {', '.join(_lbf(load) for load in machine.protocol.loads_N)} lbf",
-            next_step="declare a tare file with '[tare] file' in test.toml; else check the load channel",
+            next_step=_NEGATIVE
+            if loads
+            else "declare a tare file with '[tare] file' in test.toml; else check the load channel",
             rule="no-load-block",
         )
     return loads, tare
@@ -233,7 +241,9 @@ def split_rests(
             f"more, in which the slip angle stays within "
             f"{float(from_si(protocol.slip_angle_tolerance_rad, 'deg')):g} deg and the load within "
             f"+-{protocol.load_tolerance:.0%}",
-            next_step="hold each condition longer, or give a protocol with wider tolerances or a shorter "
+            next_step=_NEGATIVE
+            if loads
+            else "hold each condition longer, or give a protocol with wider tolerances or a shorter "
             "averaging; else check the load channel",
             rule="no-rest" if not loads else "no-load-block",
         )

@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.use import UNSIGNED
@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from toolkit.characteristics.model import Characteristics
     from toolkit.pipeline import TestResult
 
-SCHEMA = 1
+SCHEMA = 2
+FIRST_SCHEMA = 1
+"""Of the files whose hash covers what is read back and no other cell."""
+DIGEST = "content_sha256"
 KIND = "toolkit reduced test"
 
 SHEETS = (
@@ -82,7 +85,7 @@ def optional(value: Any) -> float | None:
 
 
 def content_hash(result: TestResult, *, before_intervals: bool = False) -> str:
-    """Return the SHA-256 of a result's canonical JSON: every number in its shortest exact form.
+    """Return the SHA-256 by which a file of schema 1 holds: of a result's canonical JSON.
 
     ``before_intervals``: as the first files had it, whose parameters have no intervals of 95 %.
     """
@@ -111,6 +114,43 @@ def content_hash(result: TestResult, *, before_intervals: bool = False) -> str:
         del content["reduced"]["calibration"]["signature"]
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+class CellsHash:
+    """The SHA-256 of every cell of a workbook: rows are entered sheet by sheet, from the first row on.
+
+    What a program that saves a workbook unchanged may change is no part of it: the order of the sheets, empty
+    cells, the form of a number. The value beside ``content_sha256``, the hash itself, counts as empty.
+    """
+
+    def __init__(self) -> None:
+        self._sheets: dict[str, Any] = {}
+
+    def rows(self, sheet: str, rows: Iterable[Sequence[Any]]) -> Iterator[Sequence[Any]]:
+        """Yield the rows of a sheet as they are and enter each."""
+        digest = self._sheets[sheet] = hashlib.sha256()
+        for at, row in enumerate(rows):
+            values = [_plain(value) for value in row]
+            if values[:1] == [DIGEST]:
+                values[1:2] = [""]
+            while values and values[-1] == "":
+                values.pop()
+            if values:
+                digest.update(repr((at, values)).encode())
+            yield row
+
+    def hexdigest(self) -> str:
+        """Return the hash of all sheets by their names."""
+        sheets = sorted((name, digest.hexdigest()) for name, digest in self._sheets.items())
+        return hashlib.sha256(repr(sheets).encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    if value is None:
+        return ""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value) + 0.0 if math.isfinite(value) else str(float(value))
+    return value if isinstance(value, (bool, str)) else str(value)
 
 
 def _parameters(fit: dict[str, Any] | None) -> Sequence[dict[str, Any]]:

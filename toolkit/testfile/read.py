@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import re
+from collections import deque
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -26,12 +28,15 @@ from toolkit.recording.safe_open import check_workbook
 from toolkit.reduction.model import Condition, HubLoad, ReducedTest, Tare
 from toolkit.testfile.layout import (
     CONDITION_FIELDS,
+    DIGEST,
+    FIRST_SCHEMA,
     HUB,
     KIND,
     LATER_SHEETS,
     SCHEMA,
     SHEETS,
     SWEEPS,
+    CellsHash,
     content_hash,
     header,
     number,
@@ -51,9 +56,19 @@ def read_test_file(path: Path) -> TestResult:
         the file is no test file, of a newer schema, of a form from before 1.0.0 that has no reader
         (``older-test-file``), or was changed after it was written
     """
-    book = _open(path)
+    from python_calamine import CalamineError
+
+    try:
+        return _read(path)
+    except CalamineError as error:
+        raise _broken(path, str(error), "cells as a worksheet has them") from error
+
+
+def _read(path: Path) -> TestResult:
+    book, formulas = _open(path)
     names = [name for name in (*SHEETS, SWEEPS) if name in book.sheet_names and name != "raw"]
-    sheets = {name: _rows(book.get_sheet_by_name(name).to_python(skip_empty_area=False)) for name in names}
+    tables = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in names}
+    sheets = {name: _rows(table) for name, table in tables.items()}
     items = {str(row.get("item")): row.get("value") for row in sheets.get("provenance", ())}
     lacking = [name for name in SHEETS if name not in book.sheet_names]
     if lacking == list(LATER_SHEETS) and items.get("kind") == KIND:
@@ -67,37 +82,53 @@ def read_test_file(path: Path) -> TestResult:
         )
     if lacking:
         raise _broken(path, f"no sheet {lacking[0]}", "the sheets of a reduced test")
-    if items.get("kind") != KIND or items.get("schema") != SCHEMA:
+    if items.get("kind") != KIND or items.get("schema") not in (FIRST_SCHEMA, SCHEMA):
         kind = f"{items.get('kind')}, schema {items.get('schema')}"
-        raise _broken(path, kind, f"{KIND}, schema {SCHEMA}")
+        raise _broken(path, kind, f"{KIND}, schema {FIRST_SCHEMA} or {SCHEMA}")
     try:
         result = _result(sheets, items)
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise _broken(path, f"{type(error).__name__}: {error}", "the layout of a reduced test") from error
-    if str(items["content_sha256"]) not in _hashes(result):
+    hashes = [_cells(book, tables)] if items["schema"] == SCHEMA else list(_hashes(result))
+    if formulas or str(items[DIGEST]) not in hashes:
         raise RecordingError(
             "the reduced test was changed after it was written",
             where=path,
-            got=f"content hash {content_hash(result)[:16]}...",
-            expected=f"{str(items['content_sha256'])[:16]}...",
+            got=f"a formula in {formulas[0]}" if formulas else f"content hash {hashes[0][:16]}...",
+            expected=f"{str(items[DIGEST])[:16]}...",
             next_step="process the recordings again; a reduced test is never edited by hand",
             rule="test-file-changed",
         )
     return result
 
 
+def _cells(book: Any, tables: dict[str, list[list[Any]]]) -> str:
+    """Return the hash of all cells of all sheets; ``tables`` are those that have been read already."""
+    cells = CellsHash()
+    for name in book.sheet_names:
+        rows = tables.get(name) or book.get_sheet_by_name(name).iter_rows()
+        deque(cells.rows(name, rows), maxlen=0)
+    return cells.hexdigest()
+
+
 def _hashes(result: TestResult) -> Iterator[str]:
-    """Yield the hashes by which the content holds: today's, and without intervals the one of before."""
+    """Yield the hashes by which a file of schema 1 holds: its last one, and without intervals its first."""
     yield content_hash(result)
     fits = [fit for entry in result.characteristics.fits for fit in (entry.FY, entry.MZ) if fit is not None]
     if all(parameter.interval95 is None for fit in fits for parameter in fit.parameters):
         yield content_hash(result, before_intervals=True)
 
 
-def _open(path: Path) -> Any:
+_FORMULA = re.compile(rb"<(?:[\w.-]+:)?f[\s/>]")
+
+
+def _open(path: Path) -> tuple[Any, list[str]]:
+    """Return the workbook and its members with a formula: it shows another value when it is opened next."""
     from python_calamine import CalamineWorkbook
 
-    return CalamineWorkbook.from_filelike(BytesIO(check_workbook(path).data))
+    gated = check_workbook(path)
+    formulas = [name for name, xml in gated.members.items() if b"sheetData" in xml and _FORMULA.search(xml)]
+    return CalamineWorkbook.from_filelike(BytesIO(gated.data)), formulas
 
 
 def _broken(path: Path, actual: str, expected: str) -> RecordingError:

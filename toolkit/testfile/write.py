@@ -28,7 +28,17 @@ from toolkit.estimate import Estimate
 from toolkit.publication import write_result
 from toolkit.recording.cells import reference
 from toolkit.recording.marks import mark_workbook
-from toolkit.testfile.layout import CONDITION_FIELDS, HUB, KIND, SCHEMA, SWEEPS, cell, content_hash, header
+from toolkit.testfile.layout import (
+    CONDITION_FIELDS,
+    DIGEST,
+    HUB,
+    KIND,
+    SCHEMA,
+    SWEEPS,
+    CellsHash,
+    cell,
+    header,
+)
 from toolkit.testfile.readable import Sheet, Shown, readable_sheets
 
 if TYPE_CHECKING:
@@ -50,15 +60,16 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
     ``recordings`` (by their path inside the test) fill the sheet ``raw`` with every row of every file, in the
     file's own units; beyond a worksheet's rows it goes on in ``raw 2``.
     """
-    write_result(path, workbook(result, recordings))
-    return content_hash(result)
+    content, digest = workbook(result, recordings)
+    write_result(path, content)
+    return digest
 
 
-def workbook(result: TestResult, recordings: Mapping[str, Recording] | None = None) -> bytes:
-    """Return the file that `write_test_file` writes."""
+def workbook(result: TestResult, recordings: Mapping[str, Recording] | None = None) -> tuple[bytes, str]:
+    """Return the file that `write_test_file` writes, and the SHA-256 of its cells."""
     try:
         with ExitStack() as files:
-            return _workbook(result, content_hash(result), recordings or {}, files)
+            return _workbook(result, recordings or {}, files)
     except OSError as error:
         raise OutputError(
             "the reduced test cannot be put together",
@@ -69,18 +80,17 @@ def workbook(result: TestResult, recordings: Mapping[str, Recording] | None = No
         ) from error
 
 
-def _workbook(
-    result: TestResult, digest: str, recordings: Mapping[str, Recording], files: ExitStack
-) -> bytes:
-    """Return the file's bytes; ``files`` holds its rows while they are put together."""
+def _workbook(result: TestResult, recordings: Mapping[str, Recording], files: ExitStack) -> tuple[bytes, str]:
+    """Return the file's bytes and hash; ``files`` holds its rows while they are put together."""
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
     bodies: dict[str, IO[bytes]] = {}
+    cells = CellsHash()
     use, info = result.reduced.calibration, result.reduced.info
     mark_workbook(book, simulated=info.simulated, machine=info.machine, word=use.word)
     for page in readable_sheets(result):
-        _readable(book, page, use.mark)
+        _readable(book, page, use.mark, cells)
     for name, rows in (
         ("findings", _findings(result.reduced.findings)),
         ("reduced", _reduced(result)),
@@ -94,14 +104,21 @@ def _workbook(
         ("characteristic_findings", _findings(result.characteristics.findings)),
         *([(SWEEPS, _sweeps(result))] if result.characteristics.sweeps else []),
         *_raw_sheets(recordings),
-        ("provenance", _provenance(result, digest)),
+        ("provenance", _sealed(_provenance(result), cells)),  # last: it has the hash of all
     ):
         body = files.enter_context(tempfile.TemporaryFile())  # noqa: SIM115  closed with the others
-        _machine_sheet(book, name, rows, use.mark, body)
+        _machine_sheet(book, name, cells.rows(name, rows), use.mark, body)
         bodies[f"sheet{len(book.worksheets)}.xml"] = body
     shell = BytesIO()
     book.save(shell)
-    return filled(shell.getvalue(), bodies)
+    return filled(shell.getvalue(), bodies), cells.hexdigest()
+
+
+def _sealed(provenance: Rows, cells: CellsHash) -> Rows:
+    """Yield the last sheet's rows with the hash of all cells; asked for once those before it are entered."""
+    rows = list(cells.rows("provenance", provenance))
+    digest = cells.hexdigest()
+    yield from ((DIGEST, digest) if row[0] == DIGEST else row for row in rows)
 
 
 def _sheet(book: Any, name: str, mark: str | None) -> Any:
@@ -112,7 +129,7 @@ def _sheet(book: Any, name: str, mark: str | None) -> Any:
     return sheet
 
 
-def _readable(book: Any, page: Sheet, mark: str | None) -> None:
+def _readable(book: Any, page: Sheet, mark: str | None, cells: CellsHash) -> None:
     """Write a sheet for people: one page wide in print, its head frozen and repeated, with a filter."""
     from openpyxl.worksheet.properties import PageSetupProperties
 
@@ -129,13 +146,15 @@ def _readable(book: Any, page: Sheet, mark: str | None) -> None:
         sheet.print_title_rows = "1:1"
         sheet.auto_filter.ref = f"A1:{_letter(len(page.head) - 1)}{len(page.rows) + 1}"
         numbers = {at for row in page.rows for at, value in enumerate(row) if isinstance(value, Shown)}
-        sheet.append(
-            [
-                _cell(sheet, Shown(value=text, bold=True, side="right" if at in numbers else None))
-                for at, text in enumerate(page.head)
-            ]
-        )
-    for row in page.rows:
+        head = [
+            Shown(value=text, bold=True, side="right" if at in numbers else None)
+            for at, text in enumerate(page.head)
+        ]
+    rows = [*([head] if page.head else []), *page.rows]
+    shown = [[value if isinstance(value, Shown) else Shown(value=value) for value in row] for row in rows]
+    for row, _ in zip(
+        shown, cells.rows(page.name, ([value.value for value in row] for row in shown)), strict=True
+    ):
         sheet.append([_cell(sheet, value) for value in row])
 
 
@@ -155,12 +174,11 @@ def _machine_sheet(book: Any, name: str, rows: Rows, mark: str | None, body: IO[
     sheet.auto_filter.ref = f"A1:{_letter(len(first[0]) - 1)}{count}"
 
 
-def _cell(sheet: Any, value: Any) -> Any:
+def _cell(sheet: Any, shown: Shown) -> Any:
     """Return a value as a sheet for people takes it."""
     from openpyxl.cell import WriteOnlyCell
     from openpyxl.styles import Alignment, Font
 
-    shown = value if isinstance(value, Shown) else Shown(value=value)
     content = cell(shown.value)
     # openpyxl writes 16 digits; a double that needs 17 is given as its own shortest decimal, typed as the
     # number that it is. A text is a text even where it begins like a formula: openpyxl would guess otherwise.
@@ -184,12 +202,12 @@ def _letter(column: int) -> str:
     return str(get_column_letter(column + 1))
 
 
-def _provenance(result: TestResult, digest: str) -> Rows:
+def _provenance(result: TestResult) -> Rows:
     reduced = result.reduced
     yield ("item", "value")
     yield ("kind", KIND)
     yield ("schema", SCHEMA)
-    yield ("content_sha256", digest)
+    yield (DIGEST, None)
     if reduced.info.simulated:
         yield ("SIMULATED", "these values come from the virtual machine, not from a tire")
     yield ("code_version", reduced.code_version)

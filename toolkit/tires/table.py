@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
@@ -111,57 +112,61 @@ def read_table(
         text, an empty cell, NaN or infinity in a number's place, a value that no tire can have, loads of
         both signs
     """
-    if axes not in AXES:
-        raise ConfigError(
-            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
-            next_step="name one of those expected", rule="unknown-axes",
-        )  # fmt: skip
+    _demand_axes(axes)
     lines, marks = _without_marks(_cells(path))
     row, header = lines[0]
-    names = [_symbol(cell, path) for cell in header]
-    symbols = [name for name, _, _ in names]
-    for symbol in symbols:
-        if symbols.count(symbol) > 1:
-            _refuse(
-                path,
-                "doubled-column",
-                f"the column {symbol} stands twice",
-                ", ".join(header),
-                f"one {symbol}",
-            )
-    for symbol in required:
-        if symbol not in symbols:
-            _refuse(
-                path,
-                "missing-column",
-                f"the table has no column {symbol}",
-                ", ".join(header),
-                f"{symbol} [unit]",
-            )
-    if measured and not {"FY", "MZ"} & set(symbols):
-        _refuse(
-            path, "missing-column", "the table has neither FY nor MZ", ", ".join(header), "FY [N] or MZ [N*m]"
-        )
+    _demand_columns(header, path, required=required, measured=measured)
     if len(lines) == 1:
         raise UnreadableError(
             "the table has no data", where=path, got=f"a header in row {row} and nothing below it",
             expected=_SHAPE, next_step="add the rows", rule="no-data",
         )  # fmt: skip
     values = np.array([_numbers(cells, header, path, row) for row, cells in lines[1:]], dtype=np.float64).T
+    return table_of(
+        header, list(values), path=path, axes=axes, required=required, measured=measured, marks=marks,
+        rows=[number for number, _ in lines[1:]],
+        cells=tuple(tuple(cell.strip() for cell in cells) for _, cells in lines[1:]),
+    )  # fmt: skip
+
+
+def table_of(
+    header: Sequence[str],
+    values: Sequence[NDArray[np.float64]],
+    *,
+    path: Path,
+    axes: str,
+    required: tuple[str, ...],
+    measured: bool,
+    marks: tuple[str, ...] = (),
+    rows: Sequence[int] | None = None,
+    cells: tuple[tuple[str, ...], ...] = (),
+) -> TireTable:
+    """Return the table of columns in the units of their headers: the end of `read_table`, and its checks.
+
+    Parameters
+    ----------
+    values : columns (rows,) of finite numbers, as many as headers
+    path : what messages call the table by
+    rows : the number of every row in messages; default from 1 on
+
+    Raises
+    ------
+    ToolkitError
+        as `read_table`, but for what a file's cells may hold
+    """
+    _demand_axes(axes)
+    names = _demand_columns(header, path, required=required, measured=measured)
+    numbered = list(rows) if rows is not None else list(range(1, len(values[0]) + 1))
+    if not numbered:
+        raise UnreadableError(
+            "the table has no data", where=path, got="columns without a row", expected=_SHAPE,
+            next_step="add the rows", rule="no-data",
+        )  # fmt: skip
     columns = []
     for (symbol, factor, offset), cell, column in zip(names, header, values, strict=True):
         with np.errstate(over="ignore"):
             si = column * factor + offset
-        _refuse_impossible(
-            symbol,
-            cell.strip(),
-            column,
-            si,
-            (factor, offset),
-            path,
-            [cell_text for cell_text, _ in lines[1:]],
-        )
-        numbered = [number for number, _ in lines[1:]]
+        _refuse_impossible(symbol, cell.strip(), column, si, (factor, offset), path, numbered)
         where = f"{path}, column {cell.strip()!r}"
         columns.append((symbol, load_of(si, where=where, rows=numbered) if symbol == "FZ" else si))
     return TireTable(
@@ -169,9 +174,47 @@ def read_table(
         axes=_AXES[axes],
         columns=tuple(columns),
         header=tuple(cell.strip() for cell in header),
-        cells=tuple(tuple(cell.strip() for cell in cells) for _, cells in lines[1:]),
+        cells=cells,
         marks=marks,
     )
+
+
+def _demand_axes(axes: str) -> None:
+    if axes not in AXES:
+        raise ConfigError(
+            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
+            next_step="name one of those expected", rule="unknown-axes",
+        )  # fmt: skip
+
+
+def _demand_columns(
+    header: Sequence[str], path: Path, *, required: tuple[str, ...], measured: bool
+) -> list[tuple[str, float, float]]:
+    """Return symbol, factor and offset to SI of every column."""
+    names = [_symbol(cell, path) for cell in header]
+    symbols = [name for name, _, _ in names]
+    listed = ", ".join(header)
+    for symbol in symbols:
+        if symbols.count(symbol) > 1:
+            _refuse(path, "doubled-column", f"the column {symbol} stands twice", listed, f"one {symbol}")
+    for symbol in required:
+        if symbol not in symbols:
+            _refuse(path, "missing-column", f"the table has no column {symbol}", listed, f"{symbol} [unit]")
+    if measured and not {"FY", "MZ"} & set(symbols):
+        _refuse(path, "missing-column", "the table has neither FY nor MZ", listed, "FY [N] or MZ [N*m]")
+    return names
+
+
+def example_unit(name: str) -> str:
+    """Return a unit that a column of this channel may have, for a message.
+
+    >>> example_unit("SA"), example_unit("KAPPA"), example_unit("FZ")
+    ('deg', '%', 'N')
+    """
+    channel = channel_of(name)
+    if channel is None:
+        return "unit"
+    return {"rad": "deg", "1": "%", "Pa": "kPa"}.get(channel.si, channel.si)
 
 
 def _without_marks(
@@ -211,10 +254,15 @@ def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
         _refuse(
             path, "unknown-column", f"unknown column {name!r}", repr(cell),
             f"{near} [unit]; known are {known}" if near else known,
+            "mend the header row; of a machine's recording --machine names the definition that knows it",
         )  # fmt: skip
     if text is None:
         _refuse(
-            path, "unknown-unit", f"the column {name} has no unit", repr(cell), f"'{name} [unit]', e.g. [N]"
+            path,
+            "unknown-unit",
+            f"the column {name} has no unit",
+            repr(cell),
+            f"'{name} [unit]', e.g. [{example_unit(name)}]",
         )
     where = f"{path}, column {cell.strip()!r}"
     stated = unit(text, where=where)
@@ -275,12 +323,19 @@ def _refuse_impossible(
     )
 
 
-def _refuse(path: Path, rule: str, problem: str, actual: str, expected: str) -> NoReturn:
+def _refuse(
+    path: Path,
+    rule: str,
+    problem: str,
+    actual: str,
+    expected: str,
+    next_step: str = "mend the header row of the table",
+) -> NoReturn:
     raise ColumnError(
         problem,
         where=path,
         got=actual,
         expected=expected,
-        next_step="mend the header row of the table",
+        next_step=next_step,
         rule=rule,
     )

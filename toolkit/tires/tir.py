@@ -11,6 +11,7 @@ number.
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 from collections.abc import Mapping
@@ -25,26 +26,25 @@ _LBF = 0.45359237 * 9.80665
 _INCH = 0.0254
 _KNOWN: dict[str, dict[str, float]] = {
     "LENGTH": {
-        "meter": 1.0, "metre": 1.0, "meters": 1.0, "m": 1.0, "mm": 1e-3, "millimeter": 1e-3,
-        "millimetre": 1e-3, "cm": 1e-2, "centimeter": 1e-2, "km": 1e3, "kilometer": 1e3, "inch": _INCH,
-        "in": _INCH,
-        "foot": 12 * _INCH, "ft": 12 * _INCH,
+        "meter": 1.0, "metre": 1.0, "m": 1.0, "mm": 1e-3, "millimeter": 1e-3, "millimetre": 1e-3,
+        "cm": 1e-2, "centimeter": 1e-2, "centimetre": 1e-2, "km": 1e3, "kilometer": 1e3, "kilometre": 1e3,
+        "inch": _INCH, "inches": _INCH, "in": _INCH, "foot": 12 * _INCH, "feet": 12 * _INCH,
+        "ft": 12 * _INCH,
     },
     "FORCE": {
-        "newton": 1.0, "newtons": 1.0, "n": 1.0, "kn": 1e3, "knewton": 1e3, "kilonewton": 1e3,
+        "newton": 1.0, "n": 1.0, "kn": 1e3, "knewton": 1e3, "kilonewton": 1e3,
         "lbf": _LBF, "pound_force": _LBF, "pound": _LBF, "kgf": 9.80665, "kg_force": 9.80665,
         "kilogram_force": 9.80665, "dan": 10.0,
     },
     "ANGLE": {
-        "radian": 1.0, "radians": 1.0, "rad": 1.0, "degree": math.pi / 180, "degrees": math.pi / 180,
-        "deg": math.pi / 180,
+        "radian": 1.0, "rad": 1.0, "degree": math.pi / 180, "deg": math.pi / 180,
     },
     "MASS": {
         "kg": 1.0, "kilogram": 1.0, "g": 1e-3, "gram": 1e-3, "tonne": 1e3, "lbm": 0.45359237,
         "pound_mass": 0.45359237, "slug": _LBF / (12 * _INCH),
     },
     "TIME": {
-        "second": 1.0, "seconds": 1.0, "sec": 1.0, "s": 1.0, "ms": 1e-3, "millisecond": 1e-3, "minute": 60.0,
+        "second": 1.0, "sec": 1.0, "s": 1.0, "ms": 1e-3, "millisecond": 1e-3, "minute": 60.0,
         "min": 60.0, "hour": 3600.0, "h": 3600.0,
     },
     "PRESSURE": {
@@ -67,7 +67,9 @@ _DIMENSIONS: dict[str, tuple[str, ...]] = {
         "VERTICAL_STIFFNESS", "BOTTOM_STIFF", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS",
     ),
     "FORCE*TIME/LENGTH": ("VERTICAL_DAMPING",),
-    "MASS": ("MASS",),
+    "MASS": ("MASS", "BELT_MASS"),
+    "MASS*LENGTH*LENGTH": ("IXX", "IYY", "IZZ", "BELT_IXX", "BELT_IYY", "BELT_IZZ"),
+    "LENGTH/TIME*TIME": ("GRAVITY",),
 }  # fmt: skip
 _DIMENSION = {key: dimension for dimension, keys in _DIMENSIONS.items() for key in keys}
 # Which names of a tire file belong to which Magic Formula.
@@ -88,16 +90,23 @@ _NEUTRAL = {"PKY4": 2.0, "LMUV": 0.0}
 def factors(tir: TirFile) -> dict[str, float]:
     """Return the factor to SI of each kind of unit; SI where the file names none.
 
+    The keys that every program writes are LENGTH, FORCE, ANGLE, MASS and TIME. What they make is coherent: a
+    pressure without a PRESSURE of its own is a FORCE over a LENGTH squared.
+
     Raises
     ------
     UnitError
         a unit's spelling is not known
     """
     stated = tir.section("UNITS")
-    scales = {}
+    scales: dict[str, float] = {}
     for kind, table in _KNOWN.items():
+        if kind == "PRESSURE" and kind not in stated:
+            scales[kind] = scales["FORCE"] / scales["LENGTH"] ** 2
+            continue
         text = stated.get(kind, SI[kind])
-        factor = table.get(str(text).strip().lower())
+        spelt = str(text).strip().lower()
+        factor = table.get(spelt, table.get(spelt.removesuffix("s")))
         if factor is None:
             raise UnitError(
                 f"the tire file's unit of {kind} is not known", where=f"{tir.where}, [UNITS]", got=text,
@@ -113,10 +122,8 @@ def scale(key: str, units: dict[str, float]) -> float | None:
     if dimension is None:
         return None
     above, _, below = dimension.partition("/")
-    product = 1.0
-    for kind in above.split("*"):
-        product *= units[kind]
-    return product / units[below] if below else product
+    product = math.prod(units[kind] for kind in above.split("*"))
+    return product / math.prod(units[kind] for kind in below.split("*")) if below else product
 
 
 def si_number(tir: TirFile, key: str, default: float | None = None) -> float:
@@ -294,6 +301,11 @@ def read_tir(path: Path) -> TirFile:
         a coefficient that is no finite number, or one that stands twice with different values
     """
     data = read_input(path, TIRE_FILE)
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        try:
+            data = data.decode("utf-16").encode()
+        except UnicodeDecodeError as error:
+            raise _no_tir(path, "bytes that are no text") from error
     if b"\0" in data:
         raise _no_tir(path, "bytes that are no text")
     try:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
+from toolkit.reduction.conditions import CONDITIONS
 from toolkit.reduction.limits import FRICTION, LEAST_LOAD_N, STIFFNESS
 from toolkit.tires.plausibility import LARGEST
 from toolkit.tires.slip import readers
-from toolkit.tires.tir import TirFile, si_number
+from toolkit.tires.tir import TirFile, factors, si_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -59,7 +60,29 @@ def file_findings(tir: TirFile) -> list[Finding]:
         FITTYP is not known, or FNOMIN, UNLOADED_RADIUS are missing or not positive
     """
     p = tir.coefficients()
-    return [*tir.findings(), *lacking_findings(tir, p), *_sizes(tir), *_factors(tir, p)]
+    return [
+        *tir.findings(), *lacking_findings(tir, p), *_sizes(tir), *pressure_findings(tir), *_factors(tir, p)
+    ]  # fmt: skip
+
+
+def pressure_findings(tir: TirFile) -> Iterator[Finding]:
+    """Yield where a pressure of the file is no tire's, and that a unit of it follows from force and length.
+
+    The equations see only ratios of pressures, so that a wrong unit shows nowhere else until a pressure is
+    given beside the file.
+    """
+    limits, units = CONDITIONS["P"], factors(tir)
+    pressures = {key: value for key in ("NOMPRES", "INFLPRES") if (value := si_number(tir, key, 0.0)) > 0}
+    for key, value in pressures.items():
+        if not limits.holds(value):
+            text = f"{key} is {value:.6g} Pa by [UNITS]; tires have {limits.low:g} to {limits.high:g} kPa"
+            yield _finding("tir-nominal-pressure", tir, text)
+    if pressures and "PRESSURE" not in tir.section("UNITS") and units["PRESSURE"] != 1.0:
+        text = (
+            f"[UNITS] has no PRESSURE: a number of {' and '.join(pressures)} is of FORCE / LENGTH^2, "
+            f"{units['PRESSURE']:.6g} Pa"
+        )
+        yield _finding("tir-pressure-unit", tir, text, note=True)
 
 
 def lacking_findings(tir: TirFile, p: Mapping[str, float]) -> Iterator[Finding]:

@@ -243,17 +243,30 @@ def _cell(bridge: Bridge, cell: CellEntries, column: str) -> CellSetting:
     )
 
 
+def demand_inside(path: Path, name: str, key: str) -> None:
+    """Refuse a data file that does not lie beside a session or below; ``path`` is the session's.
+
+    Links count as what they lead to: what an error quotes must never be another file than the session's own.
+
+    Raises
+    ------
+    SessionError
+        ``outside``
+    """
+    target = path.parent / name
+    if not real_path(target).is_relative_to(real_path(path.parent)) or Path(name).is_absolute():
+        raise SessionError(
+            "a data file lies outside the session's folder",
+            where=f"{path}: {key}", got=name, expected="a relative path to a file beside the session",
+            next_step="copy the file beside the session and name it there; nothing was written",
+            rule="outside",
+        )  # fmt: skip
+
+
 def _file(path: Path, name: str, key: str) -> bytes:
     target = path.parent / name
     try:
-        # Links too: what an error quotes of a file must never be another one than the session's own.
-        if not real_path(target).is_relative_to(real_path(path.parent)) or Path(name).is_absolute():
-            raise SessionError(
-                "a data file lies outside the session's folder",
-                where=f"{path}: {key}", got=name, expected="a relative path to a file beside the session",
-                next_step="copy the file beside the session and name it there; nothing was written",
-                rule="outside",
-            )  # fmt: skip
+        demand_inside(path, name, key)
         return read_regular(target, DATA_FILE)
     except TooLargeError as error:
         raise unreadable(target, DATA_FILE, error) from error

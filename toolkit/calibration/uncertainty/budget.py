@@ -131,8 +131,8 @@ def budgets_of_rows(
 ) -> tuple[Budget | None, ...]:
     """Return the budget of a load at every row of indications (rows, indications) [the record's units].
 
-    Each is that of `predict` at the row; the session's scatter is taken once for all of them. None where a
-    row is not finite.
+    Each is that of `predict` at the row; the session's scatter is taken once for all of them, and a budget
+    once for all rows that are the same. None where a row is not finite.
 
     Raises
     ------
@@ -145,12 +145,16 @@ def budgets_of_rows(
     terms = term_matrix(fitted.terms, dict(zip(record.indications, indications.T, strict=True)))
     values = terms @ np.asarray(fitted.coefficients)
     scatter = scatter_of(record, loads, fitted)
-    return tuple(
-        _budget(record, loads, check, fitted, float(value), point, None, PROBABILITY, scatter)
-        if math.isfinite(value)
-        else None
-        for value, point in zip(values.tolist(), indications, strict=True)
-    )
+    budgets: dict[bytes, Budget | None] = {}
+    keys = [point.tobytes() for point in indications]
+    for key, value, point in zip(keys, values.tolist(), indications, strict=True):
+        if key not in budgets:
+            budgets[key] = (
+                _budget(record, loads, check, fitted, value, point, None, PROBABILITY, scatter)
+                if math.isfinite(value)
+                else None
+            )
+    return tuple(budgets[key] for key in keys)
 
 
 def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: float) -> NDArray[np.float64]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -22,7 +21,7 @@ from toolkit.declared.kinds import FileKind
 from toolkit.declared.tables import FormsKind, TableKind
 from toolkit.diagnosis.case.reader import CONDITIONS, CaseFile
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.files import parse_toml, write_atomic
+from toolkit.files import parse_toml, toml_entries, write_atomic
 from toolkit.inputs import NAMED_FILE, RECORDING_FILE, SETTINGS_FILE, check_size, read_input
 from toolkit.lab.desk.holdings import CASE
 from toolkit.lab.desk.statements import Group, statement_groups, with_entry, with_statement, without_entry
@@ -216,7 +215,7 @@ def trial_of(folder: Path, home: Path) -> dict[str, Any]:
 def _keep(folder: Path, text: str) -> None:
     """Keep a text in which nothing leads to a file that is not of the case."""
     files = open_case(folder).files
-    if outside := leading_out(tomllib.loads(text), folder, files):
+    if outside := leading_out(toml_entries(text), folder, files):
         raise not_those("of this case", outside, ", ".join(files))
     write_atomic(folder / CASE, text)
 

@@ -24,7 +24,7 @@ from toolkit.calibration.session.session_file import INSTRUMENT, INSTRUMENT_FORM
 from toolkit.days import parse_day
 from toolkit.declared import attempt, toml_text
 from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError
-from toolkit.files import write_atomic
+from toolkit.files import toml_entries, write_atomic
 from toolkit.inputs import (
     DATA_FILE,
     SETTINGS_FILE,
@@ -157,7 +157,7 @@ def ended_draft(home: Path, draft_id: str) -> Ended | None:
     if not _ID.match(draft_id):
         return None
     try:
-        table = tomllib.loads(read_regular(_note(home, draft_id), SETTINGS_FILE).decode())
+        table = toml_entries(read_regular(_note(home, draft_id), SETTINGS_FILE).decode())
     except (OSError, ValueError):
         return None
     record = table.get("record")
@@ -440,7 +440,7 @@ def _check(files: Mapping[str, bytes]) -> None:
 
 def _parsed(session: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(session)
+        return toml_entries(session)
     except (tomllib.TOMLDecodeError, RecursionError):
         return {}
 

@@ -22,6 +22,7 @@ from toolkit.declared.lists import KeyedKind, ListKind
 from toolkit.declared.tables import Field, FormsKind, TableKind
 from toolkit.declared.text import key_of, value_text
 from toolkit.errors import ConfigError
+from toolkit.files import toml_entries
 
 if TYPE_CHECKING:
     from toolkit.declared.kinds import Kind
@@ -294,7 +295,7 @@ def _value(kind: Kind, typed: str) -> Any:
         return typed
     number = typed.replace(",", ".") if re.fullmatch(r"[+-]?\d+,\d+", typed) else typed
     try:
-        return tomllib.loads(f"value = {number}")["value"] if "\n" not in number else typed
+        return toml_entries(f"value = {number}")["value"] if "\n" not in number else typed
     except tomllib.TOMLDecodeError:
         return typed
 
@@ -381,7 +382,7 @@ def _name(place: Place) -> str:
 
 def _parsed(session: str) -> dict[str, Any] | None:
     try:
-        return tomllib.loads(session)
+        return toml_entries(session)
     except (tomllib.TOMLDecodeError, RecursionError):
         return None
 

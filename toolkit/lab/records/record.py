@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
-from toolkit.errors import ColumnError
+from toolkit.errors import ConfigError
+from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts
 from toolkit.units import printed
 
@@ -61,6 +62,7 @@ class Record(Face):
         """Its state by the ledger: candidate, approved, withdrawn, discarded."""
         return self.registry.status(self.id, known_at=self.known_at)
 
+    @checked
     def apply(
         self,
         data: Columns,
@@ -100,7 +102,7 @@ class Record(Face):
         from toolkit.calibration.apply import apply_record
         from toolkit.calibration.registry.clock import today
         from toolkit.calibration.registry.standing import standing
-        from toolkit.lab.quantities import columns_of, value_of
+        from toolkit.lab.quantities import columns_of, tare_of
         from toolkit.units import unit
 
         record = self.result
@@ -108,21 +110,11 @@ class Record(Face):
             self.registry, record.instrument, on=self.on or today(), known_at=self.known_at, named=self.id
         )
         use = stands.use(draft=draft)
-        columns = columns_of(data, record.indications, units=units)
+        columns = columns_of(data, self.indications, units=units)
         values = {name: columns[name].to(text, where=name) for name, text in self.indications.items()}
         zero = None
         if tare is not None:
-            if missing := [name for name in columns if name not in tare]:
-                raise ColumnError(
-                    "the tare lacks an indication", where="tare", got=", ".join(tare) or "nothing",
-                    expected=", ".join(columns), next_step=f"state it of {', '.join(missing)} too",
-                    rule="data-columns",
-                )  # fmt: skip
-            unloaded = {
-                name: value_of(name, value, columns[name].unit)
-                for name, value in tare.items()
-                if name in columns
-            }
+            unloaded = tare_of(tare, columns)
             zero = {
                 name: float(unloaded[name].to(text, where=f"tare of {name}")[0])
                 for name, text in self.indications.items()
@@ -140,6 +132,7 @@ class Record(Face):
             findings=self._beyond(points),
         )
 
+    @checked
     def budget(self, load: str, at: float | None = None) -> Budget:
         """Return the budget of a load at a value [the record's unit]; default: the largest."""
         from toolkit.calibration.uncertainty.budget import calibration_budget
@@ -264,10 +257,16 @@ class Loads(Face):
                 columns[f"U({name}) [{self.units[name]}]"] = self.U[name]
         return pd.DataFrame(columns, index=self.index)
 
+    @checked
     def quantity(self, load: str) -> Any:
         """Return a load as a pint quantity (rows,) of the toolkit's registry."""
         from toolkit.units import registry
 
+        if load not in self.units:
+            raise ConfigError(
+                "the record gives no such load", where="Loads.quantity, load", got=load,
+                expected=", ".join(self.units), next_step="name one of those expected", rule="wrong-argument",
+            )  # fmt: skip
         return registry().Quantity(self.value[load], self.units[load].replace("*", " * "))
 
     def _facts(self) -> Facts:

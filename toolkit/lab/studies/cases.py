@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts, as_path
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class Diagnosis(Face):
             columns=["effect", "channel", "stage", "parameter", "value", "unit", "low", "high"],
         )  # fmt: skip
 
+    @checked
     def save(self, out: str | Path) -> Path:
         """Write the answer, its page, predictions and model file into a folder; return the folder.
 
@@ -117,6 +119,7 @@ class Simulation(Face):
         }
 
 
+@checked
 def diagnose(
     case: str | Path,
     *,
@@ -158,6 +161,7 @@ def diagnose(
     return Diagnosis(result=diagnosed)
 
 
+@checked
 def simulate(
     plan: str | Path,
     out: str | Path,

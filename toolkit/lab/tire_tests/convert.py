@@ -143,12 +143,13 @@ def _refuse_draft(source: Path, target: Path, kinds: tuple[str, str], use: Calib
 
 def _tir(source: Path) -> tuple[str, tuple[Finding, ...]]:
     from toolkit.tires.tir import read_tir
+    from toolkit.tires.tir_checks import pressure_findings
     from toolkit.tires.tir_write import file_text, in_si
 
     file = read_tir(source)
     _ = file.version  # a kind that cannot be evaluated is not passed on
     converted, findings = in_si(file)
-    return file_text(converted), findings
+    return file_text(converted), (*findings, *pressure_findings(file))
 
 
 def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Finding, ...], tuple[str, ...]]:

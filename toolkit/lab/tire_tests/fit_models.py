@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
@@ -14,12 +14,13 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.lab.tire_tests.resolve import Basis, Resolved
-    from toolkit.machine.definition import Drum
+    from toolkit.machine.definition import Drum, Machine
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import GlobalModel, ModelFit
     from toolkit.tires.model import CurveFit, Loss, TireModel
     from toolkit.tires.sweeps import Sweeps
+    from toolkit.tires.table import TireTable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +46,7 @@ class Fitted:
 
 
 def fit_table_models(
-    table: Path,
+    table: Path | TireTable,
     names: Sequence[str],
     *,
     axes: str | None,
@@ -56,6 +57,7 @@ def fit_table_models(
 ) -> Fitted:
     """Return the fits of a table, or of a file of the field, which is split by condition and direction.
 
+    ``table`` is its path, or what a notebook gave in place of a file.
     ``axes`` are None for those of the file: SAE for a table, by the sign of the load for a file of the field.
 
     Raises
@@ -71,8 +73,12 @@ def fit_table_models(
     from toolkit.tires.table import read_table
     from toolkit.tires.table_fit import axes_findings, fit_table, repeat_findings, row_findings
 
-    sweeps = split_file(table, axes) if is_field_file(table) else None
-    measured = read_table(table, axes=axes or "SAE") if sweeps is None else sweeps.table
+    path = table if isinstance(table, Path) else table.path
+    sweeps = split_file(table, axes) if isinstance(table, Path) and is_field_file(table) else None
+    if sweeps is not None:
+        measured = sweeps.table
+    else:
+        measured = read_table(table, axes=axes or "SAE") if isinstance(table, Path) else table
     data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
     single, over_loads = _split(names)
     curves: tuple[CurveFit, ...] = ()
@@ -84,15 +90,63 @@ def fit_table_models(
         seconds[model.name] = time.perf_counter() - started
         curves += result.fits
         findings += tuple(finding for finding in result.findings if finding not in findings)
-    fits, fit_findings, seeds = _global(data, over_loads, loss, weights, str(table), seconds)
+    fits, fit_findings, seeds = _global(data, over_loads, loss, weights, str(path), seconds)
     if not single:
         findings += (
             *row_findings(measured),
             *axes_findings(measured, seeds),
-            *size_findings(seeds, table.name),
+            *size_findings(seeds, path.name),
         )
     fitted = _fitted(data, curves, (None,) * len(curves), fits, (*findings, *fit_findings), radius_m, seconds)
     return replace(fitted, sweeps=sweeps)
+
+
+def fit_recording(
+    path: Path, machine: str, names: Sequence[str], *, axes: str | None, **options: Any
+) -> Fitted:
+    """Return the fits of a machine's recording by its own forces; ``machine`` is a name or a definition.
+
+    Raises
+    ------
+    ConfigError
+        ``usage``: axes beside the definition's; errors as those of a recording and `fit_table_models`
+    """
+    from toolkit.machine import load_machine
+
+    definition = load_machine(machine)
+    if axes is not None:
+        raise ConfigError(
+            "a recording is in the axes of its machine", where="--axes", got=axes,
+            expected=f"--machine alone; its axes are {definition.axes}", next_step="leave --axes out",
+            rule="usage",
+        )  # fmt: skip
+    fitted = fit_table_models(_table_of_recording(path, definition), names, axes=None, **options)
+    return replace(fitted, road=definition.drum)
+
+
+def _table_of_recording(path: Path, machine: Machine) -> TireTable:
+    """Return a machine's recording as a table, in the axes of its definition and with its corrections.
+
+    The forces are those that the file has: what computed them is the machine's own affair.
+
+    Raises
+    ------
+    ToolkitError
+        the file is no recording of this machine, or has not the columns of a table
+    """
+    from toolkit.channels import CHANNELS
+    from toolkit.recording.read import read_recording
+    from toolkit.reduction.corrections import corrected
+    from toolkit.tires.table import table_of
+
+    recording = read_recording(path, machine)
+    columns = {series.symbol: series.si for series in recording.series if series.symbol in CHANNELS}
+    if machine.corrections:
+        columns |= corrected(machine, {name: recording[name].si for name in ("SA", "FZ", "FY", "MZ")})
+    return table_of(
+        [f"{symbol} [{CHANNELS[symbol].si}]" for symbol in columns], list(columns.values()), path=path,
+        axes=machine.axes, required=("SA", "FZ"), measured=True,
+    )  # fmt: skip
 
 
 _NEXT_STEPS = {

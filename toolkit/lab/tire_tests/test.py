@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.lab.answers import counted
+from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts, as_path
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ class Recording(Face):
         """The channels with their units."""
         return {series.symbol: series.unit for series in self.result.series}
 
+    @checked
     def to_dataframe(self, *, si: bool = False) -> pd.DataFrame:
         """Return a row a sample, ``D51 [mV/V]``; units of the file, or SI."""
         from pandas import DataFrame
@@ -101,6 +103,7 @@ class Test(Face):
             else tuple(Recording(result=recording) for recording in read(self.folder))
         )
 
+    @checked
     def process(
         self,
         *,
@@ -192,12 +195,14 @@ class ProcessedTest(Face):
                         )  # fmt: skip
         return pd.DataFrame(rows)
 
+    @checked
     def fit(self, *models: str, **options: Any) -> TireFit:
         """Return `toolkit.fit_tire` of this test."""
         from toolkit.lab.tire_tests.tires import fit_tire
 
         return fit_tire(self.result, *models, **options)
 
+    @checked
     def save(self, path: str | Path) -> str:
         """Write the whole test to one .xlsx file, and return the hash of its content.
 
@@ -271,6 +276,7 @@ class Report(Face):
         }
 
 
+@checked
 def read_recording(path: str | Path, *, machine: str | None = None) -> Recording:
     """Read one recording.
 
@@ -297,6 +303,7 @@ def read_recording(path: str | Path, *, machine: str | None = None) -> Recording
     return Recording(result=read(Path(path), load_machine(machine or DEFAULT_MACHINE)))
 
 
+@checked
 def read_test(
     path: str | Path, *, calibrations: str | Path | None = None, home: str | Path | None = None
 ) -> Test:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts
-from toolkit.lab.quantities import columns_of
+from toolkit.lab.quantities import tire_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from toolkit.tires.model import CurveFit, Loss
     from toolkit.tires.slip import Angles
     from toolkit.tires.tir import TirFile
-
-_TABLE = ("SA", "FZ", "FY", "MZ", "FX", "IA", "KAPPA", "P", "V", "t")
 
 
 class Processed(Protocol):
@@ -74,6 +73,7 @@ class TireFit(Face):
 
         return pd.DataFrame(self.result.comparison.as_dict()["rows"])
 
+    @checked
     def write_tir(self, path: str | Path, *, model: str | None = None, side: str = "UNKNOWN") -> Path:
         """Write the tire property file of a model over all loads; return its path.
 
@@ -127,6 +127,7 @@ class Tire(Face):
 
     result: TirFile
 
+    @checked
     def evaluate(
         self,
         data: Columns,
@@ -136,6 +137,8 @@ class Tire(Face):
         angles: Angles = "star",
     ) -> pd.DataFrame:
         """Return ``FX [N]``, ``FY [N]``, ``MZ [N*m]`` at every row of slip angles and loads.
+
+        What should be known of them stands in ``attrs["findings"]``, as ``toolkit evaluate --json`` has it.
 
         Parameters
         ----------
@@ -147,25 +150,23 @@ class Tire(Face):
         Raises
         ------
         ColumnError, UnitError
-            a column is missing, or has no unit or one of another dimension
+            a column is unknown or missing, or has no unit or one of another dimension
+        CellError
+            a value that no tire can have, loads of both signs
         ToolkitError
             the file cannot be evaluated there
         """
         import pandas as pd
 
-        from toolkit.channels import CHANNELS, signs
-        from toolkit.tires.plausibility import load_of
-        from toolkit.tires.tir_evaluate import evaluate_tir
+        from toolkit.lab.tire_tests.evaluate import COMPUTED, evaluate_grid
 
-        columns = columns_of(data, ("SA", "FZ"), units=units, optional=("IA", "KAPPA", "P", "V"))
-        si = {name: column.to(CHANNELS[name].si, where=name) for name, column in columns.items()}
-        turn = signs(axes, "ISO-W")
-        turned = si | {"SA": turn["SA"] * si["SA"], "FZ": load_of(si["FZ"], where="FZ")}
-        forces = evaluate_tir(self.result, angles=angles, **turned)[0].in_axes(axes)
-        return pd.DataFrame(
-            {"FX [N]": forces.FX, "FY [N]": forces.FY, "MZ [N*m]": forces.MZ},
-            index=getattr(data, "index", None),
+        table = tire_table(data, units=units, axes=axes, measured=False)
+        values, findings = evaluate_grid(self.result, table, angles=angles)
+        forces = pd.DataFrame(
+            {header: values[name] for name, header in COMPUTED.items()}, index=getattr(data, "index", None)
         )
+        forces.attrs["findings"] = [finding.as_dict() for finding in findings]
+        return forces
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the entries of the file: section, key, value as written."""
@@ -214,6 +215,7 @@ class Tire(Face):
         return plots
 
 
+@checked
 def fit_tire(
     source: Processed | Resolved | Columns | str | Path,
     *models: str,
@@ -242,8 +244,6 @@ def fit_tire(
     ToolkitError
         the source cannot be read, or a model cannot be fitted to it
     """
-    from tempfile import TemporaryDirectory
-
     from toolkit.lab.tire_tests.fit_models import fit_options, fit_resolved, fit_table_models, model_choice
     from toolkit.lab.tire_tests.resolve import Resolved
 
@@ -259,13 +259,11 @@ def fit_tire(
     if isinstance(source, str | Path):
         fitted = fit_table_models(Path(source), names, axes=axes, **options)
         return TireFit(result=fitted, source=str(source))
-    # A table has one reader with all its checks: the columns pass through it as a file does.
-    with TemporaryDirectory() as folder:
-        table = Path(folder) / "data.csv"
-        table.write_text(_csv(source, units), encoding="utf-8")  # type: ignore[arg-type]
-        return TireFit(result=fit_table_models(table, names, axes=axes, **options), source=table.name)
+    table = tire_table(source, units=units, axes=axes or "SAE")  # type: ignore[arg-type]
+    return TireFit(result=fit_table_models(table, names, axes=axes, **options), source=str(table.path))
 
 
+@checked
 def read_tire(path: str | Path) -> Tire:
     """Read a tire property file.
 
@@ -285,10 +283,3 @@ def read_tire(path: str | Path) -> Tire:
     file = read_tir(Path(path))
     _ = file.version  # a kind that cannot be evaluated is refused at once
     return Tire(result=file)
-
-
-def _csv(data: Columns, units: Mapping[str, str] | None) -> str:
-    columns = columns_of(data, ("SA", "FZ"), units=units, optional=_TABLE)
-    lines = [",".join(f"{name} [{column.unit}]" for name, column in columns.items())]
-    rows = zip(*(column.numbers.tolist() for column in columns.values()), strict=True)
-    return "\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n"

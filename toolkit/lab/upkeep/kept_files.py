@@ -21,7 +21,7 @@ from typing import Annotated, Any, Literal
 
 from toolkit.declared import Entry, read_text
 from toolkit.errors import ToolkitError
-from toolkit.files import sha256_bytes
+from toolkit.files import sha256_bytes, toml_entries
 from toolkit.inputs import RESULT_FILE, SETTINGS_FILE, TEMPLATE_FILE, Form, read_input
 from toolkit.lab.home import TEMPLATES, packaged_home
 from toolkit.recording.marks import is_own_output
@@ -181,7 +181,7 @@ def kinds() -> tuple[Kind, ...]:
 
 
 def _schema_of_toml(_name: str, data: bytes) -> Version:
-    return _schema(tomllib.loads(data.decode("utf-8-sig")))
+    return _schema(toml_entries(data.decode("utf-8-sig")))
 
 
 def _schema_of_json(_name: str, data: bytes) -> Version:
