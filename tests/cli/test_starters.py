@@ -308,7 +308,7 @@ def test_a_session_is_not_begun_with_data_that_calibrate_does_not_read(
 
 
 def computed_belt(folder: Path) -> None:
-    """Write the recording of a belt whose own program computes the forces, as a balance does, with a channel of no tire model."""
+    """Write the recording of a belt that computes its forces itself, with a channel of no tire model."""
     rows = [
         f"{number / 100},{angle},{load},{-0.9 * load * math.tanh(angle / 4):.2f},{load * angle / 1e3},45.2"
         for load in (2000, 4000)

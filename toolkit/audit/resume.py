@@ -14,7 +14,6 @@ import hashlib
 import json
 import os
 import tempfile
-import tomllib
 import weakref
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,7 +28,7 @@ from toolkit.audit.one_file import ArchivedFile, OwnOutput
 from toolkit.audit.sides import grade_of
 from toolkit.declared import json_value, object_of
 from toolkit.errors import OutputError
-from toolkit.files import sha256_bytes, sha256_file
+from toolkit.files import sha256_bytes, sha256_file, toml_entries
 from toolkit.inputs import SETTINGS_FILE, open_regular_to_append, raised_to, read_regular
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
@@ -266,7 +265,7 @@ def _words(toml: Path | None) -> str:
     data = b""
     try:
         data = read_regular(toml, SETTINGS_FILE)
-        machine = tomllib.loads(data.decode()).get("machine") if b".toml" in data else None
+        machine = toml_entries(data.decode()).get("machine") if b".toml" in data else None
         is_file = isinstance(machine, str) and machine.endswith(".toml")
         definition = sha256_file(toml.parent / str(machine)) if is_file else ""
     except (OSError, ValueError) as error:
