@@ -64,7 +64,7 @@ def noise_parts(problem: Problem, fit: Fit, name: str) -> ChannelNoise:
 
 
 def _sensor(problem: Problem, fit: Fit, name: str) -> tuple[float, Evidence]:
-    stated = problem.sd_of(name)
+    stated = problem.stated_sd(name)
     if stated is not None:
         return stated, "stated"
     repeated = _by_repeats(problem, fit, name)
@@ -102,10 +102,15 @@ def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
     ]
     if not quick:
         return math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
-    return _ROBUST * float(np.median(np.abs(np.concatenate(quick)))) / math.sqrt(_WEIGHT)
+    return robust_sd(np.concatenate(quick)) / math.sqrt(_WEIGHT)
 
 
 def spread(problem: Problem, name: str) -> float:
     """Return the standard deviation of an output as it was recorded."""
     values = problem.observed[name][problem.kept[name]]
     return float(np.std(values)) if len(values) else 0.0
+
+
+def robust_sd(values: NDArray[np.float64]) -> float:
+    """Return the standard deviation about zero that the median of the sizes tells, of normal values."""
+    return _ROBUST * float(np.median(np.abs(values)))
