@@ -20,6 +20,8 @@ from toolkit.declared import OrNan
 from toolkit.diagnosis.policy import NOISE
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
