@@ -94,9 +94,22 @@ def _by_repeats(problem: Problem, fit: Fit, name: str) -> float | None:
     return math.sqrt(squares / dof) if dof else None
 
 
+def shows_sensor(problem: Problem, fit: Fit, name: str) -> bool:
+    """Tell whether quick differences of a residual are the sensor's: those of rows between which little moves.
+
+    Rows in no order of time, or driven anew at each of them, tell what was left out in their differences too.
+    """
+    quick = _quick_sd(problem, fit.simulated[name], name)
+    return problem.case.has_time and quick <= NOISE.largest * spread(problem, name)
+
+
 def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
+    return _quick_sd(problem, fit.residual[name], name)
+
+
+def _quick_sd(problem: Problem, column: NDArray[np.float64], name: str) -> float:
     where = problem.layout(name)
-    values = fit.residual[name][where.index]
+    values = column[where.index]
     quick = [
         np.diff(values[segment], _ORDER)
         for segment in where.segments
