@@ -95,7 +95,7 @@ def _by_repeats(problem: Problem, fit: Fit, name: str) -> float | None:
 
 
 def shows_sensor(problem: Problem, fit: Fit, name: str) -> bool:
-    """Tell whether quick differences of a residual are the sensor's: those of rows between which little moves.
+    """Tell whether quick differences of a residual are the sensor's, as between two rows little moves.
 
     Rows in no order of time, or driven anew at each of them, tell what was left out in their differences too.
     """
