@@ -18,6 +18,7 @@ from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.averages import averages_findings, is_smooth, of_kept_rows, rows_averaged
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
+from toolkit.diagnosis.law.foretelling import before_nothing
 from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations
 from toolkit.diagnosis.policy import BUDGET
@@ -127,9 +128,10 @@ def _diagnosed(
             seed = int(case.sha256[:12], 16)
             with budget.limited():
                 outcome = search(posed.problem, seed=seed, budget=budget)
+                outcome = before_nothing(outcome, seed=seed, budget=budget)
                 laws = learned(outcome, withdrawn=mostly_unknown(outcome), budget=budget)
                 outcome, laws = without_imitations(outcome, laws, budget)
-                outcome, laws = judged_by_laws(outcome, laws, budget)
+                outcome, laws = judged_by_laws(outcome, laws, seed=seed, budget=budget)
             answer = answer_of(posed.case, outcome, laws, findings)
     except BudgetSpentError as error:
         answer = _too_late(posed.case, posed.problem, declared, findings, str(error))

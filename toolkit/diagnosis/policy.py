@@ -48,9 +48,7 @@ class _Rows:
         8.0, "robust sd from the neighbours' median", "no physics does that in one row: it is an outlier"
     )
     outliers: float = _set(0.03, "of a run's rows", "more than that is no outlier but a pattern")
-    sharp: float = _set(
-        0.5, "of a run's outliers", "beside sharp moves of an input: they may answer the move"
-    )
+    sharp: float = _set(0.5, "of a run's outliers", "beside sharp moves of an input: they may answer it")
     coincidence: float = _set(
         0.001, "chance of as many", "a lone outlier may stand beside a turn of the input; a dozen do not"
     )
@@ -116,8 +114,26 @@ class _Noise:
         "of an output's spread",
         "what nobody stated and no repeat shows, and is larger, is not known as noise",
     )
-    still: float = _set(
-        1e-6, "of an output's spread", "a simulation that moves less has its noise as its spread"
+    still: float = _set(1e-6, "of an output's spread", "of one that moves less the noise is the spread")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Even:
+    """When a rest is not one noise: louder in some runs or times, or foretold by a law."""
+
+    rows: int = _set(48, "rows", "of a stretch: twice as many as show the colour of a noise")
+    parts: int = _set(8, "stretches of a run", "an event of an eighth of it stands alone in one")
+    turns: int = _set(10, "estimates of a zero", "each with weights of the last: they settle")
+    clipped: float = _set(4.0, "robust sd", "what single values count for: heavy tails are no louder run")
+    runs: float = _set(4.0, "times the mean square", "of the quiet runs: sensors differ by less every day")
+    stretches: float = _set(9.0, "times the mean square", "of the quiet ones: what wanders comes and goes")
+    matters: float = _set(0.01, "of an output's spread", "simulations are off by less now and then")
+    cautious: float = _set(2.0, "times the correlation", "of short series, which seem to forget sooner")
+    worth: float = _set(10.0, "independent values", "on either side: fewer scatter by as much themselves")
+    alpha: float = _set(1e-5, "of all divisions", "seen on AR(1) 0.99 of a hundred rows, once in 4 000 cases")
+    foretold: float = _set(0.5, "of unseen runs' mean square", "by a law: it takes more than it leaves")
+    clear: float = _set(
+        0.5, "of what laws leave of noise", "at best, of 399 series: one null in 60 had as much"
     )
 
 
@@ -144,7 +160,7 @@ class _Averages:
     window: int = _set(256, "rows", "of a window of the spectra: five octaves and more")
     windows: int = _set(4, "windows side by side", "fewer are alike by chance")
     shortest: int = _set(
-        16, "rows of a window", "three octaves: a shorter stretch tells nothing of quick changes"
+        16, "rows of a window", "three octaves: a shorter one tells nothing of quick changes"
     )
     missed: float = _set(
         0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
@@ -196,23 +212,15 @@ class _Screening:
     alpha: float = _set(
         0.003, "of the whole search, a step", "four steps stay below the bar of 2 % false names on nulls"
     )
-    sharpened: int = _set(
-        30, "starts", "whose gain is computed with the noise estimated anew: quick ones rank"
-    )
-    starts: int = _set(
-        6, "starts of one candidate", "among the sharpened: one candidate cannot crowd out all"
-    )
+    sharpened: int = _set(30, "starts", "whose gain is computed with a noise estimated anew: quick ones rank")
+    starts: int = _set(6, "starts of one candidate", "among the sharpened: one cannot crowd out all others")
     turns: int = _set(2, "estimates of the noise", "the second is that of what the responses leave")
-    short: float = _set(
-        10.0, "independent rows", "a gain of so few is all chance: found on clean AR(1) series"
-    )
+    short: float = _set(10.0, "independent rows", "a gain of so few is chance: found on clean AR(1) series")
     least_trust: float = _set(0.3, "of a gain", "that the shortest series keeps: found on clean AR(1) series")
     collinear: float = _set(1e-11, "of the largest eigenvalue", "below, nothing could be told apart")
     draws: int = _set(4_000, "draws of the null", "a p-value of 0.003 has twelve draws below it")
     fewest_draws: int = _set(20, "draws below a statistic", "with fewer the drawn share is mostly chance")
-    tail: float = _set(
-        0.01, "of the draws", "from there on Bonferroni goes on, on the tests that the tail shows"
-    )
+    tail: float = _set(0.01, "of the draws", "from there on Bonferroni, on the tests that the tail shows")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,7 +228,7 @@ class _Starts:
     """Where the search for an effect starts."""
 
     subsets: int = _set(
-        8, "groups of runs by one condition", "each is a test more; the first are the likeliest"
+        8, "groups of runs by one condition", "each is one test more; the first are likeliest"
     )
     late: tuple[int, ...] = _set((1, 4, 12), "rows", "delays of a plant whose rows are far apart")
 
@@ -270,9 +278,7 @@ class _Step:
         1e-3, "of a bound", "an estimate as near to it ends there: the effect only imitates another"
     )
     signal: float = _set(0.5, "of an output in its right unit", "what else it may have in it")
-    undone: float = _set(
-        0.5, "of the smaller one's change", "left of two laws of a sensor: less is one curve"
-    )
+    undone: float = _set(0.5, "of the smaller one's change", "left of two laws of a sensor: less is one")
     undone_rows: float = _set(0.5, "of the rows", "in which they take each other back: most of the range")
     visible: float = _set(0.01, "of the noise", "an effect that never moves an output by more is not there")
     band_noise: float = _set(2.0, "of the log posterior", "noise before a dead band is taken for more likely")
@@ -286,9 +292,7 @@ class _Units:
     left: float = _set(0.2, "of the mean square", "by the right unit, its parameters still to be refitted")
     most: int = _set(4, "units", "the best: a wrong input and a wrong output often do the same")
     told: float = _set(0.02, "of a ratio", "by which a law's factor may miss it and be told as a unit")
-    vague: float = _set(
-        1.25, "times its lower end", "a wider interval holds the ratio of some units or others"
-    )
+    vague: float = _set(1.25, "times its lower end", "a wider interval holds the ratio of some units")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -373,14 +377,10 @@ class _Structure:
     alpha: float = _set(
         0.0005, "of all groups", "stricter than an effect's: no held-out run has a say in what is left"
     )
-    sharpened: int = _set(
-        15, "groups", "whose gain is computed with the noise estimated anew: quick ones rank"
-    )
+    sharpened: int = _set(15, "groups", "whose gain is computed with a noise estimated anew: quick ones rank")
     knots: int = _set(7, "knots of a spline", "a smooth dependence, over the quantiles of the variable")
     rows_per_column: float = _set(4.0, "rows for each column", "fewer would fit the noise")
-    stated: float = _set(
-        1.1, "times a stated noise", "that a residual may have: certificates are round numbers"
-    )
+    stated: float = _set(1.1, "times a stated noise", "that a residual may have: certificates are round")
     stated_rows: int = _set(10, "values of an output", "fewer do not show that they scatter too much")
     stated_worth: float = _set(3.0, "degrees of freedom", "at least, however coloured the noise is")
     foretold: float = _set(
@@ -388,14 +388,10 @@ class _Structure:
         "of a coloured residual's mean square",
         "foretold on unseen runs by what was recorded: it is no noise",
     )
-    foretold_draws: int = _set(
-        399, "series of the residual's colour", "of which none may be foretold as well"
-    )
+    foretold_draws: int = _set(399, "series of the residual's colour", "none of which is foretold as well")
     line: float = _set(1e-8, "p-value of a spectral line", "the noise's own resonances are lines as well")
     line_share: float = _set(0.05, "of a residual's variance", "a line with less matters to nobody")
-    line_around: int = _set(
-        12, "frequencies on each side", "whose median is the level that a line stands above"
-    )
+    line_around: int = _set(12, "frequencies on each side", "whose median is the level below a line")
     line_rows: int = _set(64, "rows of a run", "a shorter one has too few frequencies for a level")
     line_even: float = _set(0.05, "of the mean step", "by which the runs' clocks may differ to be added")
     line_cycles: int = _set(8, "cycles a run", "slower is a trend, not a line")
@@ -409,11 +405,9 @@ class _Laws:
 
     alpha: float = _set(0.0005, "of all laws", "as strict as the structure that it explains")
     most: int = _set(3, "laws", "every further one has less evidence and more ways to be wrong")
-    sharpened: int = _set(30, "laws", "whose gain is computed with the noise estimated anew: quick ones rank")
+    sharpened: int = _set(30, "laws", "whose gain is computed with a noise estimated anew: quick ones rank")
     refined: int = _set(10, "laws", "whose shape is moved to its best before their gain is computed")
-    rounds: int = _set(
-        12, "rounds", "of that, in which each law moves to its best neighbour or halves its steps"
-    )
+    rounds: int = _set(12, "rounds", "in which each law moves to its best neighbour or halves its steps")
     fitted: int = _set(5, "laws", "fitted jointly, of those that are ranked first")
     judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
@@ -431,9 +425,7 @@ class _Laws:
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")
     ends: int = _set(81, "times of a run", "between which an event in an equation may begin and end")
     apart: float = _set(1e-12, "of a response", "squared, of two steps in an equation: less is rounding")
-    columns: int = _set(
-        4_000_000, "numbers of a response", "of laws in an equation that are propagated together"
-    )
+    columns: int = _set(4_000_000, "numbers of a response", "of laws in an equation propagated together")
     cuts: int = _set(120, "stretches of a run", "on whose ends an event may begin and end")
     event_rows: int = _set(40, "values of a run", "fewer do not tell an event from a few outliers")
     stands_out: float = _set(
@@ -463,15 +455,11 @@ class _Verdict:
         "a simulation that nobody calibrated is off by as much without any effect",
     )
     shown: float = _set(1.1, "times the noise's mean square", "an output with less shows no mismatch")
-    telling: float = _set(
-        20.0, "of the summed squares over the noise's", "an output moved by less is not told"
-    )
+    telling: float = _set(20.0, "of the summed squares over the noise's", "one moved by less is not told")
     interval: float = _set(0.95, "probability", "of the confidence intervals that the contract promises")
     open_interval: float = _set(1e5, "times the value", "a wider interval is none: the data leave it open")
     power: float = _set(0.8, "probability", "with which the smallest detectable size would have been found")
-    far: float = _set(
-        1e3, "times the usual size", "a response is not in proportion over so many of its sizes"
-    )
+    far: float = _set(1e3, "times the usual size", "no response is in proportion over so many sizes")
     observable: float = _set(
         1e-3, "of a response", "left beside the nominal parameters, or nothing is seen of it"
     )
@@ -492,7 +480,7 @@ class _Location:
 
 
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
-PAST, RATES, SCATTER, AVERAGES = _Past(), _Rates(), _Scatter(), _Averages()
+PAST, RATES, SCATTER, AVERAGES, EVEN = _Past(), _Rates(), _Scatter(), _Averages(), _Even()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
 UNITS = _Units()
 DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()

@@ -22,7 +22,7 @@ def search(*, explained, unexplained, before, after, zero=0.0):
         slices=(slice(0, 50), slice(50, 100)), rates={},
     )  # fmt: skip
     return Of(
-        problem=problem, steps=(step,), structure=(rest,), errors=(errors,),
+        problem=problem, steps=(step,), structure=(rest,), errors=(errors,), skipped=(),
         held_refitted=Of(simulated={"y": zero + before * wave}),
         held_augmented=Of(simulated={"y": after * wave}),
     )  # fmt: skip
@@ -45,6 +45,14 @@ def plain(monkeypatch):
 def test_what_takes_more_of_the_unseen_rows_than_it_leaves_is_not_outweighed(before, after, zero, unknown):
     """A coloured noise weighs a slow error of half a volt little; the mean of a rest is any zero's."""
     found = search(explained=20.0, unexplained=60.0, before=before, after=after, zero=zero)
+    assert naming.mostly_unknown(found) is unknown
+
+
+@pytest.mark.parametrize(("step", "unknown"), [("step 3: joint fits", False), ("swaps", True)])
+@pytest.mark.usefixtures("plain")
+def test_steps_of_a_search_that_was_cut_short_are_shown_beside_a_rest_that_it_has_not_seen(step, unknown):
+    found = search(explained=20.0, unexplained=60.0, before=0.71, after=0.6)
+    found.skipped = (step,)
     assert naming.mostly_unknown(found) is unknown
 
 

@@ -60,6 +60,19 @@ def test_a_rest_above_a_tenth_of_the_spread_is_never_nothing(tmp_path):
     assert noise.total_sd == pytest.approx(2.5, rel=0.25)
 
 
+def test_white_noise_of_a_weak_signal_is_no_structure(tmp_path):
+    assert hidden(case_of(tmp_path, lambda _, rng: rng.normal(0, 2.5, N))) == ()
+
+
+def test_of_rows_in_no_order_no_difference_shows_the_sensor(tmp_path):
+    # The load is another one at every row: what it leaves is as quick as any noise.
+    text, rng = cell_case(0.01) + '[[recording.run]]\nfile = "r0.csv"\n', np.random.default_rng(3)
+    load = rng.uniform(30, 70, N)
+    table = pd.DataFrame({"t": np.arange(N) * 0.1, "L": load, "F": load + 4 * np.sign(np.sin(5 * load))})
+    case = read_case(write_case(tmp_path, text, simulator=CELL, r0__csv=table, r1__csv=None))
+    assert (LARGE,) in {found.variables for found in hidden(case)}
+
+
 def test_a_noise_of_that_size_that_a_certificate_states_hides_nothing(tmp_path):
     assert hidden(case_of(tmp_path, lambda _, rng: rng.normal(0, 2.5, N), sd=2.5)) == ()
 

@@ -12,6 +12,7 @@ from tests.diagnosis.cases import carriage, write_case
 from toolkit.diagnosis.answer.answer import Dependence
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.sensor_noise import ChannelNoise
 from toolkit.findings import Finding
 from toolkit.lab.studies.diagnosis import diagnosis_text
 from toolkit.report.diagnosis import figures
@@ -62,6 +63,63 @@ def test_a_search_that_was_cut_off_does_not_say_that_no_effect_explains(dragged)
     assert "before every known effect was tried" in headline(cut)
     assert "no known effect explains" in headline(dataclasses.replace(cut, skipped=("predictions",)))
     assert headline(dataclasses.replace(cut, complete=True, skipped=())) == HEADLINES["unknown"]
+
+
+@pytest.mark.parametrize(("step", "is_said"), [("laws", True), ("swaps", True), ("predictions", False)])
+def test_a_name_whose_last_test_was_skipped_is_provisional_in_the_first_line(dragged, step, is_said):
+    cut = dataclasses.replace(dragged.diagnosis, complete=False, skipped=(step,))
+    html = page(dataclasses.replace(dragged, diagnosis=cut))
+    console = diagnosis_text(cut, "out").splitlines()[0]
+    for first in (html.split('<div class="verdict')[1], headline(cut), console.split(": ", 1)[1]):
+        assert ("Provisional: the budget was spent" in first) is is_said
+    assert headline(cut).startswith("Provisional") is is_said
+
+
+def test_the_noise_of_the_sensor_stands_beside_what_is_left(dragged):
+    (fit,) = dragged.diagnosis.fit.held_out
+    assert f"{fit.noise.sensor_sd:.4g}" in page(dragged)
+    lines = diagnosis_text(dragged.diagnosis, "out").splitlines()
+    (titles,) = [line for line in lines if line.startswith("output ")]
+    (row,) = [line for line in lines if line.startswith("F ") and " N " in line]
+    assert titles.split()[-2:] == ["noise", "sensor"]
+    assert row.split()[-1] == f"{fit.noise.sensor_sd:.4g}"
+
+
+def test_a_rest_that_is_slower_than_its_sensor_is_not_called_its_noise(dragged):
+    (fit,) = dragged.diagnosis.fit.held_out
+    slow = dataclasses.replace(fit, noise=ChannelNoise(sensor_sd=1.0, process_sd=4.9, how="differences"))
+    clean = dataclasses.replace(
+        dragged.diagnosis, verdict="nothing", remaining="nothing", effects=(), mismatch=(),
+        fit=dataclasses.replace(dragged.diagnosis.fit, held_out=(slow,)),
+    )  # fmt: skip
+    html = page(dataclasses.replace(dragged, diagnosis=clean))
+    assert "F is 5 times its sensor" in html
+    assert "larger than the sensor has from row to row" in html
+
+
+def test_what_is_left_says_no_variable_that_is_none(dragged):
+    large = ("a floor above a tenth of the output's spread",)
+    left = tuple(Dependence(channel="F", variables=names) for names in (large, ("F",), ("v", "F")))
+    unknown = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=(), depends_on=left)
+    for text in (page(dataclasses.replace(dragged, diagnosis=unknown)), diagnosis_text(unknown, "out")):
+        assert "F leaves a floor above a tenth" in text
+        assert "F over its own size" in text
+        assert "F over v and its own size" in text
+
+
+def test_a_class_says_first_which_channel_may_be_what(dragged):
+    effect = dataclasses.replace(
+        dragged.diagnosis.effects[0], channel="F", equivalent_to=("creep", "backlash")
+    )
+    classed = dataclasses.replace(dragged.diagnosis, verdict="equivalent", effects=(effect,))
+    assert cause(classed).startswith(f"F may have {effect.name} or creep or backlash")
+
+
+def test_what_is_there_or_not_has_no_smallest_size_and_says_so(dragged):
+    absent = {each.name: each for each in dragged.diagnosis.not_found}
+    for each in absent.values():
+        assert each.minimum_detectable is not None or each.why
+    assert "it has no size" in page(dragged)
 
 
 def test_no_chance_is_zero(dragged):

@@ -227,6 +227,16 @@ class HeldOutChannel:
     with_laws_rmse: Annotated[float | None, Entry("with the laws of what has no name too")] = None
     noise: Annotated[ChannelNoise | None, Entry("null where no fit was made, and in older answers")] = None
 
+    @property
+    def sensor_sd(self) -> float | None:
+        """What the sensor has from row to row, or as it is stated; None where no fit was made."""
+        return None if self.noise is None else self.noise.sensor_sd
+
+    @property
+    def is_slow(self) -> bool:
+        """Tell whether most of what is left is slower than the sensor's noise."""
+        return self.noise is not None and self.noise.process_sd > self.noise.sensor_sd
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeldOutFit:
@@ -284,6 +294,11 @@ class Diagnosis:
 def cut_short(skipped: Sequence[str]) -> bool:
     """Tell whether a search ended before every known effect was tried; what comes later leaves names."""
     return any(step not in ("swaps", "predictions", LAWS_STEP) for step in skipped)
+
+
+def untested(skipped: Sequence[str]) -> tuple[str, ...]:
+    """Return the steps skipped that may still take a name away; predictions do not."""
+    return tuple(step for step in skipped if step != "predictions")
 
 
 def only_runs_differ(diagnosis: Diagnosis) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from toolkit.diagnosis.answer.answer import (
     RejectedEffect,
     Verdict,
     recorded,
+    untested,
 )
 from toolkit.diagnosis.answer.found_laws import found_laws
 from toolkit.diagnosis.answer.held_out_errors import held_out_errors, structured, with_laws
@@ -46,7 +48,13 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
     """Return the answer of a search and the laws of its rest; ``findings`` are those on the case itself."""
     problem = search.problem
     unknown = mostly_unknown(search)
+    skipped = search.skipped if laws.complete or search.skipped else (LAWS_STEP,)
     effects = () if unknown else tuple(_effect(search, step) for step in search.steps)
+    if untested(skipped):
+        effects = tuple(
+            replace(effect, statement=f"Provisional, not all tests were made: {effect.statement}")
+            for effect in effects
+        )
     nominal = _nominal(search, before_effects=unknown)
     left = bool(search.structure or laws.listed)
     verdict = _verdict(search, effects, nominal, unknown=unknown or left)
@@ -74,8 +82,10 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
             held_out=with_laws(search, laws, held_out_errors(search, unknown=unknown)),
         ),
         depends_on=tuple(
-            Dependence(channel=structure.output, variables=structure.variables)
-            for structure in search.structure or (search.structure_before if unknown else ())
+            dict.fromkeys(
+                Dependence(channel=structure.output, variables=structure.variables)
+                for structure in search.structure or (search.structure_before if unknown else ())
+            )
         ),
         not_found=not_found(
             search.screen,
@@ -93,7 +103,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
             *confounded_findings(case, search, laws, effects),
         ),
         complete=not search.skipped and laws.complete,
-        skipped=search.skipped if laws.complete or search.skipped else (LAWS_STEP,),
+        skipped=skipped,
         recordings=recorded(case.runs),
         laws=found_laws(search, laws),
     )

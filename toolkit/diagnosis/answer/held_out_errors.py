@@ -77,7 +77,7 @@ def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) ->
         name = output.channel
         away = problem.judged(name, problem.observed[name] - laws.held_out.simulated[name])
         rmse = math.sqrt(float(np.mean(away**2)))
-        stated = problem.sd_of(output.channel) is not None
+        stated = problem.stated_sd(output.channel) is not None
         floor = output.noise_floor if stated else min(output.noise_floor, rmse)
         told.append(replace(output, with_laws_rmse=rmse, noise_floor=floor))
     return tuple(told)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.answer.answer import cut_short
 from toolkit.diagnosis.answer.held_out_errors import held_out_errors, judged_noise
 from toolkit.diagnosis.answer.next_measurements import implausible, outsized
 from toolkit.diagnosis.fit.sensor_noise import spread
@@ -28,7 +29,8 @@ def mostly_unknown(search: Search) -> bool:
     what was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with
     a size that no cell has.
 
-    Nothing outweighs effects that take more of an output's unseen rows than they leave there.
+    Nothing outweighs effects that take more of an output's unseen rows than they leave there. Nor is anything
+    withdrawn for a rest of which a search that was cut short has not seen what it is.
     """
     if search.steps and implausible(search) and not _takes_nearly_all(search):
         return True
@@ -37,7 +39,7 @@ def mostly_unknown(search: Search) -> bool:
         return True
     if search.steps and _is_within_accuracy(search):
         return True
-    if not search.structure:
+    if not search.structure or (search.steps and cut_short(search.skipped)):
         return False
     if outsized(search):
         return True

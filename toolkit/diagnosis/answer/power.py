@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 NO_PLACE = "no place for it in this case"
+NO_SIZE = "it is there or not: it has no size"
 
 
 def not_found(
@@ -72,7 +73,9 @@ def not_found(
             )  # fmt: skip
             continue
         size, unit, visible = best[name]
-        why = "" if visible else "its response vanishes here, or the free parameters take it all"
+        why = NO_SIZE if size is None else ""
+        if not visible:
+            why = "its response vanishes here, or the free parameters take it all"
         if not visible and name in beyond:
             why = "it would not have been seen at any usual size that leaves the outputs in their own range"
         entries.append(

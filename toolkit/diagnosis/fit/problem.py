@@ -34,7 +34,8 @@ class Problem:
     ``kept`` masks the rows that count, for each output over all runs in their order; ``slices`` are the
     rows of each run; ``floor`` is the resolution of each output's numbers, or what the simulation itself is
     unsure by, below which no noise is known. ``rates`` has the outputs that only drift, and the rows by which
-    the values are apart whose rate is judged.
+    the values are apart whose rate is judged. ``shown_sd`` has the noise of outputs that nobody stated, and
+    that the recording shows to be less than what is left.
     """
 
     case: Case
@@ -47,6 +48,7 @@ class Problem:
     floor: dict[str, float]
     slices: tuple[slice, ...]
     rates: Mapping[str, int] = field(default_factory=dict)
+    shown_sd: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -187,9 +189,13 @@ class Problem:
             for k in range(len(starts))
         ]
 
-    def sd_of(self, name: str) -> float | None:
+    def stated_sd(self, name: str) -> float | None:
         """Return the stated noise of an output."""
         return next(output.sd for output in self.model.outputs if output.name == name)
+
+    def sd_of(self, name: str) -> float | None:
+        """Return the noise of an output as it is stated, or as the recording shows it to be."""
+        return self.shown_sd.get(name) if (sd := self.stated_sd(name)) is None else sd
 
 
 def problem_of(case: Case, model: Model) -> Problem:

@@ -20,6 +20,8 @@ from toolkit.declared import OrNan
 from toolkit.diagnosis.policy import NOISE
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -64,7 +66,7 @@ def noise_parts(problem: Problem, fit: Fit, name: str) -> ChannelNoise:
 
 
 def _sensor(problem: Problem, fit: Fit, name: str) -> tuple[float, Evidence]:
-    stated = problem.sd_of(name)
+    stated = problem.stated_sd(name)
     if stated is not None:
         return stated, "stated"
     repeated = _by_repeats(problem, fit, name)
@@ -92,9 +94,22 @@ def _by_repeats(problem: Problem, fit: Fit, name: str) -> float | None:
     return math.sqrt(squares / dof) if dof else None
 
 
+def shows_sensor(problem: Problem, fit: Fit, name: str) -> bool:
+    """Tell whether quick differences of a residual are the sensor's, as between two rows little moves.
+
+    Rows in no order of time, or driven anew at each of them, tell what was left out in their differences too.
+    """
+    quick = _quick_sd(problem, fit.simulated[name], name)
+    return problem.case.has_time and quick <= NOISE.largest * spread(problem, name)
+
+
 def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
+    return _quick_sd(problem, fit.residual[name], name)
+
+
+def _quick_sd(problem: Problem, column: NDArray[np.float64], name: str) -> float:
     where = problem.layout(name)
-    values = fit.residual[name][where.index]
+    values = column[where.index]
     quick = [
         np.diff(values[segment], _ORDER)
         for segment in where.segments
@@ -102,10 +117,15 @@ def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
     ]
     if not quick:
         return math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
-    return _ROBUST * float(np.median(np.abs(np.concatenate(quick)))) / math.sqrt(_WEIGHT)
+    return robust_sd(np.concatenate(quick)) / math.sqrt(_WEIGHT)
 
 
 def spread(problem: Problem, name: str) -> float:
     """Return the standard deviation of an output as it was recorded."""
     values = problem.observed[name][problem.kept[name]]
     return float(np.std(values)) if len(values) else 0.0
+
+
+def robust_sd(values: NDArray[np.float64]) -> float:
+    """Return the standard deviation about zero that the median of the sizes tells, of normal values."""
+    return _ROBUST * float(np.median(np.abs(values)))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
+from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked, responses
 from toolkit.diagnosis.law.terms import pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
@@ -90,7 +91,9 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
     listed: list[Law] = []
     complete = not search.skipped
     try:
-        for turn in range(LAWS.most if complete and outputs else 0):
+        for turn in range(LAWS.most if complete else 0):
+            if not outputs:
+                break
             budget.check(f"laws of what has no name: {turn + 1}")
             outcome = _next(search, base, held_out, outputs)
             if outcome is None:
@@ -98,6 +101,9 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
                 break
             law, base, held_out = outcome
             listed.append(law)
+            if search.problem.shown_sd:  # noise it may be now: what was none has been taken from it
+                rest = taken_for_noise(search.problem, search.folds, base, turn)
+                outputs = tuple(part.output for part in rest)
     except BudgetSpentError:
         complete = False
     return Laws(listed=tuple(listed), fit=base, held_out=held_out, complete=complete)

@@ -16,6 +16,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.folds import hold_out
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
+from toolkit.diagnosis.law.foretelling import before_nothing
 from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.policy import LAWS, STEP
 from toolkit.diagnosis.search.search import without
@@ -31,22 +32,33 @@ if TYPE_CHECKING:
     from toolkit.effects.applied import AppliedEffect
 
 
-def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
+def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget) -> tuple[Search, Laws]:
     """Return a search and its laws, or laws alone where these have fewer parameters and foretell as well.
 
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
     stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
     there rings, coloured noise takes it up, and no structure shows. What has a name keeps it against a
-    formula that says the same, and loses it where all that is named has another size beside the laws.
+    formula that says the same, and loses it where all that is named has another size beside the laws, or
+    where it leaves more than the sensor's noise and they do not.
     """
     predicting = any(law.predicts for law in laws.listed)
     is_asked = predicting or _leaves_process_noise(search)
     beside = any(step.active.key == applied.key for step in search.steps for applied in laws.fit.active)
     if not beside or not is_asked or not laws.complete:
         return search, laws
-    alone = learned(search, withdrawn=True, budget=budget)
+    bare = replace(
+        search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
+        structure=search.structure_before,
+    )  # fmt: skip
+    try:
+        bare = before_nothing(bare, seed=seed, budget=budget)
+    except BudgetSpentError:
+        return search, replace(laws, complete=False)
+    alone = learned(bare, withdrawn=False, budget=budget)
     if not any(law.predicts for law in alone.listed):
-        return search, laws
+        return search, laws if alone.complete else replace(laws, complete=False)
+    if bare.problem.shown_sd and _leaves_process_noise(search) and not _process_noise(search, alone.fit):
+        return bare, alone
     if any(_holds_beside(laws, step) for step in search.steps):
         if _parameters(alone.fit) >= _parameters(laws.fit):
             return search, laws
@@ -57,10 +69,6 @@ def judged_by_laws(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sear
             return search, laws
     elif alone.held_out.total - search.held_augmented.total < STEP.least_gain:
         return search, laws
-    bare = replace(
-        search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
-        structure=search.structure_before,
-    )  # fmt: skip
     return bare, alone
 
 
@@ -88,7 +96,11 @@ def _leaves_process_noise(search: Search) -> bool:
     motion = search.problem.model.capability.motion
     if motion is None or not motion.integrates:
         return False
-    parts = [noise_parts(search.problem, search.augmented, name) for name in search.problem.names]
+    return _process_noise(search, search.augmented)
+
+
+def _process_noise(search: Search, fit: Fit) -> bool:
+    parts = [noise_parts(search.problem, fit, name) for name in search.problem.names]
     return any(part.process_sd > part.sensor_sd for part in parts)
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, draws, fit_noise
-from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts, spread
+from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts, shows_sensor, spread
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE
 from toolkit.diagnosis.search.unexplained import StructureFound
@@ -65,7 +65,12 @@ def is_beyond_noise(problem: Problem, base: Fit) -> bool:
 
 
 def _is_large(problem: Problem, base: Fit, name: str, parts: ChannelNoise) -> bool:
-    """Tell whether a rest is above a tenth of the output's spread; of a constant, the spread is its noise."""
+    """Tell whether a rest is above a tenth of the output's spread; of a constant, the spread is its noise.
+
+    What is as white as the sensor's own noise is no structure, however weak the signal beside it.
+    """
+    if parts.process_sd < parts.sensor_sd and shows_sensor(problem, base, name):
+        return False
     simulated = base.simulated[name][problem.kept[name]]
     varies = float(np.std(simulated)) > NOISE.still * spread(problem, name)
     return varies and parts.total_sd > NOISE.largest * spread(problem, name)

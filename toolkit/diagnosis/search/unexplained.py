@@ -215,7 +215,8 @@ class StructureFound:
 
     A ``rest`` is only larger than noise may be, or differs from run to run: it follows nothing that an effect
     could imitate, and no effect beside it is withdrawn because of it. ``columns`` are the parameters of a
-    smooth dependence; a line and a rest have none.
+    smooth dependence; a line and a rest have none. ``noise_sd`` is what the output's noise is known to be
+    where the structure shows that it is not the residual; None where it shows nothing of it.
     """
 
     output: str
@@ -224,6 +225,7 @@ class StructureFound:
     p_value: float
     rest: bool = False
     columns: int = 0
+    noise_sd: float | None = None
 
     @property
     def is_lawful(self) -> bool:
@@ -284,7 +286,7 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
     """Return the finding that a residual is larger than the sensor noise which a certificate states."""
     from scipy.stats import chi2
 
-    sd, counted = problem.sd_of(name), problem.kept[name]
+    sd, counted = problem.stated_sd(name), problem.kept[name]
     if sd is None or counted.sum() < STRUCTURE.stated_rows:
         return None
     # Coarse steps add their own to what the sensor is stated to have.

@@ -244,8 +244,8 @@ def _writable(out: Path) -> None:
 def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
     from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
-    from toolkit.report.diagnosis.numbers import chance, rounded
-    from toolkit.report.diagnosis.page import cause, simulated
+    from toolkit.report.diagnosis.numbers import chance, over, rounded
+    from toolkit.report.diagnosis.page import cause, provisional, simulated
 
     cut = diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped)
     verdict = _CUT if cut else _RUNS_DIFFER if only_runs_differ(diagnosis) else _VERDICTS[diagnosis.verdict]
@@ -253,7 +253,9 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
         verdict = "the budget was spent before this recording could be judged"
     mark = simulated(diagnosis)
     lines = [mark] if mark else []
-    lines.append(f"{diagnosis.title}: {' '.join(filter(None, (cause(diagnosis), verdict)))}")
+    lines.append(
+        f"{diagnosis.title}: {' '.join(filter(None, (provisional(diagnosis), cause(diagnosis), verdict)))}"
+    )
     for effect in diagnosis.effects:
         channel = f" on {effect.channel}" if effect.channel else ""
         lines += ["", f"{effect.name}{channel} ({effect.stage}): {effect.statement}", f"  {effect.equation}"]
@@ -285,7 +287,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
         dict.fromkeys((by.channel, tuple(by.variables)) for by in diagnosis.depends_on)
     )  # the largest first
     for channel, names in structures[:_STRUCTURES]:
-        lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
+        lines.append(f"structure that no named effect explains: {over(channel, names)}")
     if len(structures) > _STRUCTURES:
         lines.append(
             f"and {len(structures) - _STRUCTURES} smaller ones over other variables: see diagnosis.json"
@@ -304,6 +306,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
             *(f"{v:.4g}" for v in (o.nominal_rmse, o.refitted_rmse, o.augmented_rmse)),
             *([] if o.with_laws_rmse is None else [f"{o.with_laws_rmse:.4g}"]),
             f"{o.noise_floor:.4g}",
+            "-" if o.sensor_sd is None else f"{o.sensor_sd:.4g}",
         ]
         for o in diagnosis.fit.held_out
     ]
@@ -312,9 +315,9 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
         lines += ["", f"error on held-out rows (by {diagnosis.fit.held_out_by}):"]
         lines.append(
             table(
-                ["output", "unit", "nominal", "refitted", "augmented", *lawful, "noise"],
+                ["output", "unit", "nominal", "refitted", "augmented", *lawful, "noise", "sensor"],
                 rows,
-                align="<<>>>>" + ">" * len(lawful),
+                align="<<>>>>>" + ">" * len(lawful),
             )
         )
     moved = [parameter for parameter in diagnosis.nominal_parameters if parameter.prior_sd]

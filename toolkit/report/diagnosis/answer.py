@@ -73,7 +73,8 @@ def _summary(source: Told, style: Style) -> str:
             )
         else:
             ends = f"is {_n(fit.refitted_rmse, style)} {printed(fit.unit)}"
-        sentences.append(f"{fit.channel} {ends} (noise {_n(fit.noise_floor, style)})")
+        sensor = "" if fit.sensor_sd is None else f", from row to row {_n(fit.sensor_sd, style)}"
+        sentences.append(f"{fit.channel} {ends} (noise {_n(fit.noise_floor, style)}{sensor})")
     fell = "With the effects the error on held-out rows falls: " if source.answer.effects else None
     text = f"{fell or 'Error on held-out rows: '}{'; '.join(sentences)}."
     return " ".join([text if sentences else "Nothing was fitted.", *_rests_on(source)])

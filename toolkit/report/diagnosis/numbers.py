@@ -51,8 +51,10 @@ def over(channel: str, variables: Sequence[str]) -> str:
 
     >>> over("FY", ["SA", "FZ"]), over("FY", ["more than its stated noise"]), over("FY", ["a slow rest"])
     ('FY over SA and FZ', 'FY is off by more than its stated noise', 'FY leaves a slow rest')
+    >>> over("FY", ["FY"]), over("FY", ["FY", "SA"])
+    ('FY over its own size', 'FY over its own size and SA')
     """
-    names = " and ".join(variables)
+    names = " and ".join("its own size" if name == channel else name for name in variables)
     words = {"more than": "is off by", "a ": "leaves"}
     verb = next((verb for start, verb in words.items() if names.startswith(start)), "over")
     return f"{channel} {verb} {names}"

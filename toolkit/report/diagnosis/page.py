@@ -64,8 +64,28 @@ class _Law:
     notes: Sequence[str]
 
 
-def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict as a sentence; a search that was cut off has not tried every effect."""
+def headline(diagnosis: Diagnosis, *, with_cause: bool = False) -> str:
+    """Return the verdict as a sentence; a search that was cut off has not tried every effect.
+
+    Parameters
+    ----------
+    with_cause : the effects with their sizes stand before it
+    """
+    sentences = (provisional(diagnosis), cause(diagnosis) if with_cause else None, _verdict(diagnosis))
+    return " ".join(filter(None, sentences))
+
+
+def provisional(diagnosis: Diagnosis) -> str | None:
+    """Return that names may not stand, as the budget was spent before their last test; None where they do."""
+    from toolkit.diagnosis.answer.answer import untested
+
+    steps = untested(diagnosis.skipped) if diagnosis.effects else ()
+    if not steps:
+        return None
+    return f"Provisional: the budget was spent before all tests of these names were made ({steps[0]})."
+
+
+def _verdict(diagnosis: Diagnosis) -> str:
     from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
 
     if diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped):
@@ -103,7 +123,7 @@ def cause(diagnosis: Diagnosis) -> str | None:
             for value, interval in (rounded(parameter.value, parameter.ci95),)
         ]
         told = is_told_from_none(effect)
-        names.append((not told, ("" if told else "perhaps ") + ", ".join((_name(effect), *sizes))))
+        names.append((not told, ("" if told else "perhaps ") + ", ".join((_said(effect), *sizes))))
     shares = []
     for fit in diagnosis.fit.held_out:
         above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
@@ -147,7 +167,7 @@ def page(result: Result, use: CalibrationUse | None = None) -> str:
             mark=" - ".join(filter(None, (simulated(diagnosis), None if use is None else use.mark))) or None,
             signature=signature_text(() if use is None else (use,)),
             diagnosis=diagnosis,
-            headline=" ".join(filter(None, (cause(diagnosis), headline(diagnosis)))),
+            headline=headline(diagnosis, with_cause=True),
             lead=_lead(diagnosis),
             chart=chart,
             effects=[_effect(result, effect) for effect in diagnosis.effects],
@@ -181,12 +201,26 @@ def _lead(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         return [("", f"The budget was spent at: {diagnosis.skipped[0]}. Nothing can be said yet.")]
     if diagnosis.verdict == "untestable":
         return [("", "The outputs do not vary, or the parameters take up everything; see below.")]
-    return [("", "What is left is noise; the list below says how large each effect would have had to be.")]
+    slow = [
+        f"{fit.channel} is {few(fit.noise.total_sd / fit.noise.sensor_sd, 2)} times its sensor's noise"
+        for fit in diagnosis.fit.held_out
+        if fit.is_slow and fit.noise is not None
+    ]
+    left = f"noise; what is left of {', of '.join(slow)}, and follows nothing recorded" if slow else "noise"
+    return [("", f"What is left is {left}. The list below says how large each effect would have had to be.")]
 
 
 def _name(effect: DiagnosedEffect) -> str:
     where = f" on {effect.channel}" if effect.channel else ""
     return effect.name + where + (f" (or {', '.join(effect.equivalent_to)})" if effect.equivalent_to else "")
+
+
+def _said(effect: DiagnosedEffect) -> str:
+    """Return an effect's name as a first line has it: of a class first which channel may be what."""
+    if not effect.equivalent_to:
+        return _name(effect)
+    classed = f"{effect.name} or {' or '.join(effect.equivalent_to)}"
+    return f"{effect.channel} may have {classed}" if effect.channel else f"it may be {classed}"
 
 
 def _effect(result: Result, effect: DiagnosedEffect) -> _Effect:
@@ -299,7 +333,9 @@ def _places(result: Result) -> Iterator[_Place]:
         for fit in diagnosis.fit.held_out:
             in_time = figures.run_in_time(search, fit.channel, after=after, laws=result.laws)
             yield _Place(
-                sentence=f"{fit.channel}: nothing stands out of the noise. The run with the largest error:",
+                sentence=f"{fit.channel}: nothing stands out of the noise"
+                f"{', which is larger than the sensor has from row to row' if fit.is_slow else ''}. "
+                "The run with the largest error:",
                 figures=[Figure(svg=in_time, alt=f"{fit.channel} in one run")],
             )
 
@@ -322,7 +358,7 @@ def _held_out(diagnosis: Diagnosis) -> Table:
         errors["with the effects"] = "augmented_rmse"
     if any(fit.with_laws_rmse is not None for fit in diagnosis.fit.held_out):
         errors["with the laws"] = "with_laws_rmse"
-    errors["noise"] = "noise_floor"
+    errors |= {"noise": "noise_floor", "sensor's noise": "sensor_sd"}
     rows = [
         (fit.channel, fit.unit, *(number(getattr(fit, field), ".4g", "–") for field in errors.values()))
         for fit in diagnosis.fit.held_out
@@ -347,8 +383,8 @@ def _nominal_parameters(diagnosis: Diagnosis) -> Table:
 
 
 def _remaining(diagnosis: Diagnosis) -> Table:
-    rows = [(by.channel, " and ".join(by.variables)) for by in diagnosis.depends_on[:8]]
-    return table(("output", "depends on"), rows)
+    rows = [(over(by.channel, by.variables),) for by in diagnosis.depends_on[:8]]
+    return table(("what is left",), rows)
 
 
 def _rejected(result: Result) -> Table:
@@ -374,7 +410,11 @@ def _rejected(result: Result) -> Table:
 
 def _detectable(diagnosis: Diagnosis) -> Table:
     rows = [
-        (effect.name, number(effect.minimum_detectable, ".3g", "–"), effect.unit)
+        (
+            effect.name,
+            effect.why if effect.minimum_detectable is None else f"{effect.minimum_detectable:.3g}",
+            "" if effect.minimum_detectable is None else effect.unit,
+        )
         for effect in diagnosis.not_found
         if effect.observable
     ]
