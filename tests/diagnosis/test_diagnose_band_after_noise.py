@@ -24,8 +24,8 @@ def recording(seed):
 def test_the_interval_holds_the_width_of_a_band_on_a_noisy_reading(tmp_path):
     frames = {f"r{i}__csv": recording(i) for i in range(2)}
     made = diagnose(read_case(write_case(tmp_path, CASE + TWO, simulator=CELL, **frames)), None).diagnosis
-    # No noise is stated, and it is more than a tenth of the reading's spread: what it hides is not known.
-    assert (made.verdict, made.remaining) == ("named", "unknown")
+    # No noise is stated, and it is half of the reading's spread; but it is as white as a sensor's.
+    assert (made.verdict, made.remaining) == ("named", "nothing")
     (one,) = made.effects
     assert (one.name, one.channel) == ("dead_band", "F")
     (width,) = one.parameters

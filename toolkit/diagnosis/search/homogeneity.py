@@ -106,12 +106,15 @@ def about_own(problem: Problem, base: Fit, name: str, values: Array, *, turns: i
     about = np.array(values)
     for rows in problem.slices:
         at = rows.start + np.flatnonzero(problem.kept[name][rows])
+        if not len(at):
+            continue
         design = np.column_stack([np.ones(len(at)), base.simulated[name][at]])
         there, weights = about[at], np.ones((len(at), 1))
-        for _ in range(turns):
+        for turn in range(turns):
+            if turn:
+                away = np.abs(about[at])
+                weights = np.sqrt(np.minimum(1.0, robust_sd(away) / np.maximum(away, 1e-300)))
             about[at] = there - design @ np.linalg.lstsq(weights * design, weights * there, rcond=None)[0]
-            away = np.abs(about[at][:, :1])
-            weights = np.sqrt(np.minimum(1.0, robust_sd(away) / np.maximum(away, 1e-300)))
     return about
 
 
