@@ -1,6 +1,7 @@
 """What coloured noise may not swallow: a large rest, and one that follows what was recorded."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.folds import folds_of
 from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG, hidden_in_noise
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
@@ -38,9 +40,10 @@ def case_of(folder, rest, *, runs=3, sd=None):
     return read_case(write_case(folder, text, simulator=CELL, **{"r1__csv": None, **frames}))
 
 
-def hidden(case):
+def hidden(case, *, beside=()):
     problem = problem_of(case, model_of(case, None, None))
-    base = fit(problem)
+    found = [candidate.active for candidate in candidates(problem) if candidate.name in beside]
+    base = fit(problem, [replace(active, values={"offset": 1.0}) for active in found])
     return hidden_in_noise(problem, folds_of(problem, base), base, seed=1)
 
 
@@ -60,8 +63,10 @@ def test_a_rest_above_a_tenth_of_the_spread_is_never_nothing(tmp_path):
     assert noise.total_sd == pytest.approx(2.5, rel=0.25)
 
 
-def test_white_noise_of_a_weak_signal_is_no_structure(tmp_path):
-    assert hidden(case_of(tmp_path, lambda _, rng: rng.normal(0, 2.5, N))) == ()
+def test_white_noise_of_a_weak_signal_is_no_structure_beside_what_was_found(tmp_path):
+    case = case_of(tmp_path, lambda _, rng: rng.normal(4.0, 2.5, N))
+    assert hidden(case, beside=("zero_offset",)) == ()
+    assert (LARGE,) in {found.variables for found in hidden(case)}
 
 
 def test_of_rows_in_no_order_no_difference_shows_the_sensor(tmp_path):

@@ -67,9 +67,10 @@ def is_beyond_noise(problem: Problem, base: Fit) -> bool:
 def _is_large(problem: Problem, base: Fit, name: str, parts: ChannelNoise) -> bool:
     """Tell whether a rest is above a tenth of the output's spread; of a constant, the spread is its noise.
 
-    What is as white as the sensor's own noise is no structure, however weak the signal beside it.
+    Beside effects that were found, what is as white as the sensor's own noise is no structure, however weak
+    the signal. Alone it is: of a recording a tenth of which is noise nobody knows what it hides.
     """
-    if parts.process_sd < parts.sensor_sd and shows_sensor(problem, base, name):
+    if base.active and parts.process_sd < parts.sensor_sd and shows_sensor(problem, base, name):
         return False
     simulated = base.simulated[name][problem.kept[name]]
     varies = float(np.std(simulated)) > NOISE.still * spread(problem, name)
