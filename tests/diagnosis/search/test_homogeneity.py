@@ -46,7 +46,9 @@ def wave(first, last):
 
 
 def test_a_run_that_leaves_much_more_than_the_others_is_told(tmp_path):
-    rest = lambda k, _, rng: rng.normal(0, 0.1, N) + (k == 1) * 3 * wave(5, 35)  # noqa: E731
+    def rest(k, _, rng):
+        return rng.normal(0, 0.1, N) + (k == 1) * 3 * wave(5, 35)
+
     part = found(tmp_path, rest)
     assert part.variables == ("time (louder in r1.csv)",)
     assert part.rest
@@ -55,7 +57,9 @@ def test_a_run_that_leaves_much_more_than_the_others_is_told(tmp_path):
 
 
 def test_what_only_one_run_leaves_is_not_told_as_noise(tmp_path):
-    rest = lambda k, _, rng: rng.normal(0, 0.1, N) + (k == 1) * 2 * wave(5, 35)  # noqa: E731
+    def rest(k, _, rng):
+        return rng.normal(0, 0.1, N) + (k == 1) * 2 * wave(5, 35)
+
     answer = diagnose(case_of(tmp_path, rest), None).diagnosis
     assert (answer.verdict, answer.effects) == ("unknown", ())
     assert [by.variables for by in answer.depends_on] == [("time (louder in r1.csv)",)]

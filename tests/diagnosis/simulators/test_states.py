@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
@@ -96,27 +97,10 @@ def rhs(t, x, u, p):
 def outputs(x, u, p):
     return {"x": 1000.0 * x[0]}
 """
-IN_MILLIMETRES = """schema = 1
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["x", "v"]
-force_terms = { v = "N/kg" }
-[simulation.parameters.k]
-value = 800.0
-unit = "N/m"
-sd = 16.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-F = { unit = "N", role = "input" }
-x = { unit = "mm", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-[[recording.run]]
-file = "r1.csv"
-"""
+IN_MILLIMETRES = case_text(
+    "ode", parameters={"k": (800.0, "N/m", 16.0)}, inputs={"F": "N"}, outputs={"x": "mm"}, runs=2,
+    states=["x", "v"], force_terms={"v": "N/kg"},
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(

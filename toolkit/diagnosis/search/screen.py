@@ -218,10 +218,10 @@ class LinearisedFit:
             yield {name: -response[:, columns] for name, response in moved.items()}
 
     def _zero(self, candidate: CandidateEffect) -> Stacked | None:
-        """Return the response to the constant beside which a candidate is seen, None where there is none."""
-        if not candidate.zero_beside(self.base.active):
-            return None
+        """Return the response to the constant beside which a candidate of an output is seen, if there is one."""
         channel = candidate.active.channel
+        if channel not in self.problem.names or not candidate.zero_beside(self.base.active):
+            return None
         return {name: np.full((self.problem.rows, 1), float(name == channel)) for name in self.problem.names}
 
     def quick(
