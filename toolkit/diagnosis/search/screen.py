@@ -218,7 +218,7 @@ class LinearisedFit:
             yield {name: -response[:, columns] for name, response in moved.items()}
 
     def _zero(self, candidate: CandidateEffect) -> Stacked | None:
-        """Return the response to the constant beside which a candidate of an output is seen, if there is one."""
+        """Return an output's response to the constant beside which a candidate is seen, if there is one."""
         channel = candidate.active.channel
         if channel not in self.problem.names or not candidate.zero_beside(self.base.active):
             return None
