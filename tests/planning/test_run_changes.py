@@ -199,3 +199,20 @@ def test_a_course_begins_within_the_limits_and_only_where_something_was_recorded
     assert changed(posed, change, RunLimits(values={"u": (1.6, 3.0), "a": (-2.0, 2.0)})) is None
     # An acceleration that never is zero leaves no course at all.
     assert changed(posed, change, RunLimits(values={"u": (1.0, 2.0), "a": (0.5, 1.0)})) is None
+
+
+@pytest.mark.parametrize(
+    "drive", [Drive(cycles=60.0, levels=2), Drive(cycles=12.0, levels=2, swept=True)], ids=str
+)
+def test_rows_tell_what_a_course_does_between_them(late: Problem, drive: Drive) -> None:
+    """As fast as may be, a course is known between rows by a straight line, to a hundredth of its span."""
+    run = changed(
+        late,
+        Change(run="r0.csv", drives=(("u", drive),)),
+        RunLimits(values={"u": (-3.0, 3.0)}, rates={"u": 1e6}),
+    )
+    assert run is not None
+    column, t = run.columns["u"], run.t
+    assert np.ptp(column) > 0
+    between = np.interp(t[1::2][:-1], t[::2], column[::2])  # every other row left out: four times as far off
+    assert np.abs(between - column[1::2][: len(between)]).max() < 4 * 0.01 * 6.0

@@ -56,6 +56,14 @@ class Pace:
     rate: float
     acceleration: float = math.inf
 
+    def told_by_rows(self, seconds: float, miss: float) -> Pace:
+        """Return a pace of which rows, so many ``seconds`` apart, miss no more than ``miss`` between them.
+
+        A straight line misses a course by an eighth of its acceleration times the square of the time between
+        rows. What is faster is no planned input: nobody could say afterwards what it was.
+        """
+        return Pace(rate=self.rate, acceleration=min(self.acceleration, 8 * miss / seconds**2))
+
     def farthest(self, seconds: float) -> float:
         """Return how far a move comes in a time."""
         return min(self.rate * seconds / _PEAK_RATE, self.acceleration * seconds**2 / _PEAK_ACCELERATION)

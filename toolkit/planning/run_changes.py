@@ -36,6 +36,7 @@ RATES = (0.25, 0.5, 1.0, 2.0, 4.0)
 _OF_A_RECORDING = ("phase", "date", "order", "repeat_of", "file")  # and of no other run
 _IS_RATE = 0.98  # of the variance of a channel that another one's derivative explains
 _SLACK = 1e-9
+_BETWEEN_ROWS = 0.01  # of an input's span, by which a straight line from row to row may miss its course
 # What else can be done with a tire on a drum, beside the conditions that the recordings have.
 _TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
 
@@ -161,7 +162,9 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
                 if recorded[1] < low or recorded[0] > high:
                     return None  # the members are known nowhere there
                 ends = _ends(low, high, sizes.get(name, 1.0), levels.get(name))
-                pace = _pace(problem, name, sources, limits)
+                pace = _pace(problem, name, sources, limits).told_by_rows(
+                    float(np.median(np.diff(run.t))), _BETWEEN_ROWS * (high - low)
+                )
                 start = min(max(float(column[0]), low), high)
                 column = driven(run.t, drives[name], start, ends, pace)
             else:
