@@ -58,7 +58,7 @@ def test_a_slip_of_mv_with_excitation_is_refused(used: Registry, tmp_path: Path)
     assert failed(decision) == {"span"}
     made, decision = judged(used, write_virtual(tmp_path / "ten", written, session=at(10.0)))
     assert decision.done, decision.findings
-    assert rules(made) == {"unit-changed"}
+    assert rules(made) == {"unit-changed", "readings-again"}
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_unit_that_was_changed_on_purpose_passes_and_is_told(
         return text
 
     made, decision = judged(used, write_virtual(tmp_path / "s", write))
-    assert rules(made) == {"unit-changed"}
+    assert rules(made) == {"unit-changed", "readings-again"}
     assert {one.where for one in made.findings if one.rule == "unit-changed"} == set(names)
     assert decision.done, decision.findings
     (entry,) = [e for e in used.ledger("m15-virtual").of(made.record.id) if e.event == "approved"]

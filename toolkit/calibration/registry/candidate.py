@@ -46,7 +46,7 @@ from toolkit.calibration.records.record import (
 )
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.registry.clock import check_begun, now
-from toolkit.calibration.registry.history import history_of
+from toolkit.calibration.registry.history import history_of, read_before
 from toolkit.calibration.registry.judgement import judge, machine_of
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.legacy import check_possible, read_legacy
@@ -148,6 +148,7 @@ def calibrate(
     # Before the write: a last approved record that fails its gates must stop this, not follow it.
     ledger = registry.ledger(session.instrument)
     history = history_of(registry, unnumbered, ledger)
+    again = read_before(registry, unnumbered, session.table, ledger)
     record_id = registry.commit(folder.name, build)
     record = records[0]
     if record_id:
@@ -155,7 +156,7 @@ def calibrate(
             unnumbered, history=history, machine=definition, loads=session.table, check=session.check
         )
         # What a gate says takes the place of the same in the session's own words: its level is the gate's.
-        by_gates = {(result.rule, result.where): result.finding() for result in judged.results}
+        by_gates = {(result.rule, result.where): result.finding() for result in (*judged.results, *again)}
         findings = tuple(by_gates.pop((entry.rule, entry.where), entry) for entry in findings)
         findings += tuple(by_gates.values())
     return Candidate(

@@ -13,10 +13,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from toolkit.calibration.fit.printed_digits import copies, own_scatter
 from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry.gates import GateResult, layout, sign_and_span
 from toolkit.calibration.registry.response import main_indications, response, same_dimension
 from toolkit.calibration.registry.status import status_of
+from toolkit.calibration.registry.stored import stored_loads
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
 
@@ -26,9 +28,11 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
+    from toolkit.calibration.session.table import Table
 
 # Another cell for the same loads may be of another capacity; ten times the output is a slip of a unit.
 REPLACED_SPAN = 10.0
+_READ_ONCE = 0.5  # of a session's rows: fewer may be old ones that were joined to new ones
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,3 +264,36 @@ def _twice(new: CalibrationRecord) -> list[GateResult]:
 
 def _serial(record: CalibrationRecord, name: str) -> str:
     return next((c.serial for c in record.cells if c.name == name), None) or "not stated"
+
+
+def read_before(
+    registry: Records, record: CalibrationRecord, table: Table, ledger: Ledger, *, but: str = ""
+) -> tuple[GateResult, ...]:
+    """Return the approved records of other days whose readings are those of a record.
+
+    ``table`` holds the record's reference loads in its own units. Loads that are applied again have noise of
+    their own: most rows of two sessions never agree. Rows are compared, not files: their order and the digits
+    in which they are written may differ. An evaluation of the same day's readings is none of another day.
+    """
+    names = [*record.indications, *(load.load for load in record.loads)]
+    equations = [(load.terms, load.coefficients, load.residual_sd or 0.0) for load in record.loads]
+    scatter = own_scatter(record.indications, equations) + [0.0] * len(record.loads)
+    told = []
+    for record_id in approved_ids(ledger, but=but):
+        older = registry.load_by(ledger, record_id)
+        had = stored_loads(registry.folder, older) if older.date != record.date else None
+        if had is None or not all(had.has(name) for name in names):
+            continue
+        if not all(same_dimension(had.unit(name), table.unit(name)) for name in names):
+            continue
+        had = had.in_units({name: table.unit(name) for name in names})
+        again = len(copies(table.matrix(names), had.matrix(names), scatter))
+        if again > _READ_ONCE * table.rows:
+            message = (
+                f"{again} of {table.rows} rows are readings of {record_id}, of {older.date}: readings have "
+                "one date. Loads that are applied again have noise of their own"
+            )
+            told.append(
+                GateResult(rule="readings-again", where=record.instrument, message=message, effect="tells")
+            )
+    return tuple(told)

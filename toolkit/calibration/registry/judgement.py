@@ -18,7 +18,15 @@ from toolkit.calibration.apply import apply_record
 from toolkit.calibration.fit.readings_findings import all_findings
 from toolkit.calibration.fit.session_fit import fit_session
 from toolkit.calibration.registry.gates import GateResult, check_loads, refusals
-from toolkit.calibration.registry.history import NO_HISTORY, History, Records, agreeing, compared, history_of
+from toolkit.calibration.registry.history import (
+    NO_HISTORY,
+    History,
+    Records,
+    agreeing,
+    compared,
+    history_of,
+    read_before,
+)
 from toolkit.calibration.registry.plausible import coarse, plausible, tare_claim
 from toolkit.calibration.registry.response import (
     largest_load,
@@ -355,12 +363,13 @@ def judge_stored(
         a record that it is compared with fails a gate
     """
     status = status_of(record.id, ledger.of(record.id), dt.date.max)
+    loads = stored_loads(registry.folder, record)
     judged = judge(
         record,
         history=history_of(registry, record, ledger, but=record.id),
         machine=machine,
         readings=readings,
-        loads=stored_loads(registry.folder, record),
+        loads=loads,
         check=stored_check(registry.folder, record),
         reason=reason,
         confirmed_before=status.in_force_from is not None,
@@ -371,7 +380,8 @@ def judge_stored(
         for result in _refused_by_session(registry, record)
         if (result.rule, result.where) not in present
     ]
-    return replace(judged, results=(*judged.results, *of_session))
+    again = () if loads is None else read_before(registry, record, loads, ledger, but=record.id)
+    return replace(judged, results=(*judged.results, *of_session, *again))
 
 
 def _refused_by_session(registry: Records, record: CalibrationRecord) -> tuple[GateResult, ...]:

@@ -8,6 +8,7 @@ read (`statement_checks`); units are those of the record's loads and indications
 from __future__ import annotations
 
 import datetime as dt
+import functools
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -201,6 +202,7 @@ class Statements:
         return next(cell for cell in self.cells if cell.name == name)
 
 
+@functools.lru_cache(maxsize=8)
 def statements_of(record: CalibrationRecord) -> Statements:
     """Return what a record's session stated; a legacy record has stated nothing."""
     return parse_statements(

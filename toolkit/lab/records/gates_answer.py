@@ -101,6 +101,7 @@ GATES: dict[str, str | None] = {
     "span": _HISTORY,
     "serial": _HISTORY,
     "replacement": _HISTORY,
+    "readings-again": _HISTORY,
     "layout-changed": _HISTORY,
     "unit-changed": _HISTORY,
     "polarity": _MACHINE,
