@@ -148,7 +148,7 @@ def calibrate(
     # Before the write: a last approved record that fails its gates must stop this, not follow it.
     ledger = registry.ledger(session.instrument)
     history = history_of(registry, unnumbered, ledger)
-    again = read_before(registry, unnumbered, session.table, ledger)
+    read_again = read_before(registry, unnumbered, session.table, ledger)
     record_id = registry.commit(folder.name, build)
     record = records[0]
     if record_id:
@@ -156,7 +156,7 @@ def calibrate(
             unnumbered, history=history, machine=definition, loads=session.table, check=session.check
         )
         # What a gate says takes the place of the same in the session's own words: its level is the gate's.
-        by_gates = {(result.rule, result.where): result.finding() for result in (*judged.results, *again)}
+        by_gates = {(result.rule, result.where): result.finding() for result in (*judged.results, *read_again)}
         findings = tuple(by_gates.pop((entry.rule, entry.where), entry) for entry in findings)
         findings += tuple(by_gates.values())
     return Candidate(
