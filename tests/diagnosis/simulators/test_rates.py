@@ -108,3 +108,15 @@ def test_friction_is_named_beside_a_position_alone(tmp_path, how):
     assert (made.verdict, one.name) == ("named", "coulomb_friction")
     low, high = one.parameters[0].ci95
     assert low < 4.0 < high
+
+
+@pytest.mark.parametrize(
+    ("speed", "load", "moves"),
+    [("m/s", "N", True), ("rad/s", "N*m", True), ("deg/s", "lbf*ft", True), ("1/min", "N*m", True),
+     ("rpm", "N*m", True), ("Hz", "N", False), ("V", "N", False)],
+)  # fmt: skip
+def test_a_rate_that_turns_is_a_velocity_as_one_along_a_line(tmp_path, speed, load, moves):
+    text = TIMED.replace('"mm"', f'"{speed}"').replace('unit = "N"', f'unit = "{load}"')
+    posed = case(tmp_path, text.replace('"N/bar"', f'"{load}/bar"'))
+    for name in BY_SPEED:
+        assert model_of(posed, None).places(effect(name)) == ([("F", None)] if moves else [])

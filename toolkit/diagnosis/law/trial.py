@@ -24,7 +24,7 @@ from toolkit.diagnosis.policy import LAWS, STRUCTURE
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.unexplained import beyond_its_past, strongest_events, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
-from toolkit.diagnosis.simulators.setting import dimension
+from toolkit.diagnosis.simulators.setting import is_speed
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.law import ITSELF, Acts, conversion, formula, law_effect, law_name
 from toolkit.units import unit
@@ -156,9 +156,6 @@ def bracketed(text: str) -> str:
     return f"({text})" if any(mark in text for mark in "*/^") and not text.startswith("(") else text
 
 
-_SPEEDS = ("speed", "frequency")
-
-
 def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
     """Return what a law on an output may depend on: inputs, their rates and ways, the output itself, time."""
     case, timed = problem.case, problem.case.has_time
@@ -186,7 +183,7 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
             values = np.concatenate([run.columns[channel.name] for run in problem.runs])
             if np.isfinite(values).all():
                 with_rate(channel.name, channel.name, values, channel.unit)
-                if timed and dimension(channel.unit) in _SPEEDS:
+                if timed and is_speed(channel.unit):
                     listed.append(_way(problem, channel.name, channel.unit, values))
     with_rate(ITSELF, output, base.simulated[output], channel_unit(case, problem.model, output))
     if timed:

@@ -21,7 +21,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import slopes
 from toolkit.diagnosis.simulators.linear_response import integrated
 from toolkit.diagnosis.simulators.rates import Track, reach_of, usual_speed
-from toolkit.diagnosis.simulators.setting import dimension
+from toolkit.diagnosis.simulators.setting import dimension, is_speed
 from toolkit.diagnosis.simulators.simulator import Moving
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from toolkit.effects.facts import ForceHook, Values
     from toolkit.effects.signals import Setting
 
-_LENGTHS, _SPEEDS = ("length", "angle"), ("speed", "rad/s", "angular_speed")
+_LENGTHS = ("length", "angle")
 _SUBSTEPS = 4
 
 
@@ -269,7 +269,7 @@ def motion_of(case: Case) -> Motion | None:
     """Return how dynamic terms could enter a case, None where its units show no motion."""
     inputs = {driver.name: dimension(driver.unit) for driver in case.drivers}
     outputs = {output.name: dimension(output.unit) for output in case.outputs}
-    velocity = next((name for name, kind in inputs.items() if _is_speed(case, name, kind)), None)
+    velocity = next((driver.name for driver in case.drivers if is_speed(driver.unit)), None)
     position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
     force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)
     if force is not None and (velocity is not None or position is not None):
@@ -278,7 +278,7 @@ def motion_of(case: Case) -> Motion | None:
     if not case.has_time:
         return None
     moved = next((name for name, kind in outputs.items() if kind in _LENGTHS), None)
-    speed = next((name for name, kind in outputs.items() if _is_speed(case, name, kind)), None)
+    speed = next((output.name for output in case.outputs if is_speed(output.unit)), None)
     if moved is not None:
         return Motion(case=case, kind="position", output=moved, position=moved, velocity=speed)
     if speed is not None:
@@ -299,10 +299,3 @@ def _track(case: Case, run: Run, position: str) -> Track:
     of = unit(case.unit(position))
     turn = 2 * math.pi / of.factor if of.dimension == "angle" else None
     return Track.of(run.t, run.columns[position], turn)
-
-
-def _is_speed(case: Case, name: str, kind: str) -> bool:
-    if kind in _SPEEDS:
-        return True
-    text = unit(case.unit(name))
-    return text.si in ("m/s", "rad/s", "1/s*rad")

@@ -23,13 +23,12 @@ from toolkit.diagnosis.simulators.ode_following import followed
 from toolkit.diagnosis.simulators.ode_responses import pushed
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
-from toolkit.diagnosis.simulators.setting import nominal_load, setting
+from toolkit.diagnosis.simulators.setting import is_speed, nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange
 from toolkit.diagnosis.simulators.states import (
     declared_dimensions,
     dimensions,
     fitting,
-    is_speed,
     shown_alone,
     state_units,
     term_places,

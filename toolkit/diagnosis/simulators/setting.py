@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 NOMINAL_SPEED = 7.66 / 3.6  # m/s, of the drum of the source document (the thesis, 2.2)
 # What tire models call the load to which their coefficients are counted, without case and underlines.
+SPEEDS = frozenset({"speed", "frequency"})
+"""Dimensions of a velocity and of a turning rate."""
 _NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMINALLOAD"})
 
 
@@ -82,6 +84,11 @@ def dimension(text: str) -> str:
         return unit(text).dimension
     except UnitError:
         return text
+
+
+def is_speed(text: str) -> bool:
+    """Tell whether a unit is that of a velocity or of a turning rate; hertz count what comes again."""
+    return dimension(text) in SPEEDS and not text.rstrip().endswith("Hz")
 
 
 def nominal_load(case: Case) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.simulators.parameter_units import reduced
-from toolkit.diagnosis.simulators.setting import dimension
+from toolkit.diagnosis.simulators.setting import SPEEDS, dimension
 from toolkit.effects.catalogue import effects
 from toolkit.units import unit, units_alike
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from toolkit.effects.effect import Effect
     from toolkit.effects.facts import Term
 
-_SPEEDS = frozenset({"speed", "frequency"})
 _FORCES = frozenset({"force", "moment"})
 _PLACES = frozenset({"length", "angle"})
 _OPEN = frozenset({"ratio"})  # a number without unit may be anything
@@ -94,11 +93,6 @@ def _multiple(text: str, factor: float) -> str:
     )
 
 
-def is_speed(text: str) -> bool:
-    """Tell whether a unit is that of a velocity or of a turning rate."""
-    return dimension(text) in _SPEEDS
-
-
 def declared_dimensions(force_units: Mapping[int, str]) -> dict[int, str]:
     """Return the dimension of every state of which the unit of a missing term is declared.
 
@@ -140,7 +134,7 @@ def fitting(
     """
     pairs = [i for i in states if i in velocities]
     if term.of == "velocity":
-        return _motions(states, pairs, meanings, _SPEEDS)
+        return _motions(states, pairs, meanings, SPEEDS)
     if term.of != "position":
         return list(states)
     if pairs:
