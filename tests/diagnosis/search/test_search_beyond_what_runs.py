@@ -97,7 +97,10 @@ def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, 
     assert "coulomb_friction" not in found
 
 
-@pytest.mark.parametrize("cannot", ["fit", "hold_out"])
+OTHER = pytest.mark.campaign("the other call that may refuse: fits of unseen rows do in every run")
+
+
+@pytest.mark.parametrize("cannot", [pytest.param("fit", marks=OTHER), "hold_out"])
 def test_an_effect_without_which_nothing_runs_is_kept(tmp_path, monkeypatch, cannot):
     # Friction and a zero: once both are there, the simulation with one of them alone can no longer be run.
     whole, there, left = getattr(search, cannot), set(), []
