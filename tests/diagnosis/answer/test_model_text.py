@@ -102,9 +102,22 @@ def written(case, folder):
 
 
 @pytest.fixture(scope="module")
-def once(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("drag")
-    return folder, written(drag_python(folder), folder / "answer")[0]
+def answered(tmp_path_factory):
+    """Return of a kind its case in a folder of its own, the answer and its model; diagnosed once, to read."""
+
+    @functools.cache
+    def of(kind):
+        folder = tmp_path_factory.mktemp(kind)
+        case = KINDS[kind][0](folder)
+        return case, *written(case, folder / "answer")
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def once(answered):
+    case, found, _ = answered("python")
+    return case.parent, found
 
 
 @pytest.fixture
@@ -120,19 +133,6 @@ KINDS = {
     "machine": (offset_machine, "steer_offset"),
     "columns": (shift_columns, "filter_lag"),
 }
-
-
-@pytest.fixture(scope="module")
-def answered(tmp_path_factory):
-    """Return of a kind its case in a folder of its own, the answer and its model; diagnosed once, to read."""
-
-    @functools.cache
-    def of(kind):
-        folder = tmp_path_factory.mktemp(kind)
-        case = KINDS[kind][0](folder)
-        return case, *written(case, folder / "answer")
-
-    return of
 
 
 @pytest.mark.parametrize("kind", KINDS)
