@@ -15,7 +15,7 @@ def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(
     The law a*FZ behind it fits better; it is the same leak, and the answer is no worse for its name.
     """
     files = columns_tire(pull=120.0, lag=0.2)
-    # The moment has no part in it, and a second output takes as long again.
+    # The moment has no part in it.
     for moment in (', MZ = "MZ_sim"', 'MZ = { unit = "N*m", role = "output" }\n'):
         assert moment in files["CASE.toml"]
         files["CASE.toml"] = files["CASE.toml"].replace(moment, "")
