@@ -24,6 +24,7 @@ import numpy as np
 import pytest
 
 from tests.comparison.comparison_factory import conicity
+from toolkit import pipeline
 from toolkit.calibration.registry.registry import Registry
 from toolkit.characteristics.characterise import characterise
 from toolkit.comparison.compare import compare
@@ -37,9 +38,11 @@ from toolkit.recording.folder import read_test_folder
 from toolkit.reduction.model import ReducedTest
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.characteristics.model import Characteristics
     from toolkit.simulation.plan import Plan
 
 MACHINE = load_machine("m15-virtual")
@@ -76,8 +79,11 @@ class Machine:
 @pytest.fixture(scope="module")
 def machine(
     tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan, record: CalibrationRecord
-) -> Machine:
-    return Machine(virtual_plan, tmp_path_factory.mktemp("repeats"), record)
+) -> Iterator[Machine]:
+    with pytest.MonkeyPatch.context() as patch:
+        # Each entry is characterised by itself, see `characterised`.
+        patch.setattr(pipeline, "characterise", lambda *_, **__: None)
+        yield Machine(virtual_plan, tmp_path_factory.mktemp("repeats"), record)
 
 
 @pytest.fixture(scope="module")
@@ -92,9 +98,19 @@ def kept(machine: Machine) -> list[ReducedTest]:
     return [machine.test(seed, *KEPT) for seed in range(2)]
 
 
+_CHARACTERISED: dict[int, tuple[ReducedTest, Characteristics]] = {}
+
+
+def characterised(reduced: ReducedTest, record: CalibrationRecord) -> Characteristics:
+    """Fit a test once, whatever is said of its day, surface and tire."""
+    if id(reduced) not in _CHARACTERISED:
+        _CHARACTERISED[id(reduced)] = reduced, characterise(reduced, machine=MACHINE, record=record)
+    return _CHARACTERISED[id(reduced)][1]
+
+
 def entry(reduced: ReducedTest, record: CalibrationRecord, **info: str) -> Entry:
+    found = characterised(reduced, record)
     named = dataclasses.replace(reduced, info=dataclasses.replace(reduced.info, **info))
-    found = characterise(named, machine=MACHINE, record=record)
     return entry_of(named, found, machine=MACHINE, record=record, source=reduced.info.name)
 
 

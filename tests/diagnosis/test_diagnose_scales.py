@@ -10,6 +10,7 @@ from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.search import search
 
 COOLING = """
 def initial(p, run):
@@ -53,7 +54,15 @@ file = "r0.csv"
     return diagnose(read_case(path), None).diagnosis
 
 
-def test_the_same_temperatures_in_kelvin_and_in_celsius_have_the_same_answer(tmp_path):
+WHOLE = pytest.mark.campaign(
+    "with the search of names: that two masses have none is held of a mug in every run"
+)
+
+
+@pytest.mark.parametrize("names", [False, pytest.param(True, marks=WHOLE)])
+def test_the_same_temperatures_in_kelvin_and_in_celsius_have_the_same_answer(tmp_path, monkeypatch, names):
+    if not names:
+        monkeypatch.setattr(search, "candidates", lambda _: ())
     in_celsius, in_kelvin = cup(0.0, "degC", tmp_path / "c"), cup(273.15, "K", tmp_path / "k")
     assert in_celsius.verdict == in_kelvin.verdict == "unknown"
     assert [law.formula for law in in_celsius.laws] == [law.formula for law in in_kelvin.laws]

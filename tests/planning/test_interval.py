@@ -102,11 +102,15 @@ def test_too_short_a_history_is_refused() -> None:
     assert refused.value.rule == "plan-history"
 
 
-def test_histories_in_drawn_worlds_keep_the_reliability_on_the_whole() -> None:
+MORE = pytest.mark.campaign("150 histories in place of 50")
+
+
+@pytest.mark.parametrize(("worlds", "least"), [(50, 0.76), pytest.param(150, 0.88, marks=MORE)])
+def test_histories_in_drawn_worlds_keep_the_reliability_on_the_whole(worlds: int, least: float) -> None:
     """The grid's own prior, drawn and read eight times: at the end of its interval an error is inside."""
     rng = np.random.default_rng(5)
     inside = []
-    for _ in range(150):
+    for _ in range(worlds):
         walk, noise, trend = rng.uniform(0, 0.4), rng.uniform(0.02, 0.2), rng.normal(0, 0.4)
         t = np.arange(8.0)
         level = trend * t + np.append(0, np.cumsum(rng.normal(0, walk, 7)))
@@ -115,5 +119,6 @@ def test_histories_in_drawn_worlds_keep_the_reliability_on_the_whole() -> None:
             years = plan.days / YEAR
             error = trend * years + rng.normal(0, math.hypot(walk * math.sqrt(years), noise))
             inside.append(abs(error) <= 1)
-    assert len(inside) > 80
-    assert np.mean(inside) >= 0.88
+    assert len(inside) > 8 / 15 * worlds
+    # Of some thirty a share of 0.9 is sure to three times 0.05.
+    assert np.mean(inside) >= least

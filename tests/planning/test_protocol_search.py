@@ -67,19 +67,20 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
 
 
 def test_more_slip_angles_are_never_worse() -> None:
-    search = ProtocolSearch(question("conicity"), tread(), LOADS)
+    asked = question("conicity", loads=LOADS[2:3], measured=NEAR)
+    search = ProtocolSearch(asked, tread(measured=NEAR), LOADS[2:3])
     worst = [search.best(size).worst for size in (7, 9, 11, 13)]
     assert worst == sorted(worst, reverse=True)
 
 
 def test_a_demand_of_one_direction_needs_no_reversed_run() -> None:
-    found = least_plan(question("slope_cornering=3 %", loads=LOADS[2:3]), tread())
+    found = least_plan(question("slope_cornering=3 %", loads=LOADS[2:3], measured=NEAR), tread(measured=NEAR))
     assert found.design.rotations == ("forward",)
 
 
 def test_every_plan_measures_a_curve_to_its_peak_on_both_sides() -> None:
-    asked = question("conicity")
-    degrees = np.degrees(least_plan(asked, tread()).design.slip_angles_rad)
+    asked = question("conicity", loads=LOADS[2:3], measured=NEAR)
+    degrees = np.degrees(least_plan(asked, tread(measured=NEAR)).design.slip_angles_rad)
     assert degrees.min() <= -8
     assert degrees.max() >= 8
     narrow = tuple(i for i, angle in enumerate(asked.candidates_rad) if abs(angle) < math.radians(3.5))
@@ -88,7 +89,8 @@ def test_every_plan_measures_a_curve_to_its_peak_on_both_sides() -> None:
 
 
 def test_no_test_makes_smaller_what_all_rows_share() -> None:
-    floor = least_plan(question("plysteer=1 N", loads=LOADS[2:3]), tread(), minutes=60)
+    asked = question("plysteer=1 N", loads=LOADS[2:3], measured=NEAR)
+    floor = least_plan(asked, tread(measured=NEAR), minutes=60)
     (reach,) = floor.reaches
     assert floor.worst > 1
     # 0.05 deg of the steering's zero by the cornering stiffness, k = 1.96.
@@ -171,8 +173,8 @@ def test_no_slip_angle_is_planned_twice() -> None:
 
 
 def test_no_plan_leaves_a_curve_open_between_its_slip_angles() -> None:
-    asked = question("plysteer", loads=LOADS[2:3])
-    search = ProtocolSearch(asked, tread(), LOADS[2:3])
+    asked = question("plysteer", loads=LOADS[2:3], measured=NEAR)
+    search = ProtocolSearch(asked, tread(measured=NEAR), LOADS[2:3])
 
     def judged(*degrees: float) -> Judged:
         return search.judged(search.design(tuple(search.candidates.index(a) for a in map(nearest, degrees))))
@@ -186,7 +188,7 @@ def test_no_plan_leaves_a_curve_open_between_its_slip_angles() -> None:
     assert lopsided.worst < 1.1
     assert lopsided.openness > 10
     assert not lopsided.feasible
-    planned = least_plan(asked, tread())
+    planned = least_plan(asked, tread(measured=NEAR))
     assert planned.feasible
     assert planned.openness <= 1
     assert judged(-10, -7, -3, 0, 3, 7, 10).openness < 2

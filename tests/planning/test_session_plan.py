@@ -46,6 +46,12 @@ def fixtures(tmp_path_factory: pytest.TempPathFactory, knowledge: Knowledge) -> 
     return made(tmp_path_factory.mktemp("fixtures"), knowledge, FIXTURES)
 
 
+@pytest.fixture
+def few_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sessions of three or four runs: those of more, up to ten, are searched in the same way."""
+    monkeypatch.setattr(session_search, "MOST_RUNS", 4)
+
+
 @pytest.fixture(scope="module")
 def fewest(knowledge: Knowledge, feasible: FeasibleLoads) -> SessionPlan:
     return plan_session(knowledge, feasible, Demand(simulated=8))
@@ -83,6 +89,7 @@ def test_the_same_seed_gives_the_same_plan(
     assert again.outlook == fewest.outlook
 
 
+@pytest.mark.usefixtures("few_runs")
 def test_less_uncertainty_takes_more_loads(
     knowledge: Knowledge, feasible: FeasibleLoads, fewest: SessionPlan
 ) -> None:
@@ -103,6 +110,7 @@ def test_an_uncertainty_below_the_floor_names_the_nearest_plan(
     assert "reference" in str(refused.value.next_step)
 
 
+@pytest.mark.usefixtures("few_runs")
 def test_time_is_kept_with_mounts_runs_and_check_loads(knowledge: Knowledge, fixtures: FeasibleLoads) -> None:
     plan = plan_session(knowledge, fixtures, Demand(minutes=330, simulated=8))
     assert plan.minutes is not None
@@ -131,6 +139,7 @@ def test_minutes_need_fixtures_that_state_them(knowledge: Knowledge, feasible: F
     assert refused.value.rule == "plan-fixtures"
 
 
+@pytest.mark.usefixtures("few_runs")
 def test_contradictory_demands_name_both_ways_out(knowledge: Knowledge, feasible: FeasibleLoads) -> None:
     with pytest.raises(ConfigError) as refused:
         plan_session(knowledge, feasible, Demand(U=(("FY", 0.262),), loads=30, simulated=8))
@@ -138,6 +147,7 @@ def test_contradictory_demands_name_both_ways_out(knowledge: Knowledge, feasible
     assert "for this U; or 30 loads" in str(refused.value.expected)
 
 
+@pytest.mark.usefixtures("few_runs")
 def test_more_loads_than_serve_are_no_plan_of_their_own(
     knowledge: Knowledge, feasible: FeasibleLoads, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from toolkit.characteristics.sweep_fit import fit_sweep
 from toolkit.characteristics.sweep_length import relaxation_length
 from toolkit.errors import ConfigError
 from toolkit.machine import Delay, Machine, Sweeping, load_machine
+from toolkit.planning import sweep_search
 from toolkit.planning.demands import parse_demand
 from toolkit.planning.sweep_plan import planned_sweeps, refuse_beyond
 from toolkit.planning.sweep_search import AMPLITUDES_RAD, PRIOR_M, SweepChoice, energy_J, least_sweeps
@@ -37,12 +40,34 @@ def least(text: str, own: Machine = VIRTUAL, **options: Any) -> SweepChoice:
     )  # fmt: skip
 
 
+@pytest.fixture(scope="module", autouse=True)
+def predicted_once() -> Iterator[None]:
+    """What a steering says of a tire hangs on no demand: it is predicted once for all tests."""
+    predicted: Any = sweep_search._predicted
+    made: dict[tuple[Any, ...], tuple[Any, Any]] = {}
+
+    def once(case: Any, steering: Any, sweeping: Any) -> Any:
+        key = (id(case.earlier), case.load_N, case.length_m, steering, sweeping)
+        if key not in made:
+            made[key] = case.earlier, predicted(case, steering, sweeping)  # kept, so that no other has its id
+        return made[key][1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sweep_search, "_predicted", once)
+        yield
+
+
+@functools.cache
+def least_of_40_mm() -> SweepChoice:
+    return least("relaxation_length=40 mm")
+
+
 def test_what_is_swept_is_what_is_fitted() -> None:
     assert max(AMPLITUDES_RAD) < SMALL_RAD
 
 
 def test_two_speeds_within_the_limits_of_the_machine_where_nobody_states_a_delay() -> None:
-    choice = least("relaxation_length=40 mm")
+    choice = least_of_40_mm()
     assert choice.feasible
     assert len(choice.design.speeds_m_s) == 2
     stated = VIRTUAL.sweeping
@@ -57,7 +82,7 @@ def test_a_stated_delay_takes_one_speed_and_its_uncertainty_is_in_the_budget() -
     sure = machine(delay=Delay(value_s=0.0, u_s=0.001, source="test"))
     choice = least("relaxation_length=40 mm", sure)
     assert len(choice.design.speeds_m_s) == 1
-    assert choice.seconds < least("relaxation_length=40 mm").seconds
+    assert choice.seconds < least_of_40_mm().seconds
     (speed,) = choice.design.speeds_m_s
     assert dict(choice.reaches[0].sources)["delay"] == pytest.approx(speed * 0.001)
     # One that is hardly known is no help: two speeds again.
@@ -82,7 +107,7 @@ def test_a_smaller_demand_takes_longer_and_one_that_is_too_small_is_told_with_th
 
 
 def test_both_ends_of_the_prior_are_served_and_a_measured_length_takes_its_place() -> None:
-    values = sorted(reach.value for reach in least("relaxation_length=40 mm").reaches)
+    values = sorted(reach.value for reach in least_of_40_mm().reaches)
     assert values == pytest.approx(sorted(PRIOR_M))
     known = dataclasses.replace(earlier(), lengths_m={LOAD: 0.43})
     (reach,) = least("relaxation_length=40 mm", tires=(known,)).reaches
@@ -90,22 +115,24 @@ def test_both_ends_of_the_prior_are_served_and_a_measured_length_takes_its_place
 
 
 def test_what_is_promised_is_what_sweeps_on_the_same_tire_say() -> None:
-    choice = least("relaxation_length=40 mm")
+    choice = least_of_40_mm()
     design, rng = choice.design, np.random.default_rng(3)
     density = earlier().rows_density(LOAD, "forward")
     reached = []
+    recorded = []
+    for place, V in enumerate(design.speeds_m_s):
+        t = np.arange(0.0, design.load_s(place), 0.02)
+        rate = design.steering.rate_rad_m * V
+
+        def steered(at: np.ndarray, rate: float = rate) -> np.ndarray:
+            return triangle(at, amplitude=design.steering.amplitude_rad, rate=rate)
+
+        recorded.append((V, t, steered(t), relaxing(t, steered, length=PRIOR_M[1], V=V, form="constant")))
     for _ in range(8):
         fits = []
-        for place, V in enumerate(design.speeds_m_s):
-            t = np.arange(0.0, design.load_s(place), 0.02)
-            rate = design.steering.rate_rad_m * V
-
-            def steered(at: np.ndarray, rate: float = rate) -> np.ndarray:
-                return triangle(at, amplitude=design.steering.amplitude_rad, rate=rate)
-
-            FY = relaxing(t, steered, length=PRIOR_M[1], V=V, form="constant")
-            FY = FY + math.sqrt(density / 0.02) * rng.standard_normal(len(t))
-            fits.append(fit_sweep(sweep(t, steered(t), FY, V=V, load=LOAD, name=str(V)), VIRTUAL.sweeping))
+        for V, t, SA, force in recorded:
+            FY = force + math.sqrt(density / 0.02) * rng.standard_normal(len(t))
+            fits.append(fit_sweep(sweep(t, SA, FY, V=V, load=LOAD, name=str(V)), VIRTUAL.sweeping))
         number = relaxation_length([fit for fit in fits if fit], load_N=LOAD, owner="m", test="t")
         assert number is not None
         reached.append(dict(number.by_source())["noise in time"])
@@ -130,7 +157,7 @@ def test_what_cannot_be_planned_is_refused(text: str, own: Machine, rule: str) -
 
 
 def test_the_cost_of_sweeps_by_hand() -> None:
-    choice = least("relaxation_length=40 mm")
+    choice = least_of_40_mm()
     design, tread = choice.design, Tread.of(VIRTUAL, (earlier(),))
     shown = planned_sweeps(choice, (earlier(),), tread)
     assert 60 * shown.minutes == pytest.approx(choice.seconds)

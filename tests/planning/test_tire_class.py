@@ -69,16 +69,17 @@ PROTOCOLS = pytest.mark.campaign("demands as large as the protocol's: stated one
 )
 def test_a_plan_for_a_class_serves_the_tires_between(names: tuple[str, ...]) -> None:
     spread = {"stiffness": (0.6, 1.4), "friction": (0.9, 1.1)}
-    demands, loads = tuple(map(parse_demand, names)), LOADS[2:3]
-    tires = members(earlier(), spread)
-    asked = Question.beside(PROTOCOL, tires=tires, demands=demands, loads_N=loads)
+    demands, loads, measured = tuple(map(parse_demand, names)), LOADS[2:3], LOADS[1:4]
+    protocol = dataclasses.replace(PROTOCOL, loads_N=measured)
+    tires = members(earlier(measured), spread)
+    asked = Question.beside(protocol, tires=tires, demands=demands, loads_N=loads)
     planned = least_plan(asked, Tread(tires=tires, pace=pace_of(M15), speed_m_s=2.0))
     assert planned.feasible
     rng = np.random.default_rng(25)
     for _ in range(6):
         stiffness, friction = (float(rng.uniform(*spread[name])) for name in ("stiffness", "friction"))
-        tire = earlier().similar(stiffness=stiffness, friction=friction, tire="between")
-        own = Question.beside(PROTOCOL, tires=(tire,), demands=demands, loads_N=loads)
+        tire = earlier(measured).similar(stiffness=stiffness, friction=friction, tire="between")
+        own = Question.beside(protocol, tires=(tire,), demands=demands, loads_N=loads)
         ratios = [reach.ratio for reach in own.reaches(planned.design)]
         assert max(ratios) < 1.01, (stiffness, friction, ratios)
 

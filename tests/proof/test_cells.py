@@ -82,6 +82,7 @@ def test_the_public_command_finds_the_cells_of_the_session(tmp_path: Path) -> No
         assert found == pytest.approx(list(row), abs=3e-4)
 
 
+@pytest.mark.usefixtures("entered_here")
 def test_a_case_with_cells_names_its_record_and_has_no_loads(tmp_path: Path) -> None:
     drawn = draw_case(9, 0, "null", picked=("tire-cells", ()))
     files.write_case(drawn.scenario, drawn.measured, tmp_path / "case")

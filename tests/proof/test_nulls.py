@@ -48,11 +48,15 @@ def explained(square: float, n: int) -> bool:
 
 
 AGAIN = pytest.mark.campaign("further draws of a family, of which one is held in every run")
+LONG = pytest.mark.campaign("families of stiff or long runs: the others stand for them in every run")
 
 
 @pytest.mark.parametrize(
     ("family", "seed"),
-    [pytest.param(family, seed, marks=[AGAIN] * (seed > 0)) for family, seed in DRAWS],
+    [
+        pytest.param(family, seed, marks=[AGAIN] * (seed > 0) + [LONG] * (family in ("pendulum", "drive")))
+        for family, seed in DRAWS
+    ],
 )
 def test_a_null_leaves_the_noise_and_nothing_slow(family: str, seed: int) -> None:
     drawn = null(family, seed)

@@ -25,6 +25,8 @@ from toolkit.simulation.run import simulate
 from toolkit.simulation.write import write_test
 from toolkit.units import from_si
 
+pytestmark = pytest.mark.usefixtures("reduced_alone")
+
 FIG = Path(__file__).resolve().parents[2] / "toolkit" / "examples" / "fig4_4" / "M15_fig4_4.xlsx"
 
 
@@ -40,6 +42,19 @@ def folder_with(tmp_path: Path, *names: str, toml: str = "") -> Path:
 def reduce_folder(folder: Path, record: CalibrationRecord) -> ReducedTest:
     test = read_test_folder(folder)
     return process(test, read_test(test), record).reduced
+
+
+@pytest.fixture(scope="module")
+def few_files(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan) -> Path:
+    """A virtual test of three slip angles; read it, never write into it."""
+    folder = tmp_path_factory.mktemp("few") / "test"
+    write_test(simulate(dataclasses.replace(virtual_plan, slip_angles_rad=(0.0, 0.0175, -0.0175))), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def few_reduced(few_files: Path, virtual_record: CalibrationRecord) -> ReducedTest:
+    return reduce_folder(few_files, virtual_record)
 
 
 def rules(reduced: ReducedTest) -> set[str]:
@@ -128,16 +143,17 @@ def test_a_record_in_other_units_is_refused(tmp_path: Path, published_record: Ca
 
 
 def test_names_and_order_of_files_do_not_matter(
-    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+    tmp_path: Path, few_files: Path, few_reduced: ReducedTest, virtual_record: CalibrationRecord
 ) -> None:
-    first = reduce_folder(virtual_test, virtual_record)
+    first = few_reduced
     other = tmp_path / "renamed"
     other.mkdir()
-    files = sorted(virtual_test.glob("*.xlsx"))
-    names = {path.name: f"{(i * 7) % len(files):02d} any name" for i, path in enumerate(files)}
+    shutil.copy(few_files / "protocol.toml", other / "protocol.toml")
+    files = sorted(few_files.glob("*.xlsx"))
+    names = {path.name: f"{(i * 5) % len(files):02d} any name" for i, path in enumerate(files)}
     for path in files:
         shutil.copy(path, other / names[path.name])
-    text = (virtual_test / "test.toml").read_text()
+    text = (few_files / "test.toml").read_text()
     for old, new in names.items():
         text = text.replace(f'"{old}"', f'"{new}"')
     (other / "test.toml").write_text(text)
@@ -235,10 +251,10 @@ def untared(virtual_test: Path, target: Path) -> tuple[Path, dict[str, float]]:
 
 
 def test_tare_blocks_in_every_file_do_what_the_declared_tare_does(
-    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+    tmp_path: Path, few_files: Path, few_reduced: ReducedTest, virtual_record: CalibrationRecord
 ) -> None:
-    declared = reduce_folder(virtual_test, virtual_record)
-    folder, tare = untared(virtual_test, tmp_path / "t")
+    declared = few_reduced
+    folder, tare = untared(few_files, tmp_path / "t")
     for path in sorted(folder.glob("*.xlsx")):
         with_tare_rows(path, path, "m15-virtual", tare)
     found = reduce_folder(folder, virtual_record)
@@ -249,10 +265,10 @@ def test_tare_blocks_in_every_file_do_what_the_declared_tare_does(
 
 
 def test_a_tare_block_in_one_file_serves_all(
-    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+    tmp_path: Path, few_files: Path, few_reduced: ReducedTest, virtual_record: CalibrationRecord
 ) -> None:
-    declared = reduce_folder(virtual_test, virtual_record)
-    folder, tare = untared(virtual_test, tmp_path / "t")
+    declared = few_reduced
+    folder, tare = untared(few_files, tmp_path / "t")
     first = min(folder.glob("*.xlsx"))
     with_tare_rows(first, first, "m15-virtual", tare)
     found = reduce_folder(folder, virtual_record)
@@ -263,10 +279,10 @@ def test_a_tare_block_in_one_file_serves_all(
 
 
 def test_without_a_tare_the_zero_of_the_cells_is_in_the_uncertainty(
-    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+    tmp_path: Path, few_files: Path, few_reduced: ReducedTest, virtual_record: CalibrationRecord
 ) -> None:
-    declared = reduce_folder(virtual_test, virtual_record)
-    folder, _ = untared(virtual_test, tmp_path / "t")
+    declared = few_reduced
+    folder, _ = untared(few_files, tmp_path / "t")
     bare = reduce_folder(folder, virtual_record)
     assert "no-tare" in rules(bare)
     # The virtual machine states the values of its tare with their u.
@@ -337,12 +353,12 @@ def test_cells_beyond_the_calibrated_range_are_told(
 
 
 def test_blocks_of_another_condition_feed_nothing(
-    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+    tmp_path: Path, few_files: Path, few_reduced: ReducedTest, virtual_record: CalibrationRecord
 ) -> None:
     # Every recording again, leaning, with other forces: first by name, so that the protocol would take them.
-    plain = reduce_folder(virtual_test, virtual_record)
+    plain = few_reduced
     folder = tmp_path / "mixed"
-    shutil.copytree(virtual_test, folder)
+    shutil.copytree(few_files, folder)
     machine = load_machine("m15-virtual")
     files = {path: {s.symbol: s.values.copy() for s in read_recording(path, machine).series
                     if s.role != "covariate"}

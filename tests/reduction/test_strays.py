@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.findings import Finding
 from toolkit.pipeline import process, read_test
-from toolkit.recording.folder import read_test_folder
+from toolkit.recording.folder import TestFolder, read_test_folder
 from toolkit.recording.model import Recording
 
+pytestmark = pytest.mark.usefixtures("reduced_alone")
+
 Values = NDArray[np.float64]
+Recorded = tuple[TestFolder, tuple[Recording, ...]]
 RULES = ("stray-file", "stray-row", "repeated-readings")
 
 
@@ -34,18 +37,24 @@ def cells(recording: Recording, factor: float = 1.0) -> dict[str, Values]:
     return {c.symbol: factor * c.values for c in recording.series if c.role == "indication"}
 
 
+@pytest.fixture(scope="module")
+def recorded(virtual_test: Path) -> Recorded:
+    """The files of the virtual test, read once; what is changed is a copy."""
+    test = read_test_folder(virtual_test)
+    return test, tuple(read_test(test))
+
+
 def findings(
-    folder: Path, record: CalibrationRecord, change: Callable[[list[Recording]], None]
+    recorded: Recorded, record: CalibrationRecord, change: Callable[[list[Recording]], None]
 ) -> list[Finding]:
-    test = read_test_folder(folder)
-    recordings = list(read_test(test))
+    test, recordings = recorded[0], list(recorded[1])
     change(recordings)
     reduced = process(test, tuple(recordings), record).reduced
     return [finding for finding in reduced.findings if finding.rule in RULES]
 
 
-def test_a_sound_test_has_no_stray(virtual_test: Path, virtual_record: CalibrationRecord) -> None:
-    assert findings(virtual_test, virtual_record, lambda _: None) == []
+def test_a_sound_test_has_no_stray(recorded: Recorded, virtual_record: CalibrationRecord) -> None:
+    assert findings(recorded, virtual_record, lambda _: None) == []
 
 
 OTHER = pytest.mark.campaign("further files: the first, one between and the last hold in every run")
@@ -56,7 +65,7 @@ OTHER = pytest.mark.campaign("further files: the first, one between and the last
     [index if index in (0, 12, 24) else pytest.param(index, marks=OTHER) for index in range(0, 26, 3)],
 )
 def test_a_file_with_its_cells_turned_is_named(
-    virtual_test: Path, virtual_record: CalibrationRecord, index: int
+    recorded: Recorded, virtual_record: CalibrationRecord, index: int
 ) -> None:
     names: list[str] = []
 
@@ -64,7 +73,7 @@ def test_a_file_with_its_cells_turned_is_named(
         names.append(recordings[index].name)
         recordings[index] = with_values(recordings[index], cells(recordings[index], -1.0))
 
-    found = findings(virtual_test, virtual_record, turn)
+    found = findings(recorded, virtual_record, turn)
     assert {(one.rule, one.level, one.where) for one in found} == {("stray-file", "error", names[0])}
 
 
@@ -72,7 +81,7 @@ def test_a_file_with_its_cells_turned_is_named(
     ("one", "other"), [(3, 4), (0, 7), (10, 22)]
 )  # neighbours, two others, one angle's two directions
 def test_the_cells_of_two_files_exchanged(
-    virtual_test: Path, virtual_record: CalibrationRecord, one: int, other: int
+    recorded: Recorded, virtual_record: CalibrationRecord, one: int, other: int
 ) -> None:
     names: set[str] = set()
 
@@ -82,12 +91,12 @@ def test_the_cells_of_two_files_exchanged(
         recordings[one] = with_values(first, cells(second))
         recordings[other] = with_values(second, cells(first))
 
-    found = findings(virtual_test, virtual_record, exchange)
+    found = findings(recorded, virtual_record, exchange)
     assert {finding.where for finding in found if finding.rule == "stray-file"} == names
 
 
 def test_readings_that_were_pasted_from_another_file(
-    virtual_test: Path, virtual_record: CalibrationRecord
+    recorded: Recorded, virtual_record: CalibrationRecord
 ) -> None:
     names: list[str] = []
 
@@ -96,18 +105,18 @@ def test_readings_that_were_pasted_from_another_file(
         names.extend((source.name, target.name))
         recordings[8] = with_values(target, cells(source) | {"FZ": source["FZ"].values})
 
-    found = findings(virtual_test, virtual_record, paste)
+    found = findings(recorded, virtual_record, paste)
     repeated = [one for one in found if one.rule == "repeated-readings"]
     assert [(one.where, one.level) for one in repeated] == [(names[1], "error")]
     assert names[0] in repeated[0].message
 
 
-def test_one_row_far_off_its_block(virtual_test: Path, virtual_record: CalibrationRecord) -> None:
+def test_one_row_far_off_its_block(recorded: Recorded, virtual_record: CalibrationRecord) -> None:
     def glitch(recordings: list[Recording]) -> None:
         values = recordings[0]["D51"].values.copy()
         values[10] += 1000 * float(np.std(values[:20]))
         recordings[0] = with_values(recordings[0], {"D51": values})
 
-    rows = [one for one in findings(virtual_test, virtual_record, glitch) if one.rule == "stray-row"]
+    rows = [one for one in findings(recorded, virtual_record, glitch) if one.rule == "stray-row"]
     assert len(rows) == 1
     assert "row 11" in rows[0].message

@@ -1,8 +1,8 @@
 """There and back: an effect that the virtual machine is given is the one that the engine names.
 
 Five recordings of two steering rates, two speeds, both directions and a turned tire; inputs are exact, so
-that the noise of FY and MZ is the cells'. One effect stands for all in the ordinary run; the others are a
-campaign, and `make proof` takes every one of them.
+that the noise of FY and MZ is the cells'. In the ordinary run a riddle stands for all (`test_case_riddles`),
+beside the test that nothing is put in; effects are a campaign, and `make proof` takes every one of them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ ALL = (
     "creep.FY=fraction:0.02,time_constant:5s", "hysteresis.FY=50N", "nonlinearity.FY=cubic:3e-9",
     "sensitivity_error.MZ=2%",
 )  # fmt: skip
-USUAL = ("crosstalk.FZ.FY=0.01",)
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +56,8 @@ def answer(folder, plan):
     return diagnose(read_case(write_case(simulate(plan), folder)[0]), None).diagnosis
 
 
-APART = pytest.mark.campaign("a whole diagnosis for each of the effects of the virtual machine")
-
-
-@pytest.mark.parametrize("text", [text if text in USUAL else pytest.param(text, marks=APART) for text in ALL])
+@pytest.mark.campaign("a whole diagnosis for each of the effects: the riddles name one of the same machine")
+@pytest.mark.parametrize("text", ALL)
 def test_what_was_put_in_is_named(plan, tmp_path, text):
     given = with_effects(plan, [text])
     if text.startswith("load_lag"):  # judged on the forces, from the command alone

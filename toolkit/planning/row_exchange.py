@@ -51,27 +51,31 @@ class Response:
         """Number of coefficients that are sought."""
         return int(self.targets.shape[1])
 
-    def row(self, candidate: NDArray[np.intp] | int, run: int, runs: int) -> NDArray[np.float64]:
-        """Return the rows of candidates in a run: (candidates, columns + runs * effects)."""
-        common, of_run = self.common[candidate], self.of_run[candidate]
-        effects = of_run.shape[-1]
-        rows = np.zeros((*common.shape[:-1], common.shape[-1] + runs * effects))
-        rows[..., : common.shape[-1]] = common
-        start = common.shape[-1] + run * effects
-        rows[..., start : start + effects] = of_run
+    def rows(self, runs: int) -> NDArray[np.float64]:
+        """Return the rows of every candidate in every run: (runs, candidates, columns + runs * effects)."""
+        (candidates, columns), effects = self.common.shape, self.of_run.shape[1]
+        rows = np.zeros((runs, candidates, columns + runs * effects))
+        rows[:, :, :columns] = self.common
+        for run in range(runs):
+            start = columns + run * effects
+            rows[run, :, start : start + effects] = self.of_run
         return rows
+
+    def before(self, runs: int) -> NDArray[np.float64]:
+        """Return the information that is there before any row."""
+        return np.diag(np.concatenate([self.precision, np.tile(self.run_precision, runs)]))
 
     def information(self, points: NDArray[np.intp], run: NDArray[np.intp], runs: int) -> NDArray[np.float64]:
         """Return the information of rows, with what is known beforehand."""
-        order = np.argsort(run, kind="stable")
-        points, run = points[order], run[order]
-        columns, effects = self.common.shape[1], self.of_run.shape[1]
-        rows = np.zeros((len(points), columns + runs * effects))
-        rows[:, :columns] = self.common[points]
-        own = columns + run[:, None] * effects + np.arange(effects)
-        rows[np.arange(len(points))[:, None], own] = self.of_run[points]
-        precision = np.concatenate([self.precision, np.tile(self.run_precision, runs)])
-        return np.asarray(rows.T @ rows + np.diag(precision))
+        return _information(self.rows(runs), self.before(runs), points, run)
+
+
+def _information(
+    rows: NDArray[np.float64], before: NDArray[np.float64], points: NDArray[np.intp], run: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    order = np.argsort(run, kind="stable")
+    chosen = rows[run[order], points[order]]
+    return np.asarray(chosen.T @ chosen + before)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,7 +157,12 @@ def exchange(
     With a ``price`` the criterion pays for what the rows take; ``once``: no run has a candidate twice.
     ``spans`` are kept before anything else counts, as far as the rows allow.
     """
-    rows = _Rows(responses=responses, run=run, by=by, price=price, once=once, spans=spans)
+    runs = int(run.max()) + 1
+    rows = _Rows(
+        responses=responses, run=run, by=by, price=price, once=once, spans=spans,
+        of_candidates=[response.rows(runs) for response in responses],
+        before=[response.before(runs) for response in responses],
+    )  # fmt: skip
     return best_of(
         (rows.drawn(rng) for _ in range(starts)),
         lambda start: exchanged(start, rows.alternatives, lambda: rng.permutation(len(run)).tolist()),
@@ -163,14 +172,20 @@ def exchange(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Rows:
-    """The rows of a session as parts of a design: each may be any candidate, in its own run."""
+    """The rows of a session as parts of a design: each may be any candidate, in its own run.
+
+    ``of_candidates`` and ``before`` are `Response.rows` and `Response.before` of each response: thousands of
+    exchanges ask for them.
+    """
 
     responses: Sequence[Response]
     run: NDArray[np.intp]
     by: Criterion
     price: Price | None
     once: bool
-    spans: Sequence[Span] = ()
+    spans: Sequence[Span]
+    of_candidates: Sequence[NDArray[np.float64]]
+    before: Sequence[NDArray[np.float64]]
 
     def drawn(self, rng: np.random.Generator) -> NDArray[np.intp]:
         """Return a design (rows,) drawn at random."""
@@ -192,9 +207,10 @@ class _Rows:
         if self.price is not None:
             losses = losses + self.price.added(beside)
         for span in self.spans:
-            runs = np.unique(run_of_rest[span.among[remaining]])
-            adds = span.among & (self.run[at] not in runs)
-            losses = losses + _LACKING * np.maximum(span.runs - len(runs) - adds, 0)
+            runs = set(run_of_rest[span.among[remaining]].tolist())
+            if (lacking := span.runs - len(runs)) > 0:
+                adds = span.among & (int(self.run[at]) not in runs)
+                losses = losses + _LACKING * np.maximum(lacking - adds, 0)
         if self.once:
             losses[beside] = np.inf
 
@@ -209,11 +225,9 @@ class _Rows:
         self, remaining: NDArray[np.intp], run_of_rest: NDArray[np.intp], run: int
     ) -> NDArray[np.float64]:
         """Return the criterion (candidates,) of what remains with each candidate added to a run."""
-        runs = int(self.run.max()) + 1
         values = []
-        for response in self.responses:
-            information = response.information(remaining, run_of_rest, runs)
+        for response, rows, before in zip(self.responses, self.of_candidates, self.before, strict=True):
+            information = _information(rows, before, remaining, run_of_rest)
             covariance = np.asarray(np.linalg.inv(information + _RIDGE * np.eye(len(information))))
-            rows = response.row(np.arange(len(response.common)), run, runs)
-            values.append(with_each_row(covariance, rows, response.targets, self.by))
+            values.append(with_each_row(covariance, rows[run], response.targets, self.by))
         return together(values, self.by)

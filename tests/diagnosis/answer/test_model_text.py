@@ -1,6 +1,7 @@
 """What was found goes back into use: the model file of every kind of simulation, read, run, and refused."""
 
 import dataclasses
+import functools
 import io
 import math
 import shutil
@@ -101,9 +102,22 @@ def written(case, folder):
 
 
 @pytest.fixture(scope="module")
-def once(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("drag")
-    return folder, written(drag_python(folder), folder / "answer")[0]
+def answered(tmp_path_factory):
+    """Return of a kind its case in a folder of its own, the answer and its model; diagnosed once, to read."""
+
+    @functools.cache
+    def of(kind):
+        folder = tmp_path_factory.mktemp(kind)
+        case = KINDS[kind][0](folder)
+        return case, *written(case, folder / "answer")
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def once(answered):
+    case, found, _ = answered("python")
+    return case.parent, found
 
 
 @pytest.fixture
@@ -122,10 +136,9 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(tmp_path, kind):
-    write, name = KINDS[kind]
-    case = write(tmp_path / "case")
-    found, path = written(case, tmp_path / "answer")
+def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(answered, kind):
+    name = KINDS[kind][1]
+    case, found, path = answered(kind)
     (effect,) = found.effects
     assert name in (effect.name, *effect.equivalent_to)
     again = diagnose(read_case(case, model=path), None).diagnosis
@@ -139,9 +152,8 @@ def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(tmp_p
     assert [one.level for one in again.findings if one.rule == "case-model"] == ["note"]
 
 
-def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
-    case = drag_ode(tmp_path / "case")
-    _, path = written(case, tmp_path / "answer")
+def test_small_forces_act_beside_what_a_model_has_in_it(answered):
+    case, _, path = answered("ode")
     read = read_case(case, model=path)
     model = model_of(read, None)
     run, p = read.runs[0], {one.name: one.value for one in model.parameters}
@@ -155,9 +167,8 @@ def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
     np.testing.assert_allclose(linear, moved, atol=0.01 * moved[-1])
 
 
-def test_an_equation_is_led_along_its_recording_with_the_effects_that_it_has(tmp_path):
-    case = drag_ode(tmp_path / "case")
-    _, path = written(case, tmp_path / "answer")
+def test_an_equation_is_led_along_its_recording_with_the_effects_that_it_has(answered):
+    case, _, path = answered("ode")
     whole, bare = read_case(case, model=path), read_case(case)
     (effect,) = whole.effects
 
@@ -233,9 +244,9 @@ def test_a_case_names_a_model_in_place_of_its_simulation(tmp_path, drag):
     assert read.sha256 != read_case(case).sha256
 
 
-def test_a_model_stands_in_the_place_of_a_tire_file(tmp_path, once):
-    case = offset_machine(tmp_path)
-    written(case, tmp_path / "answer")
+def test_a_model_stands_in_the_place_of_a_tire_file(tmp_path, once, answered):
+    shutil.copytree(answered("machine")[0].parent, tmp_path, dirs_exist_ok=True)
+    case = tmp_path / answered("machine")[0].name
     text = case.read_text().replace('tire = "tire.tir"', 'tire = "answer/model.toml"')
     (tmp_path / "next.toml").write_text(
         text.replace('[simulation.parameters.LMUY]\nvalue = 1.0\nunit = "1"\nsd = 0.05\n', "")

@@ -54,16 +54,20 @@ def drift_beside_scatter(folder, seed, **sizes):
     return dict(made.active[0].values)["rate"], float(np.sqrt(made.covariance[0, 0])), scatter
 
 
-def test_intervals_cover_where_zeros_and_gains_of_the_runs_scatter(tmp_path):
-    drifts = [drift_beside_scatter(tmp_path / str(k), k, zero_sd=0.6, gain_sd=0.004) for k in range(30)]
+MORE = pytest.mark.campaign("30 draws in place of 12")
+
+
+@pytest.mark.parametrize(("draws", "least"), [(12, 9), pytest.param(30, 25, marks=MORE)])
+def test_intervals_cover_where_zeros_and_gains_of_the_runs_scatter(tmp_path, draws, least):
+    drifts = [drift_beside_scatter(tmp_path / str(k), k, zero_sd=0.6, gain_sd=0.004) for k in range(draws)]
     covered = sum(abs(rate - RATE) < 1.96 * sd for rate, sd, _ in drifts)
-    # Of 30 intervals of 95 % fewer than 25 cover in three draws of a thousand.
-    assert covered >= 25
+    # Of 30 intervals of 95 % fewer than 25 cover in three draws of a thousand, of 12 fewer than 9 in two.
+    assert covered >= least
     # As sure as the rows within the runs allow, however far these lie apart: a slope about each run's own
     # zero has 0.5 N / sqrt(400) over the 0.77 min by which times scatter.
     assert np.median([sd for _, sd, _ in drifts]) < 2.5 * 0.5 / np.sqrt(400) / 0.77
     zeros = [scatter[0].zero_sd for _, _, scatter in drifts if scatter]
-    assert len(zeros) > 24
+    assert len(zeros) > 0.8 * draws
     assert np.sqrt(np.mean(np.square(zeros))) == pytest.approx(0.6, rel=0.3)
 
 

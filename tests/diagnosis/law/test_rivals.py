@@ -14,7 +14,12 @@ def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(
 
     The law a*FZ behind it fits better; it is the same leak, and the answer is no worse for its name.
     """
-    for name, text in columns_tire(pull=120.0, lag=0.2).items():
+    files = columns_tire(pull=120.0, lag=0.2)
+    # The moment has no part in it.
+    for moment in (', MZ = "MZ_sim"', 'MZ = { unit = "N*m", role = "output" }\n'):
+        assert moment in files["CASE.toml"]
+        files["CASE.toml"] = files["CASE.toml"].replace(moment, "")
+    for name, text in files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     answer = diagnose(read_case(tmp_path / "CASE.toml"), None).diagnosis
     classes = [{effect.name, *effect.equivalent_to} for effect in answer.effects]

@@ -12,6 +12,9 @@ from scipy.integrate import solve_ivp
 
 from tests.diagnosis.case_text import case_text
 from tests.diagnosis.law.test_learn import estimates, run
+from toolkit.declared import json_value
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import diagnose
 
 SIMULATOR = """
 import numpy as np
@@ -117,9 +120,12 @@ def _diagnosed(folder: Path, hidden, seed: int = 0) -> dict:
     (folder / "case.toml").write_text(HEAD + runs)
     for i in range(3):
         _moved(hidden, seed, i).to_csv(folder / f"r{i}.csv", index=False)
-    return json.loads(run("diagnose", folder / "case.toml", "--out", folder / "out", "--json").output)
+    return json_value(diagnose(read_case(folder / "case.toml"), None).diagnosis)
 
 
+@pytest.mark.campaign(
+    "a product of two signals is learned in every run, and so is a law in a state's equation"
+)
 def test_a_law_of_an_input_and_a_state_is_learned(tmp_path):
     answer = _diagnosed(tmp_path, HIDDEN["a factor of the force that grows with the position"])
     (law,) = answer["laws"]
@@ -143,7 +149,7 @@ def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path):
     answer = _diagnosed(tmp_path, HIDDEN["a force that grows with its square"])
     assert (answer["verdict"], answer["effects"]) == ("unknown", [])
     (law,) = answer["laws"]
-    assert law["formula"] == "a*F*abs(F)"
+    assert (law["place"], law["formula"]) == ({"kind": "state", "channel": "v"}, "a*F*abs(F)")
     assert estimates(law)["a"][0] == pytest.approx(-0.002, rel=0.02)
 
 

@@ -39,7 +39,10 @@ def pairs_of(case):
     return view, ranked_pairs(view.screen, view.scored)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+AGAIN = pytest.mark.campaign("a second draw of the same two effects")
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=AGAIN)])
 def test_two_effects_that_hide_each_other_are_both_named(tmp_path, seed):
     case = carriages(tmp_path, coulomb=COULOMB, drag=DRAG, seed=seed)
     answer = diagnose(case, None).diagnosis

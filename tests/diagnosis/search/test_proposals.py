@@ -184,6 +184,7 @@ def outputs(x, u, p):
     return {"angle": x[0]}
 """
 LENGTH, DRAG, ZERO = 0.332, 0.0105, 0.009
+LOSSES = ("viscous_damping", "quadratic_drag", "coulomb_friction")
 
 
 def filmed(folder: Path) -> Problem:
@@ -216,7 +217,9 @@ def test_a_slow_loss_is_proposed_in_spite_of_noise_that_the_likeliest_following_
 
     joint = fit(problem, [scored.active for scored in found.together], start=found.together[0].p)
     damping = next(each for each in joint.active if each.effect.name != "constant_force")
-    instead, active, rivals = best_in_place(problem, joint, damping, candidates(problem))
+    # Of all that has a place there those that lose: the others take as long, and none comes near.
+    listed = [each for each in candidates(problem) if each.name in LOSSES]
+    instead, active, rivals = best_in_place(problem, joint, damping, listed)
     names = {active.effect.name, *(rival.active.effect.name for rival in rivals)}
     assert {"viscous_damping", "quadratic_drag"} <= names
     assert instead.log_posterior >= joint.log_posterior

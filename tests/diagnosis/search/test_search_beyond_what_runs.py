@@ -1,16 +1,11 @@
 """A candidate that the simulation cannot run with goes alone; the search goes on with the others."""
 
-import json
-
 import numpy as np
 import pandas as pd
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
-from toolkit.cli import diagnose as command
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.search import forward_step, search
@@ -51,17 +46,11 @@ def test_an_equation_that_stops_within_the_reach_of_a_rival_is_diagnosed(tmp_pat
     stop = 1.02 * max(largest for _, largest in made)
     frames = {f"r{i}__csv": frame for i, (frame, _) in enumerate(made)}
     case = write_case(tmp_path / "case", CASE + TWO, simulator=STOPPED.format(stop=stop), **frames)
-    app = typer.Typer()
-    app.command("diagnose")(command.command)
-    done = CliRunner().invoke(
-        app, [str(case), "--out", str(tmp_path / "out"), "--json"], standalone_mode=False
-    )
-    assert (done.exception, done.return_value) == (None, 1)
-    answer = json.loads(done.stdout)
-    assert answer["verdict"] in ("named", "equivalent")
-    (one,) = answer["effects"]
-    assert (one["name"], one["channel"]) == ("sensitivity_error", "Y")
-    low, high = one["parameters"][0]["ci95"]
+    answer = diagnose(read_case(case), None).diagnosis
+    assert answer.verdict in ("named", "equivalent")
+    (one,) = answer.effects
+    assert (one.name, one.channel) == ("sensitivity_error", "Y")
+    low, high = one.parameters[0].ci95
     assert low < GAIN - 1 < high
 
 
@@ -97,7 +86,10 @@ def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, 
     assert "coulomb_friction" not in found
 
 
-@pytest.mark.parametrize("cannot", ["fit", "hold_out"])
+OTHER = pytest.mark.campaign("the other call that may refuse: fits of unseen rows do in every run")
+
+
+@pytest.mark.parametrize("cannot", [pytest.param("fit", marks=OTHER), "hold_out"])
 def test_an_effect_without_which_nothing_runs_is_kept(tmp_path, monkeypatch, cannot):
     # Friction and a zero: once both are there, the simulation with one of them alone can no longer be run.
     whole, there, left = getattr(search, cannot), set(), []

@@ -92,8 +92,8 @@ def test_what_rolls_out_is_periodic_by_the_way_that_it_rolled_and_not_by_the_sim
     assert CaseView(problem, "v", None).way[0] > 1.5 * way
 
 
-def fitted(problem: Problem, **values: Values) -> tuple[Fit, HeldOut, HeldOut, list[Step]]:
-    """Return a joint fit of some effects on the speed, unseen rows with and without them, and their steps."""
+def fitted(problem: Problem, **values: Values) -> tuple[Fit, HeldOut, Fit, list[Step]]:
+    """Return a joint fit of some effects on the speed, its unseen rows, the fit of none, and their steps."""
     listed = {candidate.name: candidate.active for candidate in candidates(problem)}
     active = tuple(
         replace(listed[name], values=dict(listed[name].values) | dict(sizes))
@@ -102,8 +102,7 @@ def fitted(problem: Problem, **values: Values) -> tuple[Fit, HeldOut, HeldOut, l
     refitted, made = fit(problem), fit(problem, active)
     folds = folds_of(problem, refitted)
     steps = [Step(active=each, p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=()) for each in made.active]
-    without = hold_out(problem, folds, (), refitted)
-    return made, hold_out(problem, folds, made.active, made), without, steps[::-1]
+    return made, hold_out(problem, folds, made.active, made), refitted, steps[::-1]
 
 
 def names(steps: Sequence[Step]) -> list[str]:
@@ -113,12 +112,13 @@ def names(steps: Sequence[Step]) -> list[str]:
 def test_what_the_form_of_a_drag_may_leave_is_dropped_beside_it(tmp_path: Path) -> None:
     """A slow wave over the way takes what is left, less than a thousandth of what the drag took."""
     problem, _ = coasting(tmp_path, wave=0.002)
-    made, unseen, without, steps = fitted(
+    made, unseen, refitted, steps = fitted(
         problem,
         quadratic_drag={"drag": 0.0022},
         periodic_ripple={"amplitude": 0.002, "period": 160 * np.pi, "phase": 0.0},
     )
     folds = folds_of(problem, made)
+    without = hold_out(problem, folds_of(problem, refitted), (), refitted)
     _, kept_unseen, kept = search._pruned(problem, folds, made, unseen, without, steps)
     assert names(steps) == ["periodic_ripple", "quadratic_drag"]
     assert unseen.total > kept_unseen.total + 1.5  # the score alone would have kept it

@@ -39,11 +39,14 @@ def piston(seed: int, *, pressure: float = 1.0, force: float = 1.0) -> pd.DataFr
     return pd.DataFrame({"t": t, "x": np.cos(t), "P": bar * pressure, "F": F * force})
 
 
+ANOTHER = pytest.mark.campaign("another pair of units: one is named in every run")
+
+
 @pytest.mark.parametrize(
     ("columns", "channel", "factor", "told"),
     [
         ({"pressure": 100.0}, "P", 100.0, "kPa read as bar"),
-        ({"pressure": 14.503774}, "P", 14.503774, "psi read as bar"),
+        pytest.param({"pressure": 14.503774}, "P", 14.503774, "psi read as bar", marks=ANOTHER),
     ],
 )
 def test_an_input_in_another_unit_is_named_with_both_units(tmp_path, columns, channel, factor, told):

@@ -98,10 +98,12 @@ def test_forces_of_a_velocity_have_a_place_where_the_position_is_recorded_in_tim
     assert not any(still.places(effect(name)) for name in BY_SPEED)
 
 
-EXACT = pytest.mark.campaign("a position without noise, which asks less than the two of every run")
+OTHER = pytest.mark.campaign("a position without noise, and one in steps: a noisy one holds in every run")
 
 
-@pytest.mark.parametrize("how", [pytest.param({}, marks=EXACT), {"noise": 0.1}, {"step": 0.5}])
+@pytest.mark.parametrize(
+    "how", [{"noise": 0.1}, *(pytest.param(how, marks=OTHER) for how in ({}, {"step": 0.5}))]
+)
 def test_friction_is_named_beside_a_position_alone(tmp_path, how):
     made = diagnose(case(tmp_path, friction=4.0, **how), None).diagnosis
     (one,) = made.effects

@@ -8,6 +8,7 @@ is an English word too (``wear``) counts where it is the whole text, or stands a
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -57,15 +58,24 @@ def entry_keys(tree: ast.Module) -> set[int]:
     }
 
 
-def named(path: Path) -> Iterator[tuple[int, str]]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+NAMES = "|".join(name for name in effects() if "_" in name)
+WORDS = "|".join(name for name in effects() if "_" not in name)
+WRITTEN = re.compile(rf"\b({NAMES})\b|\A({WORDS})\Z|\b({WORDS})[.=@](?=\S)")
+ANY = re.compile(rf"{NAMES}|{WORDS}")
+
+
+@functools.cache
+def named(path: Path) -> list[tuple[int, str]]:
+    """Return the lines of a file that name an effect, with what they name."""
+    text = path.read_text(encoding="utf-8")
+    return list(_named(ast.parse(text))) if ANY.search(text) else []
+
+
+def _named(tree: ast.Module) -> Iterator[tuple[int, str]]:
     skipped = docstrings(tree) | entry_keys(tree)
-    names = "|".join(name for name in effects() if "_" in name)
-    words = "|".join(name for name in effects() if "_" not in name)
-    written = re.compile(rf"\b({names})\b|\A({words})\Z|\b({words})[.=@](?=\S)")
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in skipped:
-            for match in written.finditer(node.value):
+            for match in WRITTEN.finditer(node.value) if ANY.search(node.value) else ():
                 yield node.lineno, str(match[match.lastindex or 0])
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("toolkit.effects.catalogue."):
             yield node.lineno, str(node.module).rsplit(".", 1)[1]
