@@ -35,6 +35,7 @@ from toolkit.diagnosis.simulators.states import (
     term_places,
 )
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
+from toolkit.diagnosis.simulators.turning import Turning
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
@@ -58,6 +59,7 @@ ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth
 FINER = 4  # rows between two rows, one of them among them
 _MISSED = 3  # times in turn: an equation that is not smooth enough
 _LEVELS = 41  # quantiles of a state
+_STATES = 4  # simulations whose states are kept: a fit asks for the last one again
 _MOST_HELD = 200_000_000  # bytes of simulations to remember
 
 
@@ -77,8 +79,10 @@ class OdeModel:
         self._fine: dict[Run, Run] = {}
         self._held = 0  # bytes of what is kept
         self._missed = 0  # times in turn that no guess led to a simulation
+        self._states: dict[Any, NDArray[np.float64]] = {}  # integrated last
         self._near: dict[Run, NDArray[np.float64]] = {}  # states simulated last
         self._steps: dict[Run, NDArray[np.intp]] = {}  # of the simulation as declared
+        self._turning = Turning(self)
         self._alone: set[Any] = set()  # what does not come to its end with others
         self._slopes: dict[tuple[Run, ...], NDArray[np.float64] | None] = {}
         self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
@@ -287,8 +291,9 @@ class OdeModel:
         listed: list[tuple[tuple[Any, ...], Mapping[str, float], list[AppliedEffect]]],
     ) -> None:
         """Integrate sets together; one that does not come to its end is left to be integrated alone."""
+        points = [(p, active) for _, p, active in listed]
         try:
-            solved, reached = self._solved(runs, [(p, active) for _, p, active in listed])
+            solved, reached = self._turning.solved(runs, points) or self._solved(runs, points)
         except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, the same set alone raises it by name
             return
         for run, x, at in zip(runs, solved, range(len(runs)), strict=True):
@@ -321,7 +326,7 @@ class OdeModel:
         forces = [self.forces(active) for _, active in listed]
         together, rows = ForcesTogether(forces, own, runs), Rows(runs, self.drivers)
         starts = [np.stack([self.equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
-        atol = np.stack([self._tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
+        atol = np.stack([self.tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
         p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
         x = np.zeros((own + together.added, len(listed), len(rows.t)))
         steps = np.ones(len(rows.t) - 1, dtype=np.intp)
@@ -366,11 +371,8 @@ class OdeModel:
         forces = [
             applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
         ]
-        forces_key = tuple(
-            (force.effect.name, force.channel, tuple(force.values.values())) for force in forces
-        )
         between = any(_between_rows(applied) and applied.acts_in(run) for applied in active)
-        return (run, between and run.rows > 1, tuple(p.values()), forces_key), forces
+        return (run, between and run.rows > 1, tuple(p.values()), _forces_key(forces)), forces
 
     def _keep(self, key: tuple[Any, ...], simulated: dict[str, NDArray[np.float64]] | FitError) -> None:
         if len(self._kept) > 400 or self._held > _MOST_HELD:
@@ -385,6 +387,16 @@ class OdeModel:
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool = False
     ) -> NDArray[np.float64]:
         """Return the states of a run, (states, rows), those that forces bring along behind the own ones."""
+        key = (run, tuple(p.values()), _forces_key(forces))
+        if key not in self._states:
+            while len(self._states) >= _STATES * len(self.case.runs):
+                del self._states[next(iter(self._states))]
+            self._states[key] = self._integrated(run, p, forces, alone=alone)
+        return self._states[key]
+
+    def _integrated(
+        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool
+    ) -> NDArray[np.float64]:
         acting = self.forces(forces)
         rate = self.equation.rates(run, dict(p), acting, len(self.states))
         start = self.equation.start(run, p)
@@ -398,7 +410,7 @@ class OdeModel:
         begun = np.concatenate([start, np.zeros(acting.added)])
         try:
             with silenced():
-                atol = self._tolerance(start, acting, acting.added)
+                atol = self.tolerance(start, acting, acting.added)
                 x = integrate(rate, run.t, begun, atol, acting.slides(len(self.states)))
         except IntegrationError as error:
             raise failed(self.case, run, f"the integration ended early: {error}") from error
@@ -407,7 +419,7 @@ class OdeModel:
         self._near[run] = x[: len(self.states)]
         return x
 
-    def _tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
+    def tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
         """Return the absolute tolerance of every state, ``added`` ones among them."""
         if not self.scale:
             return 0.01 * ATOL * np.maximum(np.abs(start), 1.0)
@@ -489,6 +501,10 @@ def handlers(case: Case) -> Handlers:
 
 def _loaded(case: Case) -> OdeModel:
     return OdeModel(case, *load_functions(case.file(), "rhs", "outputs", "initial"))
+
+
+def _forces_key(forces: Sequence[AppliedEffect]) -> tuple[Any, ...]:
+    return tuple((force.effect.name, force.channel, tuple(force.values.values())) for force in forces)
 
 
 def _between_rows(applied: AppliedEffect) -> bool:
