@@ -120,8 +120,22 @@ def _advance(
         try:
             k2 = _at(rate, t, C[0] * h, [y[i] + h * (a21 * k1[i]) for i in of], hold, over)
             k3 = _at(rate, t, C[1] * h, [y[i] + h * (a31 * k1[i] + a32 * k2[i]) for i in of], hold, over)
-            k4 = _at(rate, t, C[2] * h, [y[i] + h * (a41 * k1[i] + a42 * k2[i] + a43 * k3[i]) for i in of], hold, over)
-            k5 = _at(rate, t, C[3] * h, [y[i] + h * (a51 * k1[i] + a52 * k2[i] + a53 * k3[i] + a54 * k4[i]) for i in of], hold, over)
+            k4 = _at(
+                rate,
+                t,
+                C[2] * h,
+                [y[i] + h * (a41 * k1[i] + a42 * k2[i] + a43 * k3[i]) for i in of],
+                hold,
+                over,
+            )
+            k5 = _at(
+                rate,
+                t,
+                C[3] * h,
+                [y[i] + h * (a51 * k1[i] + a52 * k2[i] + a53 * k3[i] + a54 * k4[i]) for i in of],
+                hold,
+                over,
+            )
             x6 = [
                 y[i] + h * (a61 * k1[i] + a62 * k2[i] + a63 * k3[i] + a64 * k4[i] + a65 * k5[i]) for i in of
             ]

@@ -50,7 +50,9 @@ class Slide:
 Hold = Callable[[list[float], float, "Slide | None"], None]
 
 
-def held(slides: Sequence[Slide], before: list[float], rates: list[float], turned: Slide | None) -> Hold | None:
+def held(
+    slides: Sequence[Slide], before: list[float], rates: list[float], turned: Slide | None
+) -> Hold | None:
     """Return what sets the bends of a later state within a step, None where a body stands at its beginning.
 
     It raises TurnedError for a state in which a body has turned.
@@ -68,8 +70,19 @@ def held(slides: Sequence[Slide], before: list[float], rates: list[float], turne
         if not speed:
             return None
         way = math.copysign(1.0, speed)
-        known.append((slide, slide.bend, slide.velocity, slide.way, way, slack, before[slide.bend] - way,
-                      before[slide.way], slide.reach))
+        known.append(
+            (
+                slide,
+                slide.bend,
+                slide.velocity,
+                slide.way,
+                way,
+                slack,
+                before[slide.bend] - way,
+                before[slide.way],
+                slide.reach,
+            )
+        )
 
     def hold(y: list[float], after: float, over: Slide | None) -> None:
         for slide, bend, velocity, place, way, slack, off, begun, reach in known:

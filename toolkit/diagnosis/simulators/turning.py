@@ -23,7 +23,6 @@ from toolkit.diagnosis.simulators.marching import flows, neighbours_on
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.trajectory import recursion
 from toolkit.diagnosis.simulators.user_code import silenced
-from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,6 +40,7 @@ _STEP = 1e-6  # of a state's size, for differences
 _NEAR = 1e-2  # of a state's spread: the square of more shows
 _SWEEPS = 10  # a guess that needs more is too far off
 _SLOW = 0.2  # of the last correction: where one is larger, derivatives are taken anew
+_DAMPED = 2  # corrections that had to be shortened: a guess that is too far off
 _FAR = 0.5  # of a state's spread, by which one correction moves it: beyond, the derivatives are others
 
 
@@ -49,21 +49,26 @@ class Turning:
 
     def __init__(self, model: IntegratedModel) -> None:
         self._model = model
-        self._paths: dict[object, tuple[Array, Array | None]] = {}  # states (states, rows), flow's derivatives
+        self._paths: dict[
+            object, tuple[Array, Array | None]
+        ] = {}  # states (states, rows), flow's derivatives
 
-    def solved(self, runs: Sequence[Run], listed: Sequence[Point]) -> tuple[list[Array], Mask] | None:
+    def solved(self, runs: Sequence[Run], listed: Sequence[Point]) -> tuple[list[Array], Mask]:
         """Return the states of sets in every run, (states, sets, rows), and which came to the end, (sets,).
 
-        None for what is smooth, or nowhere near what is known: then there are better ways.
+        None does that is smooth, turns otherwise than the first, or is nowhere near what is known: there are
+        better ways for it.
         """
         model, own = self._model, len(self._model.states)
+        reached = np.zeros(len(listed), dtype=bool)
         acting = [model.forces(active) for _, active in listed]
-        together, columns = ForcesTogether(acting, own, runs), model.equation.columns
+        turning, columns = [_turning(forces) for forces in acting], model.equation.columns
         everywhere = all(applied.acts_in(run) for _, active in listed for applied in active for run in runs)
-        turning = [_turning(forces) for forces in acting]
-        if columns is None or not together.abrupt[0] or not everywhere or any(one != turning[0] for one in turning):
-            return None
-        rows, (p, active) = Rows(runs, model.drivers), listed[0]
+        if columns is None or not turning[0] or not everywhere:
+            return [], reached
+        able = [k for k, one in enumerate(turning) if one == turning[0]]
+        listed, acting = [listed[k] for k in able], [acting[k] for k in able]
+        together, rows, (p, active) = ForcesTogether(acting, own, runs), Rows(runs, model.drivers), listed[0]
         starts = np.zeros((own + together.added, len(listed), len(runs)))
         for k, run in enumerate(runs):
             starts[:own, :, k] = np.stack([model.equation.start(run, values) for values, _ in listed], axis=1)
@@ -71,35 +76,36 @@ class Turning:
         atol = np.stack([model.tolerance(starts[:own, 0, 0], one, one.added) for one in acting], axis=1)
         flow = RowFlow(columns, rows, values, together, atol)
         sizes = np.array([*(model.scale[name][1] for name in model.states), *acting[0].sizes])
+        ways = [own + force.way for force in acting[0].listed if force.way is not None]
+        reaches = sizes.copy()
+        reaches[ways] = np.inf  # nothing depends on where a way began
         key = (tuple(runs), tuple(turning[0]))
         with silenced():
-            first = self._led(flow, key, starts[:, :1], sizes)
+            first = self._led(flow, key, starts[:, :1], sizes, reaches)
             if first is None:
-                try:
-                    x = np.concatenate([model.integrated(run, p, active) for run in runs], axis=1)
-                except FitError:
-                    return None
+                x = np.concatenate([model.integrated(run, p, active) for run in runs], axis=1)
                 first = x, None
             x, slopes = self._paths[key] = first
-            made, reached = x[:, None], np.ones(1, dtype=bool)
+            made = np.repeat(x[:, None], len(listed), axis=1)
+            there = np.ones(len(listed), dtype=bool)
             if len(listed) > 1:
-                slopes, others = beside(flow, x, starts, sizes)
+                slopes, off = beside(flow, x, starts, sizes)
                 self._paths[key] = x, slopes
-                done = np.isfinite(others).all(axis=(0, 2)) & bool(
-                    [_places(one) for one in acting] == [_places(acting[0])] * len(acting)
-                )
-                done &= (np.abs(others) / sizes[:, None, None]).max(axis=(0, 2)) < _NEAR
-                made = np.concatenate([made, x[:, None] + others], axis=1)
-                rest = 1 + np.flatnonzero(~done)
-                reached = np.ones(len(listed), dtype=bool)
+                far = ~((np.abs(off) / reaches[:, None, None]).max(axis=(0, 2)) < _NEAR)
+                far |= [_places(one) != _places(acting[0]) for one in acting[1:]]
+                rest = 1 + np.flatnonzero(far)
+                made[:, 1:] += np.where(far[:, None], 0.0, off)
+                begun = np.array([at.start for at in rows.slices])
+                made[:, rest[:, None], begun] = starts[:, rest]
                 if len(rest):
-                    made[:, rest] = x[:, None]
-                    made[:, rest[:, None], [at.start for at in rows.slices]] = starts[:, rest]
-                    _, reached[rest] = converged(flow, made, rest, slopes, sizes)
-        return [made[:, :, at] for at in rows.slices], reached
+                    _, there[rest] = converged(flow, made, rest, slopes, sizes, reaches)
+        reached[np.array(able)[there]] = True
+        whole = np.full((len(made), len(reached), made.shape[2]), np.nan)
+        whole[:, able] = made
+        return [whole[:, :, at] for at in rows.slices], reached
 
     def _led(
-        self, flow: RowFlow, key: object, starts: Array, sizes: Array
+        self, flow: RowFlow, key: object, starts: Array, sizes: Array, reaches: Array
     ) -> tuple[Array, Array | None] | None:
         """Return the first set's states from the path that is known, and the flow's derivatives."""
         if key not in self._paths:
@@ -107,12 +113,12 @@ class Turning:
         known, slopes = self._paths[key]
         x = known[:, None].copy()
         x[:, :, [at.start for at in flow.rows.slices]] = starts
-        slopes, reached = converged(flow, x, np.zeros(1, dtype=np.intp), slopes, sizes)
+        slopes, reached = converged(flow, x, np.zeros(1, dtype=np.intp), slopes, sizes, reaches)
         return (x[:, 0], slopes) if reached[0] else None
 
 
 def converged(
-    flow: RowFlow, x: Array, sets: NDArray[np.intp], slopes: Array | None, sizes: Array
+    flow: RowFlow, x: Array, sets: NDArray[np.intp], slopes: Array | None, sizes: Array, reaches: Array
 ) -> tuple[Array | None, Mask]:
     """Move the states of some sets to where they follow from each other, in place.
 
@@ -120,30 +126,34 @@ def converged(
     ----------
     x : states at every row, (states, sets of the flow or 1, rows); the first rows of the runs are right
     slopes : derivatives of the flow near by, (rows - 1, 1, states, states), or none
+    sizes, reaches : of the states, for differences and for how far one correction may lead, (states,)
 
     Returns
     -------
     the derivatives used last, and which of the sets came to rest
     """
     active, solved = np.arange(len(sets)), np.zeros(len(sets), dtype=bool)
-    before = np.full(len(sets), np.inf)
+    before, damped = np.full(len(sets), np.inf), np.zeros(len(sets), dtype=np.intp)
     for _ in range(_SWEEPS):
         at = sets[active]
         there = x[:, at]
         fresh = slopes is None
         if slopes is None:
-            slopes = _slopes(flow, there[:, 0], int(at[0]), sizes)
-        ends, arrived = flows(flow, there, at)
+            slopes, ends, whole = _slopes(flow, there[:, 0], int(at[0]), sizes)
+            arrived = np.array([whole])
+        if not fresh or len(active) > 1:
+            ends, arrived = flows(flow, there, at)
         moved = recursion(slopes, ends - there[:, :, 1:])
         size = flow.atol[:, at, None] + RTOL * np.abs(ends)
         off = (np.abs(moved) / size).max(axis=(0, 2))
         usable = np.isfinite(off) & arrived & (np.abs(ends) < OFF).all(axis=(0, 2))
-        share = _FAR / np.maximum((np.abs(moved) / sizes[:, None, None]).max(axis=(0, 2)), _FAR)
+        share = _FAR / np.maximum((np.abs(moved) / reaches[:, None, None]).max(axis=(0, 2)), _FAR)
         x[:, at[usable], 1:] += (share[:, None] * moved)[:, usable]
         done = usable & (off < 1)
         solved[active[done]] = True
         slow = (off > _SLOW * before[active]) | (share < 1)
-        stalled = slow & fresh & (len(active) == 1) & (off > before[active])
+        damped[active] += share < 1
+        stalled = (damped[active] > _DAMPED) | (slow & fresh & (off > before[active]))
         before[active] = off
         going = usable & ~done & ~stalled
         if not going.any():
@@ -154,11 +164,14 @@ def converged(
     return slopes, solved
 
 
-def _slopes(flow: RowFlow, x: Array, of: int, sizes: Array) -> Array:
-    """Return the derivatives of a set's flow at every row, (rows - 1, 1, states, states)."""
+def _slopes(flow: RowFlow, x: Array, of: int, sizes: Array) -> tuple[Array, Array, bool]:
+    """Return the derivatives of a set's flow at every row, where it leads, and whether all of it came there.
+
+    They are (rows - 1, 1, states, states) and (states, 1, rows - 1).
+    """
     moved = np.concatenate([x[:, None], x[:, None] + _STEP * np.diag(sizes)[:, :, None]], axis=1)
-    ends, _ = neighbours_on(flow, moved, np.full(1 + len(x), of, dtype=np.intp))
-    return _differences(flow, ends, sizes)
+    ends, whole = neighbours_on(flow, moved, np.full(1 + len(x), of, dtype=np.intp))
+    return _differences(flow, ends, sizes), ends[:, :1], whole
 
 
 def _differences(flow: RowFlow, ends: Array, sizes: Array) -> Array:
@@ -184,7 +197,7 @@ def beside(flow: RowFlow, x: Array, starts: Array, sizes: Array) -> tuple[Array,
     (rows - 1, 1, states, states) and (states, sets - 1, rows)
     """
     n, others, rows = len(x), starts.shape[1] - 1, flow.rows
-    slopes = _slopes(flow, x, 0, sizes)
+    slopes, _, _ = _slopes(flow, x, 0, sizes)
     there = np.repeat(x[:, None], 1 + others, axis=1)
     ends, _ = neighbours_on(flow, there, np.arange(1 + others, dtype=np.intp))
     added = ends[:, 1:] - ends[:, :1]
@@ -199,7 +212,10 @@ def beside(flow: RowFlow, x: Array, starts: Array, sizes: Array) -> tuple[Array,
 
 
 def _places(forces: Forces) -> list[object]:
-    return [(force.velocity, force.position, force.bristle, force.way, force.active.key) for force in forces.listed]
+    return [
+        (force.velocity, force.position, force.bristle, force.way, force.active.key)
+        for force in forces.listed
+    ]
 
 
 def _turning(forces: Forces) -> list[object]:
