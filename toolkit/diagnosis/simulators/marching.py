@@ -10,7 +10,7 @@ no part of their difference, however small that is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def march(flow: RowFlow, starts: Array, sets: Places) -> tuple[Array, Mask]:
         flow, sets[of][:, None], np.tile(begun, count), np.tile(rows.last, count),
         starts.reshape(n, -1, 1), keep,
     )  # fmt: skip
-    return x, ended.reshape(count, runs).all(axis=1)
+    return x, np.asarray(ended.reshape(count, runs).all(axis=1))
 
 
 def flows(flow: RowFlow, x: Array, sets: Places) -> tuple[Array, Mask]:
@@ -77,7 +77,7 @@ def flows(flow: RowFlow, x: Array, sets: Places) -> tuple[Array, Mask]:
         ends[:, of[which], row - 1] = y[:, :, 0]
 
     ended = _marched(flow, sets[of][:, None], at, at + 1, x[:, of, at][:, :, None], keep)
-    return ends, ended.reshape(len(sets), -1).all(axis=1)
+    return ends, np.asarray(ended.reshape(len(sets), -1).all(axis=1))
 
 
 def neighbours_on(flow: RowFlow, x: Array, sets: Places) -> tuple[Array, bool]:
@@ -128,7 +128,7 @@ def _marched(
     t, who, y = flow.rows.t, np.arange(many), np.ascontiguousarray(y).reshape(n, -1)
     ended, lead = np.zeros(many, dtype=bool), slice(None, None, beside)
 
-    def each(values: Array) -> Array:
+    def each(values: Any) -> Any:
         return values if beside == 1 else np.repeat(values, beside)
 
     now, h, tries = t[at], t[at + 1] - t[at], np.zeros(many, dtype=np.intp)
@@ -169,7 +169,7 @@ def _marched(
             at[there] += 1
             tries[there] = -1
         tries += 1
-        whole = (np.abs(y[:, lead]) < OFF).all(axis=0)
+        whole = np.asarray((np.abs(y[:, lead]) < OFF).all(axis=0))
         lost = (tries > (TURNING if bristles else MANY)) | ~whole
         arrived = at >= end
         ended[who[arrived]] = whole[arrived]

@@ -40,8 +40,7 @@ _STEP = 1e-6  # of a state's size, for differences
 _NEAR = 1e-2  # of a state's spread: the square of more shows
 _SWEEPS = 10  # a guess that needs more is too far off
 _SLOW = 0.2  # of the last correction: where one is larger, derivatives are taken anew
-_DAMPED = 2  # corrections that had to be shortened: a guess that is too far off
-_FAR = 0.5  # of a state's spread, by which one correction moves it: beyond, the derivatives are others
+_FAR = 2.0  # of a state's spread: by no correction near a known simulation is it moved as far
 
 
 class Turning:
@@ -133,7 +132,7 @@ def converged(
     the derivatives used last, and which of the sets came to rest
     """
     active, solved = np.arange(len(sets)), np.zeros(len(sets), dtype=bool)
-    before, damped = np.full(len(sets), np.inf), np.zeros(len(sets), dtype=np.intp)
+    before = np.full(len(sets), np.inf)
     for _ in range(_SWEEPS):
         at = sets[active]
         there = x[:, at]
@@ -147,13 +146,12 @@ def converged(
         size = flow.atol[:, at, None] + RTOL * np.abs(ends)
         off = (np.abs(moved) / size).max(axis=(0, 2))
         usable = np.isfinite(off) & arrived & (np.abs(ends) < OFF).all(axis=(0, 2))
-        share = _FAR / np.maximum((np.abs(moved) / reaches[:, None, None]).max(axis=(0, 2)), _FAR)
-        x[:, at[usable], 1:] += (share[:, None] * moved)[:, usable]
+        near = (np.abs(moved) / reaches[:, None, None]).max(axis=(0, 2)) < _FAR
+        x[:, at[usable], 1:] += moved[:, usable]
         done = usable & (off < 1)
         solved[active[done]] = True
-        slow = (off > _SLOW * before[active]) | (share < 1)
-        damped[active] += share < 1
-        stalled = (damped[active] > _DAMPED) | (slow & fresh & (off > before[active]))
+        slow = off > _SLOW * before[active]
+        stalled = ~near | (slow & fresh & (off > before[active]))
         before[active] = off
         going = usable & ~done & ~stalled
         if not going.any():
