@@ -56,7 +56,10 @@ def stacked(results: Any, columns: int) -> Array:
     """Return the results of a function as rows of columns, a constant one in every column."""
     if isinstance(results, np.ndarray) and results.ndim == 2:
         return np.asarray(results, dtype=np.float64)
-    return np.stack([np.broadcast_to(np.asarray(row, dtype=np.float64), columns) for row in results])
+    rows = np.empty((len(results), columns))
+    for i, row in enumerate(results):
+        rows[i] = row
+    return rows
 
 
 def columnwise(

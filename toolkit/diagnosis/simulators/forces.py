@@ -38,7 +38,7 @@ class Force:
     ``bristle`` is its bend's place among the added states, ``way`` that of its body's way where no state of
     the equation is it; ``scale`` is the size of the velocity state (of the state itself, where it has no
     position). ``reads`` are the signals of a law by name, with the place of those that are states; ``feeds``
-    is the state to which a part of what is held back may come.
+    is the state to which a part of what is held back may come; ``dry`` are size and reach of a bristle.
     """
 
     velocity: int
@@ -49,6 +49,7 @@ class Force:
     active: AppliedEffect
     reads: tuple[tuple[str, int | None], ...] = ()
     feeds: int | None = None
+    dry: tuple[Any, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,8 @@ class Forces:
         for one in active:
             at = states.index(str(one.channel))
             bristle = way = None
-            if _reach(one) > 0:
+            dry = _dry(one)
+            if dry is not None and dry[1] > 0:
                 bristle, added = added, added + 1
                 if at not in derivative_of:
                     way, added = added, added + 1
@@ -92,6 +94,7 @@ class Forces:
                     active=one,
                     reads=_reads(one, states, at, derivative_of.get(at, at), inputs),
                     feeds=(feeds or {}).get(at),
+                    dry=dry if bristle is not None else None,
                 )
             )
         return Forces(tuple(made), added)
@@ -103,10 +106,10 @@ class Forces:
                 bend=own + one.bristle,
                 velocity=one.velocity,
                 way=one.position if one.way is None else own + one.way,
-                reach=_reach(one.active),
+                reach=one.dry[1],
             )
             for one in self.listed
-            if one.bristle is not None
+            if one.bristle is not None and one.dry is not None
         )
 
     @property
@@ -114,8 +117,8 @@ class Forces:
         """Sizes of the added states: of a bend that of sliding, of a way the bristle's reach."""
         made = [1.0] * self.added
         for one in self.listed:
-            if one.way is not None:
-                made[one.way] = _reach(one.active)
+            if one.way is not None and one.dry is not None:
+                made[one.way] = one.dry[1]
         return tuple(made)
 
     def add(self, x: Array, rate: Array, own: int, seen: Seen) -> None:
@@ -126,7 +129,15 @@ class Forces:
         seen : the inputs and the time
         """
         for one in self.listed:
-            _add(one, x, rate, own, seen)
+            if one.dry is None or one.bristle is None:
+                _add(one, x, rate, own, seen)
+                continue
+            # As `_add` has it, in plain numbers: it is asked for at every step of one state.
+            (size, reach), v, bend = one.dry, x.item(one.velocity), x.item(own + one.bristle)
+            rate[one.velocity] -= size * bend
+            rate[own + one.bristle] = (v - abs(v) * bend) / reach
+            if one.way is not None:
+                rate[own + one.way] = v
 
 
 def _reads(
@@ -156,8 +167,8 @@ def _add(force: Force, x: Array, rate: Array, own: int, seen: Seen) -> None:
         rate[i] -= held_back
         if term.spill is not None and force.feeds is not None:
             rate[force.feeds] += values.get(term.spill, 0.0) * held_back
-    elif force.bristle is not None and term.bristle is not None:
-        size, reach = term.bristle(values)
+    elif force.bristle is not None and force.dry is not None:
+        size, reach = force.dry
         v, bend = x[i], x[own + force.bristle]
         rate[i] -= size * bend
         rate[own + force.bristle] = (v - abs(v) * bend) / reach
@@ -242,9 +253,10 @@ class Acting:
 
 def _of(force: Force, values: Mapping[str, Array], sets: Places) -> Force:
     there = {name: column[sets] for name, column in values.items()}
-    return replace(force, active=replace(force.active, values=there))  # type: ignore[arg-type]
+    active = replace(force.active, values=there)  # type: ignore[arg-type]
+    return replace(force, active=active, dry=_dry(active) if force.dry is not None else None)
 
 
-def _reach(effect: AppliedEffect) -> float:
+def _dry(effect: AppliedEffect) -> tuple[Any, Any] | None:
     term = effect.effect.term
-    return 0.0 if term is None or term.bristle is None else term.bristle(effect.values)[1]
+    return None if term is None or term.bristle is None else term.bristle(effect.values)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.sliding_friction import Slide, TurnedError, held
+from toolkit.diagnosis.simulators.sliding_friction import Hold, Slide, TurnedError, held, until_turn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,6 +26,7 @@ RTOL = 1e-6
 _MOST = 20_000  # rates that the stiff solver may ask for between two rows
 OFF = 1e100  # in no unit is a state of any plant as large
 _HUGE = 1e300
+SLOW = 100.0  # tolerances of a velocity, by which a body is at its turn
 MANY = 60  # steps within one interval: the equation is stiff there
 TURNING = 240  # the same where bristles slide: each body that turns takes a run of short steps
 
@@ -108,28 +109,45 @@ def _advance(
     (a21,), (a31, a32), (a41, a42, a43), (a51, a52, a53, a54), (a61, a62, a63, a64, a65) = A
     b1, _, b3, b4, b5, b6 = B
     e1, _, e3, e4, e5, e6, e7 = E
-    hold = held(slides, y) if slides else None
+    hold = held(slides, y, k1, None) if slides else None
+    over: Slide | None = None  # the body that a step leads up to its turn
     h = min(step, end - t)
     for _ in range(TURNING if slides else MANY):
         last = t + h >= end - 1e-12 * max(abs(end), h)
         if last:
             h = end - t
-        at = [t + c * h for c in C]
+
         try:
-            k2 = _at(rate, at[0], [y[i] + h * (a21 * k1[i]) for i in of], hold)
-            k3 = _at(rate, at[1], [y[i] + h * (a31 * k1[i] + a32 * k2[i]) for i in of], hold)
-            x4 = [y[i] + h * (a41 * k1[i] + a42 * k2[i] + a43 * k3[i]) for i in of]
-            k4 = _at(rate, at[2], x4, hold)
-            x5 = [y[i] + h * (a51 * k1[i] + a52 * k2[i] + a53 * k3[i] + a54 * k4[i]) for i in of]
-            k5 = _at(rate, at[3], x5, hold)
+            k2 = _at(rate, t, C[0] * h, [y[i] + h * (a21 * k1[i]) for i in of], hold, over)
+            k3 = _at(rate, t, C[1] * h, [y[i] + h * (a31 * k1[i] + a32 * k2[i]) for i in of], hold, over)
+            k4 = _at(
+                rate,
+                t,
+                C[2] * h,
+                [y[i] + h * (a41 * k1[i] + a42 * k2[i] + a43 * k3[i]) for i in of],
+                hold,
+                over,
+            )
+            k5 = _at(
+                rate,
+                t,
+                C[3] * h,
+                [y[i] + h * (a51 * k1[i] + a52 * k2[i] + a53 * k3[i] + a54 * k4[i]) for i in of],
+                hold,
+                over,
+            )
             x6 = [
                 y[i] + h * (a61 * k1[i] + a62 * k2[i] + a63 * k3[i] + a64 * k4[i] + a65 * k5[i]) for i in of
             ]
-            k6 = _at(rate, at[4], x6, hold)
+            k6 = _at(rate, t, C[4] * h, x6, hold, over)
             z = [y[i] + h * (b1 * k1[i] + b3 * k3[i] + b4 * k4[i] + b5 * k5[i] + b6 * k6[i]) for i in of]
-            k7 = _at(rate, t + h, z, hold)
-        except TurnedError:
-            hold = None
+            k7 = _at(rate, t, h, z, hold, over)
+        except TurnedError as turn:
+            speed = y[turn.slide.velocity]
+            if abs(speed) <= SLOW * atol[turn.slide.velocity]:
+                hold, over = None, None  # it rests, or nearly so: its bend is integrated as any state
+            else:
+                over, h = turn.slide, until_turn(speed, k1[turn.slide.velocity], turn.after, turn.speed)
             continue
         error = 0.0
         for i in of:
@@ -143,20 +161,33 @@ def _advance(
             continue
         error = math.sqrt(error / len(y))
         grow = min(5.0, max(0.2, 0.9 * error**-0.2)) if error > 0 else 5.0
-        if error <= 1.0:
-            if last:
-                return np.array(z), k7, h * grow, end
-            t, y, k1 = t + h, z, k7
+        if error > 1.0:
+            h *= grow
+            continue
+        turned, ahead = None, h * grow
+        if over is not None:
+            speed, pull = z[over.velocity], k7[over.velocity]
+            if abs(speed) <= SLOW * atol[over.velocity]:
+                turned, ahead = over, math.sqrt(over.reach / abs(pull)) if pull else ahead
+            elif speed * y[over.velocity] < 0:
+                h = until_turn(y[over.velocity], k1[over.velocity], h, speed)
+                continue
+            elif speed * pull < 0:
+                ahead = min(ahead, -speed / pull)
+        if last:
+            return np.array(z), k7, ahead, end
+        t, y, k1, h = t + h, z, k7, ahead
         if slides:
-            hold = held(slides, y)
-        h *= grow
+            hold, over = held(slides, y, k1, turned), None if turned else over
     return np.array(y), k1, end - t, t
 
 
-def _at(rate: Rate, t: float, y: list[float], hold: Callable[[list[float]], None] | None) -> list[float]:
+def _at(
+    rate: Rate, t: float, after: float, y: list[float], hold: Hold | None, over: Slide | None
+) -> list[float]:
     if hold is not None:
-        hold(y)
-    rates: list[float] = rate(t, np.array(y)).tolist()
+        hold(y, after, over)
+    rates: list[float] = rate(t + after, np.array(y)).tolist()
     return rates
 
 

@@ -18,6 +18,7 @@ from toolkit.diagnosis.simulators.channels import (
 from toolkit.diagnosis.simulators.equation import Equation, failed
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
+from toolkit.diagnosis.simulators.memory import Memory
 from toolkit.diagnosis.simulators.ode_apart import OdeApart, handlers_of
 from toolkit.diagnosis.simulators.ode_following import followed
 from toolkit.diagnosis.simulators.ode_responses import pushed
@@ -30,10 +31,12 @@ from toolkit.diagnosis.simulators.states import (
     dimensions,
     fitting,
     shown_alone,
+    state_names,
     state_units,
     term_places,
 )
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
+from toolkit.diagnosis.simulators.turning import Turning
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
@@ -41,7 +44,7 @@ from toolkit.effects.filters import STRAIGHT
 from toolkit.effects.law import is_law
 from toolkit.effects.signals import Setting
 from toolkit.effects.surroundings import MotionSizes
-from toolkit.errors import ConfigError, FitError
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     import pathlib
@@ -57,7 +60,8 @@ ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth
 FINER = 4  # rows between two rows, one of them among them
 _MISSED = 3  # times in turn: an equation that is not smooth enough
 _LEVELS = 41  # quantiles of a state
-_MOST_HELD = 200_000_000  # bytes of simulations to remember
+_STATES = 4  # simulations whose states are kept: a fit asks for the last one again
+_MOST_KEPT, _MOST_HELD = 400, 200_000_000  # simulations of a run to remember, and their bytes
 
 
 class OdeModel:
@@ -74,30 +78,18 @@ class OdeModel:
         self._driven: dict[Any, Run] = {}
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
-        self._held = 0  # bytes of what is kept
         self._missed = 0  # times in turn that no guess led to a simulation
+        self._states: Memory[NDArray[np.float64]] = Memory(_STATES * len(case.runs), _MOST_HELD)
         self._near: dict[Run, NDArray[np.float64]] = {}  # states simulated last
         self._steps: dict[Run, NDArray[np.intp]] = {}  # of the simulation as declared
+        self._turning = Turning(self)
         self._alone: set[Any] = set()  # what does not come to its end with others
         self._slopes: dict[tuple[Run, ...], NDArray[np.float64] | None] = {}
-        self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
+        self._kept: Memory[dict[str, NDArray[np.float64]] | FitError] = Memory(_MOST_KEPT, _MOST_HELD)
         p = {parameter.name: parameter.value for parameter in case.parameters}
         start = self.equation.start(case.runs[0], p)
-        names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
-        if len(names) != len(start):
-            raise ConfigError(
-                "states and initial do not agree", where=f"{case.path}: simulation.states",
-                got=f"{len(names)} names, {len(start)} initial values", expected="one name for each",
-                next_step="correct the list of states", rule="case",
-            )  # fmt: skip
-        self.states = names
+        self.states = names = state_names(case, len(start))
         terms = dict(case.simulation.force_terms)
-        unknown = [name for name in terms if name not in names]
-        if unknown:
-            raise ConfigError(
-                "a force term names no state", where=f"{case.path}: simulation.force_terms",
-                got=", ".join(unknown), expected=", ".join(names), next_step="correct the name", rule="case",
-            )  # fmt: skip
         self.derivative_of = self.equation.kinematics(p)
         # A place moves nothing into its own rate.
         self.feeds = {i: j for i, j in self.equation.feeds(p).items() if self.derivative_of.get(j) != i}
@@ -233,7 +225,7 @@ class OdeModel:
         key, forces = self._key(run, p, active)
         if key not in self._kept:
             states = self.integrated(run, p, forces, alone=key in self._alone)
-            self._keep(key, self._made(run, p, forces, states, between=key[1]))
+            self._kept[key] = self._made(run, p, forces, states, between=key[1])
         simulated = self._kept[key]
         if isinstance(simulated, FitError):
             raise simulated
@@ -286,23 +278,31 @@ class OdeModel:
         listed: list[tuple[tuple[Any, ...], Mapping[str, float], list[AppliedEffect]]],
     ) -> None:
         """Integrate sets together; one that does not come to its end is left to be integrated alone."""
-        try:
-            solved, reached = self._solved(runs, [(p, active) for _, p, active in listed])
-        except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, the same set alone raises it by name
-            return
-        for run, x, at in zip(runs, solved, range(len(runs)), strict=True):
-            for k, (keys, p, active) in enumerate(listed):
-                forces = [applied for applied in active if applied.acts_in(run)]
-                if not reached[k]:
-                    self._alone.add(keys[at])
-                    continue
-                if keys[at][1] and len(forces) < len(active):
-                    continue  # its added states stand elsewhere than those of the run alone
-                states = np.ascontiguousarray(x[:, k])
-                try:
-                    self._keep(keys[at], self._made(run, p, forces, states, between=keys[at][1]))
-                except FitError as error:
-                    self._keep(keys[at], error)
+        rest = listed
+        for solve in (self._turning.solved, self._solved):
+            if not rest:
+                return
+            try:
+                solved, reached = solve(runs, [(p, active) for _, p, active in rest])
+            except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, a set alone raises it by name
+                return
+            for k in np.flatnonzero(reached).tolist():
+                self._keep_all(runs, *rest[k], [np.ascontiguousarray(x[:, k]) for x in solved])
+            rest = [one for one, there in zip(rest, reached, strict=True) if not there]
+        self._alone.update(key for keys, *_ in rest for key in keys)
+
+    def _keep_all(
+        self, runs: Sequence[Run], keys: tuple[Any, ...], p: Mapping[str, float],
+        active: list[AppliedEffect], states: Sequence[NDArray[np.float64]],
+    ) -> None:  # fmt: skip
+        for run, key, x in zip(runs, keys, states, strict=True):
+            forces = [applied for applied in active if applied.acts_in(run)]
+            if key[1] and len(forces) < len(active):
+                continue  # its added states stand elsewhere than those of the run alone
+            try:
+                self._kept[key] = self._made(run, p, forces, x, between=key[1])
+            except FitError as error:
+                self._kept[key] = error
 
     def _solved(
         self,
@@ -320,7 +320,7 @@ class OdeModel:
         forces = [self.forces(active) for _, active in listed]
         together, rows = ForcesTogether(forces, own, runs), Rows(runs, self.drivers)
         starts = [np.stack([self.equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
-        atol = np.stack([self._tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
+        atol = np.stack([self.tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
         p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
         x = np.zeros((own + together.added, len(listed), len(rows.t)))
         steps = np.ones(len(rows.t) - 1, dtype=np.intp)
@@ -365,25 +365,21 @@ class OdeModel:
         forces = [
             applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
         ]
-        forces_key = tuple(
-            (force.effect.name, force.channel, tuple(force.values.values())) for force in forces
-        )
         between = any(_between_rows(applied) and applied.acts_in(run) for applied in active)
-        return (run, between and run.rows > 1, tuple(p.values()), forces_key), forces
-
-    def _keep(self, key: tuple[Any, ...], simulated: dict[str, NDArray[np.float64]] | FitError) -> None:
-        if len(self._kept) > 400 or self._held > _MOST_HELD:
-            self._kept.clear()
-            self._held = 0
-        self._kept[key] = simulated
-        self._held += (
-            0 if isinstance(simulated, FitError) else sum(column.nbytes for column in simulated.values())
-        )
+        return (run, between and run.rows > 1, tuple(p.values()), _forces_key(forces)), forces
 
     def integrated(
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool = False
     ) -> NDArray[np.float64]:
         """Return the states of a run, (states, rows), those that forces bring along behind the own ones."""
+        key = (run, tuple(p.values()), _forces_key(forces))
+        if key not in self._states:
+            self._states[key] = self._integrated(run, p, forces, alone=alone)
+        return self._states[key]
+
+    def _integrated(
+        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool
+    ) -> NDArray[np.float64]:
         acting = self.forces(forces)
         rate = self.equation.rates(run, dict(p), acting, len(self.states))
         start = self.equation.start(run, p)
@@ -397,7 +393,7 @@ class OdeModel:
         begun = np.concatenate([start, np.zeros(acting.added)])
         try:
             with silenced():
-                atol = self._tolerance(start, acting, acting.added)
+                atol = self.tolerance(start, acting, acting.added)
                 x = integrate(rate, run.t, begun, atol, acting.slides(len(self.states)))
         except IntegrationError as error:
             raise failed(self.case, run, f"the integration ended early: {error}") from error
@@ -406,7 +402,7 @@ class OdeModel:
         self._near[run] = x[: len(self.states)]
         return x
 
-    def _tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
+    def tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
         """Return the absolute tolerance of every state, ``added`` ones among them."""
         if not self.scale:
             return 0.01 * ATOL * np.maximum(np.abs(start), 1.0)
@@ -488,6 +484,10 @@ def handlers(case: Case) -> Handlers:
 
 def _loaded(case: Case) -> OdeModel:
     return OdeModel(case, *load_functions(case.file(), "rhs", "outputs", "initial"))
+
+
+def _forces_key(forces: Sequence[AppliedEffect]) -> tuple[Any, ...]:
+    return tuple((force.effect.name, force.channel, tuple(force.values.values())) for force in forces)
 
 
 def _between_rows(applied: AppliedEffect) -> bool:

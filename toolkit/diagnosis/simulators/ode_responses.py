@@ -46,6 +46,10 @@ class IntegratedModel(Protocol):
         """Return effects as forces on the equation's states."""
         ...
 
+    def tolerance(self, start: Array, acting: Forces, added: int) -> Array:
+        """Return the absolute tolerance of every state, ``added`` ones among them."""
+        ...
+
     def integrated(self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect]) -> Array:
         """Return the states of a run, (states, rows)."""
         ...

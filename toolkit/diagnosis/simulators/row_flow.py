@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.simulators.columnwise import Columnwise
     from toolkit.diagnosis.simulators.forces import Acting, ForcesTogether
-    from toolkit.diagnosis.simulators.sliding_friction import Bristles
+    from toolkit.diagnosis.simulators.sliding_friction import Held
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]
@@ -135,12 +135,14 @@ class RowFlow:
         h = (self.rows.t[places + 1] - self.rows.t[places]) / count
         worst, first = np.zeros(y.shape[1]), rates(0.0, y)
         for i in range(count):
-            on = bristles.moving(y)
+            free = np.zeros(y.shape[1], dtype=bool)
             while True:
-                z, last, share, turned = stepped(rates, y, first, h, i / count, 1 / count, atol, bristles, on)
-                if not any(turns.any() for turns in turned):
+                held = bristles.held(y, first, free)
+                z, last, share = stepped(rates, y, first, h, i / count, 1 / count, atol, held)
+                if not any(slide.turned.any() for slide in held.slides):
                     break
-                on = [moving & ~turns for moving, turns in zip(on, turned, strict=True)]
+                for slide in held.slides:
+                    free[slide.leads] |= slide.turned
             y, first = z, last
             np.maximum(worst, share, out=worst)
         return y, worst
@@ -154,31 +156,29 @@ def stepped(
     w: float | Array,
     width: float | Array,
     atol: Array,
-    bristles: Bristles,
-    on: Sequence[NDArray[np.bool_]],
-) -> tuple[Array, Array, Array, list[NDArray[np.bool_]]]:
-    """Return state and rate after a step, its error as a share of what is allowed, and what has turned.
+    held: Held,
+) -> tuple[Array, Array, Array]:
+    """Return state and rate after a step, and its error as a share of what is allowed.
 
     Parameters
     ----------
     y, first : states and their rates at its beginning, (states, columns)
     h : its length [s], (columns,)
     w, width : where it begins, and its length, as shares of the way from row to row
-    on : of every bristle, in which of its columns the bend follows from the way
+    held : the bends of bristles, which note where a body turns
     """
     k = np.empty((7, y.size))
     k[0] = first.ravel()
-    turned = [np.zeros_like(moving) for moving in on]
     for j, (c, row) in enumerate(zip(C, _ROWS, strict=True), start=1):
         z = y + h * (row @ k[:j]).reshape(y.shape)
-        bristles.hold(y, z, on, turned)
+        held.set(z, c * h)
         k[j] = rates(w + c * width, z).ravel()
     z = y + h * (_WEIGHTS @ k[:6]).reshape(y.shape)
-    bristles.hold(y, z, on, turned)
+    held.set(z, h)
     k[6] = rates(w + width, z).ravel()
     share = h * (_ERROR @ k).reshape(y.shape) / (atol + RTOL * np.maximum(np.abs(y), np.abs(z)))
-    bristles.known(share, on)
-    return z, k[6].reshape(y.shape), np.sqrt(np.mean(share**2, axis=0)), turned
+    held.known(share)
+    return z, k[6].reshape(y.shape), np.sqrt(np.mean(share**2, axis=0))
 
 
 def finer(steps: Places, errors: Array) -> Places:

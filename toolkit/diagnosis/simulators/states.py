@@ -15,6 +15,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.setting import SPEEDS, dimension
 from toolkit.effects.catalogue import effects
+from toolkit.errors import ConfigError
 from toolkit.units import unit, units_alike
 
 if TYPE_CHECKING:
@@ -149,3 +150,27 @@ def _motions(
         return list(states)
     # Beside states of another kind, one of which nothing is known is of theirs.
     return [i for i in states if i in pairs or meanings.get(i) in allowed]
+
+
+def state_names(case: Case, count: int) -> tuple[str, ...]:
+    """Return the names of an equation's states, of which ``count`` have initial values.
+
+    Raises
+    ------
+    ConfigError
+        ``case``: there are not as many, or a force term names none of them
+    """
+    names = case.simulation.states or tuple(f"x{i}" for i in range(count))
+    if len(names) != count:
+        raise ConfigError(
+            "states and initial do not agree", where=f"{case.path}: simulation.states",
+            got=f"{len(names)} names, {count} initial values", expected="one name for each",
+            next_step="correct the list of states", rule="case",
+        )  # fmt: skip
+    unknown = [name for name in dict(case.simulation.force_terms) if name not in names]
+    if unknown:
+        raise ConfigError(
+            "a force term names no state", where=f"{case.path}: simulation.force_terms",
+            got=", ".join(unknown), expected=", ".join(names), next_step="correct the name", rule="case",
+        )  # fmt: skip
+    return names
