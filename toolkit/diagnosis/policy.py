@@ -441,6 +441,7 @@ class _Laws:
     knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
     times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")
+    lines_beside: int = _set(6, "lines on each side", "whose amplitudes tell the noise of a tone")
     ends: int = _set(81, "times of a run", "between which an event in an equation may begin and end")
     apart: float = _set(1e-12, "of a response", "squared, of two steps in an equation: less is rounding")
     columns: int = _set(4_000_000, "numbers of a response", "of laws in an equation propagated together")
@@ -452,6 +453,7 @@ class _Laws:
     event_least: int = _set(5, "rows", "fewer are single values far off, not an event")
     event_most: float = _set(0.6, "of a run", "what lasts longer is no event but the run's own zero")
     alike: float = _set(0.5, "of a response", "left beside a known effect's, above which it is not like it")
+    tried: int = _set(5, "known effects", "fitted to a law's response, of those nearest in proportion")
     resembling: int = _set(3, "known effects", "that a law is told to be like, the nearest first")
 
 

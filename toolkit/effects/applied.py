@@ -127,7 +127,7 @@ class AppliedEffect:
 
         The share is a limit to both sides and nothing is known between them: GUM (JCGM 100) 4.3.7.
         """
-        if parameter.off is None:
+        if parameter.off is None or not math.isfinite(parameter.off):
             return 0.0
         size = abs(self.values[parameter.name] - parameter.off)
         share = self.effect.form_error if self.effect.size_error is None else self.effect.size_error

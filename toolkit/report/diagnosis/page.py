@@ -266,8 +266,7 @@ def _law(law: DiagnosedLaw) -> _Law:
     if law.confounded_with:
         notes.append(f"It may be taken for {', '.join(law.confounded_with)}, which moved far because of it.")
     if law.resembles:
-        near = ", ".join(f"{near.name} ({100 * near.distance:.0f} % apart)" for near in law.resembles)
-        notes.append(f"Known effects that are like it, and explain less: {near}.")
+        notes.append(f"It {law.likeness}.")
     return _Law(
         sentence=law.sentence,
         parameters=table(("parameter", "value", "unit", "95 % interval"), rows, numbers=(1,)),
