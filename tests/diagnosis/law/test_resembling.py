@@ -39,7 +39,8 @@ def loaded(seed: int) -> pd.DataFrame:
     ("signal", "text", "values", "like"),
     [
         ("T", "a*{x}", {"a": 0.4}, "thermal_drift"),  # counted from another temperature, of no use to anybody
-        ("L", "a*loop({x}, reach)", {"a": 0.05, "reach": 20.0}, "hysteresis"),
+        ("L", "a*loop({x}, reach)", {"a": -0.05, "reach": 20.0}, "hysteresis"),
+        ("L", "a*loop({x}, reach)", {"a": 0.05, "reach": 20.0}, "hysteresis"),  # turned round
         ("L", "a*{x}**2", {"a": 2e-3}, "nonlinearity"),
         ("T", "a*sin(2*pi*{x}/period)", {"a": 2.0, "period": 0.9}, None),
     ],
@@ -63,4 +64,4 @@ def test_a_law_is_told_to_be_like_the_effect_that_does_the_same(tmp_path, signal
     assert (near[0][0] if near else None) == like
     assert all(0 <= distance < 0.5 for _, distance in near)
     if like is not None:
-        assert near[0][1] < 0.1
+        assert near[0][1] < 0.2  # one operator for a loop, where the effect has several side by side

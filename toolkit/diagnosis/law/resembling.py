@@ -86,10 +86,21 @@ def _likely(
         left = float(np.sum((added - columns @ solution) ** 2))
         name = trial.active.effect.name
         if name not in best or left < best[name][0]:
-            reached = trial.valued(solution.tolist()) or trial.active
-            best[name] = (left, replace(trial, active=reached))
+            best[name] = (left, replace(trial, active=_of_either_sign(trial.reached(solution.tolist()))))
     ranked = sorted(best.values(), key=lambda entry: entry[0])
     return [trial for _, trial in ranked[: LAWS.tried]]
+
+
+def _of_either_sign(applied: AppliedEffect) -> AppliedEffect:
+    """Return an effect that may be turned round: a loop run the other way is like a loop."""
+    effect = applied.effect
+    parameters = tuple(
+        replace(parameter, bounds=(-parameter.bounds[1], parameter.bounds[1]))
+        if parameter.off == parameter.bounds[0] == 0.0 and parameter.unit != "s"
+        else parameter
+        for parameter in effect.parameters
+    )
+    return replace(applied, effect=replace(effect, parameters=parameters))
 
 
 def _away(problem: Problem, screen: LinearisedFit, columns: Stacked) -> NDArray[np.float64]:

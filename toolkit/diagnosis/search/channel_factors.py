@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.search.forward_step import Step
     from toolkit.effects.effect import Effect
 
-_ANY = (1e-4, 1e4)  # a factor that may be a unit's
-
 
 def is_ratio(effect: Effect) -> bool:
     """Tell whether an effect is one factor out of a list of ratios."""
@@ -56,7 +54,8 @@ def free_factor(like: AppliedEffect, factor: float) -> AppliedEffect:
     effect = next(each for each in effects().values() if _is_factor(each) and not each.discrete)
     facts, (parameter,) = effect.on_channel, effect.parameters
     off = 0.0 if facts is None else facts.proportion or 0.0
-    wide = replace(parameter, bounds=(_ANY[0] - off, _ANY[1] - off))
+    most = UNITS.farthest**2
+    wide = replace(parameter, bounds=(1 / most - off, most - off))
     origin = {ORIGIN: like.values[ORIGIN]} if ORIGIN in like.values else {}
     return replace(
         like,
@@ -111,8 +110,8 @@ def _reach() -> float:
 
 def _by_chance(ratio: float, factor: float, sd: float, ratios: Sequence[float]) -> float:
     """Return how many ratios are as near to a factor by chance; ``sd`` is the factor's relative one."""
-    within = sum(1 / UNITS.decade < each / factor < UNITS.decade for each in ratios)
-    density = within / (2 * math.log(UNITS.decade))
+    within = sum(1 / UNITS.farthest < each / factor < UNITS.farthest for each in ratios)
+    density = within / (2 * math.log(UNITS.farthest))
     off = math.log(factor / ratio) / sd
     return density * sd * math.sqrt(2 * math.pi) * math.exp(min(off**2 / 2, 700.0))
 
