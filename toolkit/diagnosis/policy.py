@@ -165,12 +165,8 @@ class _Averages:
     missed: float = _set(
         0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
     )
-    everywhere: float = _set(
-        0.3, "of an input's differences", "that their median shows: of noise 1, of steps 0"
-    )
-    of_inputs: float = _set(
-        0.5, "of what is not followed", "at least goes with an input's noise, or is physics"
-    )
+    everywhere: float = _set(0.3, "of an input's differences", "their median: of noise 1, of steps nothing")
+    of_inputs: float = _set(0.5, "of what is not followed", "goes with an input's noise, or it is physics")
     jitter: float = _set(0.1, "of the usual step", "rows further apart than that are no series")
     jittering: float = _set(0.01, "of all steps", "a clock stumbles now and then")
 
@@ -297,17 +293,12 @@ class _Units:
     gross: float = _set(0.5, "of an output's spread", "as declared: units are off by more, no calibration is")
     left: float = _set(0.2, "of the mean square", "by the right unit, its parameters still to be refitted")
     most: int = _set(4, "units", "the best: a wrong input and a wrong output often do the same")
-    farthest: float = _set(
-        100.0, "times, or a share", "where free factors are looked for, and ratios counted"
-    )
+    farthest: float = _set(100.0, "times, or a share", "where factors are looked for, and ratios counted")
     steps: int = _set(13, "factors", "each twice the one before: the joint fit goes on from the best")
     least: float = _set(1.25, "times, or a share", "a factor nearer to one is a calibration's and no unit's")
     chance: float = _set(0.2, "ratios", "as near to a factor by chance: with more the unit is one of many")
-    near: float = _set(
-        2.0, "times the sensor's noise", "left beside an exact factor: beside more it is a guess"
-    )
+    near: float = _set(2.0, "times the sensor's noise", "left beside an exact factor: else it is a guess")
     told: float = _set(0.02, "of a ratio", "by which a law's factor may miss it and be told as a unit")
-    vague: float = _set(1.25, "times its lower end", "a wider interval holds the ratio of some units")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -438,7 +429,6 @@ class _Laws:
     knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
     times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")
-    lines_beside: int = _set(6, "lines on each side", "whose amplitudes tell the noise of a tone")
     ends: int = _set(81, "times of a run", "between which an event in an equation may begin and end")
     apart: float = _set(1e-12, "of a response", "squared, of two steps in an equation: less is rounding")
     columns: int = _set(4_000_000, "numbers of a response", "of laws in an equation propagated together")
@@ -450,7 +440,6 @@ class _Laws:
     event_least: int = _set(5, "rows", "fewer are single values far off, not an event")
     event_most: float = _set(0.6, "of a run", "what lasts longer is no event but the run's own zero")
     alike: float = _set(0.5, "of a response", "left beside a known effect's, above which it is not like it")
-    tried: int = _set(5, "known effects", "fitted to a law's response, of those nearest in proportion")
     resembling: int = _set(3, "known effects", "that a law is told to be like, the nearest first")
 
 

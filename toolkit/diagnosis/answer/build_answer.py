@@ -188,7 +188,7 @@ def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
             if factor <= 0:
                 continue
             low, high = min(low, factor / (1 + UNITS.told)), max(high, factor * (1 + UNITS.told))
-            if not low > 0 or high > low * UNITS.vague:
+            if not low > 0 or high > low * UNITS.least:
                 continue
             for name in (law.place.channel, *(driver.name for driver in problem.case.drivers)):
                 text = channel_unit(problem.case, problem.model, name)

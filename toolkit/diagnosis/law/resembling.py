@@ -88,7 +88,7 @@ def _likely(
         if name not in best or left < best[name][0]:
             best[name] = (left, replace(trial, active=_of_either_sign(trial.reached(solution.tolist()))))
     ranked = sorted(best.values(), key=lambda entry: entry[0])
-    return [trial for _, trial in ranked[: LAWS.tried]]
+    return [trial for _, trial in ranked[: LAWS.fitted]]
 
 
 def _of_either_sign(applied: AppliedEffect) -> AppliedEffect:

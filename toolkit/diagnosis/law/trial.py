@@ -264,7 +264,7 @@ def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
     frequency = _strongest(runs, near)
     frequency = _strongest(runs, frequency + np.linspace(-1, 1, LAWS.tones) * (near[1] - near[0]))
     amplitudes_of, left = _waves(runs, frequency)
-    lines = [k for k in range(-LAWS.lines_beside, LAWS.lines_beside + 1) if abs(k) > 1]
+    lines = [k for k in range(-STRUCTURE.line_around, STRUCTURE.line_around + 1) if abs(k) > 1]
     beside = [
         _waves(left, frequency + k / longest)[0] for k in lines if frequency + k / longest > 1 / longest
     ]
