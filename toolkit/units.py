@@ -332,14 +332,14 @@ def unit_examples(text: str) -> tuple[str, ...]:
     return tuple(name for name, parts in _EXACT.items() if parts[3] == dimension)
 
 
-# Units in which people record, beside those of the machine's own files: a number in one, taken for another of
-# its dimension, is off by their ratio.
-_RECORDED_IN = (
+RECORDED_IN = (
     *_EXACT, "kgf", "MN", "lbf*in", "kgf*m", "kN*m", "N*mm", "µV/V", "g", "kg", "cm", "µm", "km", "inch",
     "ft", "min", "h", "µs", "mph", "cm/s", "mm/s", "cm/s^2", "m/s^2", "standard_gravity", "MPa", "mbar",
     "hPa", "atm", "mmHg", "mV", "V", "kV", "mA", "A", "mW", "W", "kW", "turn", "mrad", "%", "rad/s", "rpm",
     "ml", "liter", "m^3", "l/min", "m^3/h",
 )  # fmt: skip
+"""Units in which people record, those of the machine's own files first: a number in one that is taken for
+another of its dimension is off by their ratio."""
 _SAME_RATIO = 0.01
 
 
@@ -350,7 +350,7 @@ def units_alike(text: str) -> tuple[str, ...]:
     ('Pa', 'kPa', 'bar', 'psi', 'MPa', 'mbar', 'hPa', 'atm', 'mmHg')
     """
     dimension = unit(text).dimension
-    return tuple(name for name in _RECORDED_IN if unit(name).dimension == dimension)
+    return tuple(name for name in RECORDED_IN if unit(name).dimension == dimension)
 
 
 def ratio_of_units(ratio: float, text: str) -> str | None:

@@ -24,3 +24,9 @@ def test_a_factor_counts_from_where_it_does_nothing():
 def test_an_exact_law_leaves_nothing_open():
     offset = AppliedEffect(effect=effect("zero_offset"), channel="FY", values={"offset": 5.0})
     assert offset.form_uncertainty(offset.searched[0]) == 0.0
+
+
+@pytest.mark.parametrize(("name", "uncertain"), [("saturation", 0.0), ("overflow", math.inf)])
+def test_a_limit_of_a_sensor_has_no_uncertainty_of_its_form_and_that_of_a_state_has_no_bound(name, uncertain):
+    applied = AppliedEffect(effect=effect(name), channel="U", values={"level": 0.7, "share": 0.0})
+    assert applied.form_uncertainty(applied.effect.parameter("level")) == uncertain

@@ -48,8 +48,8 @@ class Case:
     def recorded_range(self, *_names):
         return 3.0
 
-    def dimension(self):
-        return "force"
+    def unit(self):
+        return "N"
 
     def conditions(self, _key):
         return frozenset({"normal"})

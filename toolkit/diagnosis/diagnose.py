@@ -15,7 +15,14 @@ from toolkit.diagnosis.answer.failed_runs import FailedRuns
 from toolkit.diagnosis.answer.naming import mostly_unknown
 from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.fit.averages import averages_findings, is_smooth, of_kept_rows, rows_averaged
+from toolkit.diagnosis.fit.averages import (
+    averages_findings,
+    is_smooth,
+    moved_by_inputs,
+    noisy_inputs,
+    of_kept_rows,
+    rows_averaged,
+)
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
 from toolkit.diagnosis.law.foretelling import before_nothing
@@ -158,7 +165,7 @@ def _of_means(
     if rows == 1:
         return None
     whole = of_kept_rows(problem, rows)
-    even, means = smoothed(whole, rows), averaged(whole, rows)
+    even, means = smoothed(whole, rows, noisy_inputs(problem.case)), averaged(whole, rows)
     if code is not None:
         code.learn((*whole.runs, *even.runs))
     build = budget.guarded(model_of)
@@ -168,7 +175,8 @@ def _of_means(
         as_recorded, as_smooth = (each.simulate(_values(each), ()) for each in (of_rows, steady))
     except FitError:  # it does not take inputs between those that were recorded
         return None
-    if not is_smooth(of_rows, as_recorded, as_smooth, rows):
+    shown = moved_by_inputs(of_rows, as_recorded, as_smooth, rows)
+    if not (shown and is_smooth(of_rows, as_recorded, as_smooth, rows)):
         return None
     told = averages_findings(problem.case, rows)
     return _posed(means, MeansOf(plain, smooth, (whole, even, means), rows), budget), told

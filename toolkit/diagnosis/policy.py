@@ -165,6 +165,8 @@ class _Averages:
     missed: float = _set(
         0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
     )
+    everywhere: float = _set(0.3, "of an input's differences", "their median: of noise 1, of steps nothing")
+    of_inputs: float = _set(0.5, "of what is not followed", "goes with an input's noise, or it is physics")
     jitter: float = _set(0.1, "of the usual step", "rows further apart than that are no series")
     jittering: float = _set(0.01, "of all steps", "a clock stumbles now and then")
 
@@ -291,8 +293,12 @@ class _Units:
     gross: float = _set(0.5, "of an output's spread", "as declared: units are off by more, no calibration is")
     left: float = _set(0.2, "of the mean square", "by the right unit, its parameters still to be refitted")
     most: int = _set(4, "units", "the best: a wrong input and a wrong output often do the same")
+    farthest: float = _set(100.0, "times, or a share", "where factors are looked for, and ratios counted")
+    steps: int = _set(13, "factors", "each twice the one before: the joint fit goes on from the best")
+    least: float = _set(1.25, "times, or a share", "a factor nearer to one is a calibration's and no unit's")
+    chance: float = _set(0.2, "ratios", "as near to a factor by chance: with more the unit is one of many")
+    near: float = _set(2.0, "times the sensor's noise", "left beside an exact factor: else it is a guess")
     told: float = _set(0.02, "of a ratio", "by which a law's factor may miss it and be told as a unit")
-    vague: float = _set(1.25, "times its lower end", "a wider interval holds the ratio of some units")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -125,10 +125,15 @@ class AppliedEffect:
     def form_uncertainty(self, parameter: EffectParameter) -> float:
         """Return the standard uncertainty of a size whose law may be off by a share of what it does.
 
-        The share is a limit to both sides and nothing is known between them: GUM (JCGM 100) 4.3.7.
+        The share is a limit to both sides and nothing is known between them: GUM (JCGM 100) 4.3.7. A level
+        that a sensor cannot pass is as certain as the clipped rows are. One that a state cannot pass has no
+        bound here: the likelihood has a kink at every row that reaches it, and intervals of its curvature
+        held the truth in 29 of 40 simulated tanks, where 95 % were promised.
         """
         if parameter.off is None:
             return 0.0
+        if not math.isfinite(parameter.off):
+            return 0.0 if self.effect.term is None else math.inf
         size = abs(self.values[parameter.name] - parameter.off)
         share = self.effect.form_error if self.effect.size_error is None else self.effect.size_error
         return share * size / math.sqrt(3)

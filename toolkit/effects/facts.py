@@ -50,8 +50,9 @@ class ChannelFacts:
     into a channel that was recorded disturbed, it must not follow that channel's noise. ``about_zero`` says
     that it depends on where the channel has its zero, which is then the recording's first value where the
     scale has a zero by convention alone. ``between_rows``
-    says that it shows what happened between two rows. ``inverse`` takes it away exactly; without it, a fixed
-    point does.
+    says that it shows what happened between two rows. ``proportion`` says that it is one factor of the
+    channel, and what has to be added to its parameter to give it. ``inverse`` takes it away exactly; without
+    it, a fixed point does.
     """
 
     where: tuple[Where, ...]
@@ -61,6 +62,7 @@ class ChannelFacts:
     about_zero: bool = False
     usual: str | None = None
     between_rows: bool = False
+    proportion: float | None = None
     inverse: InverseHook | None = None
 
     @property

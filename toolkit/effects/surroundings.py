@@ -125,8 +125,8 @@ class Surroundings(Protocol):
         """Return the range of the first of these channels that was recorded, 1 where none was."""
         ...
 
-    def dimension(self) -> str | None:
-        """Return the dimension of the place's channel, None where its unit is not known."""
+    def unit(self) -> str | None:
+        """Return the unit of the place's channel, None where it is not known."""
         ...
 
     def conditions(self, key: str) -> frozenset[str]:

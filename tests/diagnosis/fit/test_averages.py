@@ -14,7 +14,7 @@ from tests.diagnosis.cases import HEAD, write_case
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.fit.averages import is_smooth, rows_averaged
+from toolkit.diagnosis.fit.averages import is_smooth, moved_by_inputs, noisy_inputs, rows_averaged
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.averaged import averaged, smoothed, windows
 from toolkit.diagnosis.simulators.build_simulator import model_of
@@ -96,6 +96,49 @@ def test_an_unsigned_output_is_no_noise_of_the_inputs(tmp_path: Path) -> None:
     assert rows_of(case_of(tmp_path, *(frame.assign(F=frame["F"].abs()) for frame in frames))) == 1
 
 
+CIRCUIT = """
+import numpy as np, pandas as pd
+def simulate(inputs, p):
+    e, y = inputs["v"].to_numpy(), np.zeros(len(inputs))
+    for i in range(1, len(e)):
+        y[i] = e[i] + (y[i - 1] - e[i]) * np.exp(-0.005 / p["c"])
+    return pd.DataFrame({"F": y + 0 * p["mass"] * inputs["a"]})
+"""
+
+
+@pytest.mark.parametrize("noise_of_input", [0.0, 1e-3])
+def test_an_input_that_moves_by_steps_has_no_noise_whatever_is_missing(
+    tmp_path: Path, noise_of_input: float
+) -> None:
+    """A rectified answer follows the simulation by half: the steps of the input are known to every row."""
+    frames = []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        e = np.repeat(rng.normal(0, 2.0, 60), 12)
+        y = np.zeros(len(e))
+        for i in range(1, len(e)):
+            y[i] = e[i] + (y[i - 1] - e[i]) * np.exp(-0.005 / 0.026)
+        t, F = STEP * np.arange(len(e)), np.abs(y) + rng.normal(0, 0.1, len(e))
+        frames.append(
+            pd.DataFrame({"t": t, "v": e + rng.normal(0, noise_of_input, len(e)), "a": 0 * e, "F": F})
+        )
+    toml = HEAD.replace("value = 210.0", "value = 0.025")
+    assert rows_of(case_of(tmp_path, *frames, toml=toml, simulator=CIRCUIT)) == 1
+
+
+def test_quick_changes_that_stay_without_an_inputs_noise_are_not_its(tmp_path: Path) -> None:
+    """Smooth inputs move a simulation by what the recording lacks: that is physics, which no mean shows."""
+    case = case_of(tmp_path, *(swept(seed) for seed in range(2)))
+    even = smoothed(case, 16, noisy_inputs(case))
+    problem, smooth = (problem_of(each, model_of(each, None)) for each in (case, even))
+    values = [parameter.value for parameter in problem.free]
+    recorded, without_noise = problem.simulate(values, ()), smooth.simulate(values, ())
+    assert moved_by_inputs(problem, recorded, without_noise, 16)
+    ripple = 40 * np.sin(2 * np.pi * 60 * np.arange(problem.rows) * STEP)
+    other = {name: column + ripple for name, column in without_noise.items()}
+    assert not moved_by_inputs(problem, other, without_noise | {"F": other["F"]}, 16)
+
+
 def test_a_case_without_inputs_has_no_noise_of_inputs(tmp_path: Path) -> None:
     frames = [swept(seed).rename(columns={"a": "S"}).drop(columns="v") for seed in range(2)]
     toml = """schema = 1
@@ -157,7 +200,8 @@ def simulate(inputs, p):
     problem = problem_of(case, model_of(case, None))
     values = [parameter.value for parameter in problem.free]
     simulated = problem.simulate(values, ())
-    smooth = problem_of(smoothed(case, 16), model_of(smoothed(case, 16), None))
+    even = smoothed(case, 16, ("v", "a"))
+    smooth = problem_of(even, model_of(even, None))
     assert not is_smooth(problem, simulated, smooth.simulate(values, ()), 16)
 
 

@@ -116,3 +116,71 @@ def test_an_input_that_lost_its_sign_is_named_though_it_drives_little_of_the_out
         runs[f"r{seed}__csv"] = frame
     answer = diagnose(read_case(write_case(tmp_path, HEAD, simulator=simulator, **runs)), None).diagnosis
     assert [(effect.name, effect.key.channel) for effect in answer.effects] == [("channel_sign", "x")]
+
+
+BASIN = """
+def simulate(inputs, p):
+    import pandas as pd
+    return pd.DataFrame({"h": p["k"] * inputs["q"] / (1 + 0.1 * inputs["q"])})
+"""
+INFLOW = case_text(
+    "python", parameters={"k": (2.0, "cm*min/l", 0.01)}, inputs={"q": "l/min"}, outputs={"h": "cm"}, runs=3
+)
+
+
+def basin(seed: int, factor: float) -> pd.DataFrame:
+    """Return the level over the inflow, which is recorded too large by a factor."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(60) * 0.5
+    q = rng.uniform(2.0, 12.0, 60)
+    return pd.DataFrame({"t": t, "q": q * factor, "h": 2 * q / (1 + 0.1 * q) + rng.normal(0, 0.05, 60)})
+
+
+def test_a_factor_of_an_input_that_is_no_ratio_of_units_is_told_with_its_interval(tmp_path):
+    """Pounds of water for litres: no list of volume flows has it, and the level meets a ratio near."""
+    runs = {f"r{seed}__csv": basin(seed, 2.2046226) for seed in range(3)}
+    answer = diagnose(read_case(write_case(tmp_path, INFLOW, simulator=BASIN, **runs)), None).diagnosis
+    (effect,) = answer.effects
+    assert (effect.name, effect.key.channel) == ("sensitivity_error", "q")
+    (gain,) = effect.parameters
+    low, high = gain.ci95
+    assert low < 1.2046226 < high < low + 0.1
+    assert any("off by a factor" in text for text in answer.next_measurements)
+
+
+@pytest.mark.parametrize(
+    ("noise", "left", "structured", "named"),
+    [
+        (0.05, 0.0, True, True),  # narrow, and nothing but the sensor's noise is left
+        (0.05, 0.0, False, True),
+        (5.0, 0.0, False, False),  # so wide that several ratios are in it
+        (0.05, 1.0, True, False),  # structure is left: an exact factor would be a guess
+    ],
+)
+def test_a_unit_is_named_where_its_factor_is_certain_and_nothing_else_is_left(
+    tmp_path, noise, left, structured, named
+):
+    from toolkit.diagnosis.fit.fit import fit
+    from toolkit.diagnosis.fit.folds import folds_of, hold_out
+    from toolkit.diagnosis.fit.problem import problem_of
+    from toolkit.diagnosis.search.channel_factors import factor_of, free_factor, with_units_judged
+    from toolkit.diagnosis.search.forward_step import Step
+    from toolkit.diagnosis.simulators.build_simulator import model_of
+    from toolkit.effects.applied import AppliedEffect
+    from toolkit.effects.catalogue import effects
+
+    rng = np.random.default_rng(5)
+    frames = {f"r{seed}__csv": basin(seed, 1000 / 60) for seed in range(3)}
+    for frame in frames.values():
+        frame["h"] += left * np.sin(0.3 * frame["t"]) + rng.normal(0, noise, len(frame))
+    case = read_case(write_case(tmp_path, INFLOW, simulator=BASIN, **frames))
+    problem = problem_of(case, model_of(case, None))
+    place = AppliedEffect(effect=effects()["unit_error"], channel="q", values={"factor": 16.0})
+    made = fit(problem, (free_factor(place, 16.0),))
+    folds = folds_of(problem, made)
+    step = Step(active=made.active[0], p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=())
+    held = hold_out(problem, folds, made.active, made)
+    _, _, (judged,) = with_units_judged(problem, folds, made, held, [step], structured=structured)
+    assert judged.active.effect.name == ("unit_error" if named else "sensitivity_error")
+    if named:
+        assert factor_of(judged.active) == pytest.approx(1000 / 60, rel=1e-12)

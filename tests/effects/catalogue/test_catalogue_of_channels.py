@@ -7,7 +7,7 @@ import pytest
 
 from tests.effects.rig import setting
 from toolkit.effects.catalogue import effect
-from toolkit.effects.catalogue.unit_error import factors, factors_for
+from toolkit.effects.catalogue.unit_error import factors
 from toolkit.units import unit
 
 T = np.linspace(0.0, 20.0, 4001)
@@ -143,8 +143,8 @@ def test_factors_of_confused_units_are_ratios_of_units():
         assert factor == pytest.approx(unit(taken).factor / unit(true).factor, rel=1e-9), text
 
 
-def test_a_unit_is_taken_for_one_of_its_own_dimension():
-    force = factors_for("force")
-    assert 4.4482216152605 in force
-    assert all(abs(one - 57.29577951308232) > 1e-6 for one in force)
-    assert set(factors_for("no dimension of the field")) == {1000.0, 0.001}
+def test_every_unit_of_the_one_list_may_be_taken_for_another_of_its_dimension():
+    named = factors()
+    assert named["lbf read as N"] == pytest.approx(1 / 4.4482216152605)
+    assert named["l/min read as m^3/h"] == pytest.approx(1000 / 60)
+    assert not any("degC" in text or "N read as N*m" in text for text in named)

@@ -193,6 +193,12 @@ class DiagnosedLaw:
         explains_alone = self.evidence.held_out_log_score_gain is None
         return f"{text}; it explains, not predicts" if explains_alone else text
 
+    @property
+    def likeness(self) -> str:
+        """Which known effects it is like, for people; nothing where it is like none."""
+        near = ", ".join(f"{each.name} ({each.distance:.2f})" for each in self.resembles)
+        return f"resembles {near}: 0 is the same, 1 nothing alike" if near else ""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NominalParameter:

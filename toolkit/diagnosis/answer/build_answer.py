@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -32,11 +33,12 @@ from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.answer.refit_findings import confounded_findings, refit_findings
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.policy import PRIORS, SCREENING, UNITS, VERDICT
+from toolkit.diagnosis.search.channel_factors import factor_of, is_ratio
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
-from toolkit.diagnosis.simulators.unit_ratios import near_ratio
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
+from toolkit.effects.unit_ratios import near_ratio
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -95,7 +97,11 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
             alpha=SCREENING.alpha / tests,
             units=units,
         ),
-        next_measurements=(*_unit_hints(search, laws), *next_measurements(search, effects, verdict)),
+        next_measurements=(
+            *_factor_hints(search, effects),
+            *_unit_hints(search, laws),
+            *next_measurements(search, effects, verdict),
+        ),
         findings=(
             *findings,
             *_outliers(case, search),
@@ -138,7 +144,7 @@ def _effect(search: Search, step: Step) -> DiagnosedEffect:
         name=active.key.name,
         stage=active.effect.stage,
         channel=active.key.channel,
-        statement=_statement(problem, active) + ("" if runs is None else f" In {_listed(runs)} alone."),
+        statement=_statement(problem, step) + ("" if runs is None else f" In {_listed(runs)} alone."),
         equation=active.effect.equation + _counted_from(problem, active),
         reference=active.effect.reference,
         parameters=(*_parameters(search, active, runs), *_named(active, runs)),
@@ -149,6 +155,24 @@ def _effect(search: Search, step: Step) -> DiagnosedEffect:
         ),
         evidence=EffectEvidence(held_out_log_score_gain=step.held_out_gain, p_value=step.p_value),
     )
+
+
+def _factor_hints(search: Search, effects: Sequence[DiagnosedEffect]) -> tuple[str, ...]:
+    """Return sentences where a channel is off by a factor that no calibration misses by."""
+    problem, told = search.problem, {(effect.name, effect.channel) for effect in effects}
+    hints = []
+    for active in (step.active for step in search.steps):
+        if is_ratio(active.effect) or not active.effect.needs_signal:
+            continue
+        if (active.key.name, active.key.channel) in told:
+            name, factor = str(active.channel), factor_of(active)
+            text = channel_unit(problem.case, problem.model, name)
+            near = near_ratio(factor / (1 + UNITS.told), factor * (1 + UNITS.told), text)
+            unit = "" if near is None else f"; {near} is near it"
+            hints.append(
+                f"Check unit, range and gain of {name}: it is off by a factor of {factor:.4g}{unit}."
+            )
+    return tuple(hints)
 
 
 def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
@@ -164,7 +188,7 @@ def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
             if factor <= 0:
                 continue
             low, high = min(low, factor / (1 + UNITS.told)), max(high, factor * (1 + UNITS.told))
-            if not low > 0 or high > low * UNITS.vague:
+            if not low > 0 or high > low * UNITS.least:
                 continue
             for name in (law.place.channel, *(driver.name for driver in problem.case.drivers)):
                 text = channel_unit(problem.case, problem.model, name)
@@ -177,14 +201,23 @@ def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
     return tuple(dict.fromkeys(hints))[:2]
 
 
-def _statement(problem: Problem, active: AppliedEffect) -> str:
+def _statement(problem: Problem, step: Step) -> str:
     """Return what an effect is; of a ratio of units also of which."""
-    effect = active.effect
-    if not effect.needs_signal or not effect.names:
-        return effect.statement
-    ratio = active.values[effect.names[0]]
-    text = near_ratio(ratio, ratio, channel_unit(problem.case, problem.model, active.channel))
-    return effect.statement if text is None else f"{effect.statement.removesuffix('.')}: {text}."
+    statement = step.active.effect.statement
+    if is_ratio(step.active.effect):
+        ratio = factor_of(step.active)
+        text = near_ratio(ratio, ratio, channel_unit(problem.case, problem.model, step.active.channel))
+        statement = statement if text is None else f"{statement.removesuffix('.')}: {text}."
+    others = [
+        str(rival.active.channel)
+        for rival in step.rivals
+        if rival.difference > -VERDICT.close
+        and rival.active.effect.name == step.active.effect.name
+        and rival.active.channel != step.active.channel
+    ]
+    if others:
+        statement += f" The same of {_listed(tuple(dict.fromkeys(others)))} would explain as much."
+    return statement
 
 
 def _counted_from(problem: Problem, active: AppliedEffect) -> str:

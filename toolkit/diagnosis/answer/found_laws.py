@@ -48,7 +48,7 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
     trial = law.trial
     same = (applied for applied in search.augmented.active if applied.key == law.applied.key)
     fitted = next(same, law.applied)
-    covariance = _covariance(search, fitted)
+    covariance = _covariance(search, law, fitted)
     reach = _quantile(search) * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     # In an equation a law stands as what resists; an answer has what is added to the rate.
     turned = amplitudes(fitted) if trial.acts == "enters" else ()
@@ -99,11 +99,11 @@ def _memory(fitted: AppliedEffect) -> float | None:
     return None
 
 
-def _covariance(search: Search, fitted: AppliedEffect) -> NDArray[np.float64]:
+def _covariance(search: Search, law: Law, fitted: AppliedEffect) -> NDArray[np.float64]:
     """Return the covariance of a law's parameters, in their units."""
     augmented, at = search.augmented, len(search.problem.free)
     if all(applied.key != fitted.key for applied in augmented.active):  # it explains, and is in no fit
-        return np.full((len(fitted.searched), len(fitted.searched)), math.nan)
+        return np.diag([law.trial.sds.get(parameter.name, math.nan) ** 2 for parameter in fitted.searched])
     for applied in augmented.active:
         if applied.key == fitted.key:
             break

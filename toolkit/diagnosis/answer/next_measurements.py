@@ -12,12 +12,13 @@ from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
 
-_OF_CELLS = (None, "force", "moment", "pressure", "bridge_ratio", "voltage", "counts", "ratio")
-"""Dimensions of what strain gauges read; None, of a unit that is not known, may be one."""
+_OF_CELLS = ("force", "moment", "pressure", "bridge_ratio", "voltage", "count", "ratio")
+"""Dimensions of what strain gauges read; of a unit that is not known it may be one."""
 
 # Classes of effects that a recording cannot tell apart, and the measurement that would.
 
@@ -81,14 +82,17 @@ def outsized(search: Search) -> bool:
     """Tell whether a law of a cell stands with a size that no cell has: something else bends the answer.
 
     Asked of what acts by the value that a cell carries, on what a cell can read: an iron's loop is no cell's.
-    A zero may be any, where nobody tared.
+    A zero may be any, where nobody tared, and a factor that was found as units are, as far from one.
     """
     for active in (step.active for step in search.steps):
         by_value = active.effect.on_channel is not None and active.effect.on_channel.by_value
-        if active.effect.stage != "load_cells" or not by_value:
+        if active.effect.stage != "load_cells" or not by_value or active.effect.needs_signal:
             continue
         view = CaseView(search.problem, active.channel, active.source)
-        if view.dimension() in _OF_CELLS and active.is_unusual(view, log_density=PRIORS.within**2 / 2):
+        text = view.unit()
+        if (text is None or unit(text).dimension in _OF_CELLS) and active.is_unusual(
+            view, log_density=PRIORS.within**2 / 2
+        ):
             return True
     return False
 

@@ -90,10 +90,8 @@ def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:
     for parameter, refitted, augmented in zip(
         search.problem.free, search.refitted.p, search.augmented.p, strict=True
     ):
-        shifts = {
-            fit: (value - parameter.value) / (parameter.sd or 1.0)
-            for fit, value in (("refitted", refitted), ("with the effects", augmented))
-        }
+        values = {"refitted": refitted} | ({"with the effects": augmented} if search.steps else {})
+        shifts = {fit: (value - parameter.value) / (parameter.sd or 1.0) for fit, value in values.items()}
         ends = [f"{shift:+.1f} sd {fit}" for fit, shift in shifts.items() if abs(shift) > PRIORS.end]
         if ends:
             findings.append(

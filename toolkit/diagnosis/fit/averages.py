@@ -8,6 +8,10 @@ whitening. Means over some rows keep the slow changes, in which simulation and r
 How much of a slope is left is told by the coherence of both, run by run: a lag, a wrong sign or a wrong gain
 does not lower it, noise of an input does.
 
+Low coherence is also what missing physics looks like. Noise of an input is shown at the input itself: it is
+in its differences from row to row all the time, and not at steps alone; and without it the simulation no
+longer moves by what the recording does not follow.
+
 Source: Bendat and Piersol, Random Data, 4th ed. (2010), 6.1 (noise at the input lowers coherence and slope
 alike) and 9.2 (the bias of coherence, one over the number of windows); Fuller, Measurement Error Models
 (1987), 1.1 (the reliability ratio of a slope).
@@ -24,6 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import layout
+from toolkit.diagnosis.fit.sensor_noise import QUICK, robust_sd
 from toolkit.diagnosis.policy import AVERAGES, NOISE, ROWS
 from toolkit.diagnosis.simulators.averaged import usual_step, windows
 from toolkit.findings import Finding
@@ -69,19 +74,51 @@ def rows_averaged(problem: Problem, simulated: Stacked) -> int:
     simulated : outputs of the simulation as declared, over all runs
     """
     case = problem.case
-    if not (problem.model.capability.averages and case.drivers and case.has_time):
+    if not (problem.model.capability.averages and case.has_time and noisy_inputs(case)):
         return 1
     if not all(map(_is_regular, case.runs)):
         return 1
     if any(_turns(run, channel.name, channel.unit) for run in case.runs for channel in case.drivers):
         return 1
+    octaves = _all_octaves(problem, simulated)
     most = 0
     while sum(len(windows(case, run, 2 ** (most + 1)).rows) for run in long_runs(case, 2 ** (most + 1))) >= (
         AVERAGES.fewest
     ):
         most += 1
-    octaves = [_octaves(problem, name, simulated[name]) for name in problem.names]
-    return int(2 ** max(_first(each, most) for each in octaves))
+    return int(2 ** max(_first(each, most) for each in octaves.values()))
+
+
+def noisy_inputs(case: Case) -> frozenset[str]:
+    """Return inputs and covariates that may carry noise: differences from row to row are as large everywhere.
+
+    The third differences of what is put in by steps are large at the steps alone; of noise their median tells
+    as much as their mean square.
+    """
+    noisy = set()
+    for driver in case.drivers:
+        columns = [run.columns[driver.name] for run in case.runs if driver.name in run.columns]
+        quick = [np.diff(column[np.isfinite(column)], QUICK) for column in columns]
+        differences = np.concatenate(quick or [np.zeros(0)])
+        size = math.sqrt(float(np.mean(differences**2))) if len(differences) else 0.0
+        if size > 0 and robust_sd(differences) > AVERAGES.everywhere * size:
+            noisy.add(driver.name)
+    return frozenset(noisy)
+
+
+def moved_by_inputs(problem: Problem, simulated: Stacked, smooth: Stacked, rows: int) -> bool:
+    """Tell whether what is averaged away goes from the simulation with the noise of its inputs.
+
+    Parameters
+    ----------
+    simulated, smooth : outputs as declared over all runs, with inputs as recorded, and without their noise
+    """
+    for name, octaves in _all_octaves(problem, simulated).items():
+        away = simulated[name] - smooth[name]
+        foreign = sum(octave.foreign for octave in octaves[: round(math.log2(rows))] if not octave.is_quiet)
+        if foreign > 0 and float(np.nansum(away**2)) > AVERAGES.of_inputs * foreign:
+            return True
+    return False
 
 
 def _first(octaves: Sequence[Octave], most: int) -> int:
@@ -158,6 +195,10 @@ def averages_findings(case: Case, rows: int) -> tuple[Finding, ...]:
     return tuple(
         Finding(rule="case-averaged", where=where, level="note", message=message) for where, message in lines
     )
+
+
+def _all_octaves(problem: Problem, simulated: Stacked) -> dict[str, list[Octave]]:
+    return {name: _octaves(problem, name, simulated[name]) for name in problem.names}
 
 
 def _octaves(problem: Problem, name: str, simulated: NDArray[np.float64]) -> list[Octave]:

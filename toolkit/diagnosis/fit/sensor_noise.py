@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 
 Evidence = Literal["stated", "repeats", "differences", "resolution"]
 
-_ORDER = 3  # of the differences
-_WEIGHT = math.comb(2 * _ORDER, _ORDER)  # variance of a difference of white noise of variance one
+QUICK = 3
+"""Order of the differences from row to row that a sensor's noise is read from."""
+_WEIGHT = math.comb(2 * QUICK, QUICK)  # variance of a difference of white noise of variance one
 _ROBUST = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
 
@@ -111,9 +112,7 @@ def _quick_sd(problem: Problem, column: NDArray[np.float64], name: str) -> float
     where = problem.layout(name)
     values = column[where.index]
     quick = [
-        np.diff(values[segment], _ORDER)
-        for segment in where.segments
-        if segment.stop - segment.start > _ORDER
+        np.diff(values[segment], QUICK) for segment in where.segments if segment.stop - segment.start > QUICK
     ]
     if not quick:
         return math.sqrt(float(np.mean(values**2))) if len(values) else 0.0

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.fit.folds import hold_out, matters
 from toolkit.diagnosis.law.foretelling import taken_for_noise
-from toolkit.diagnosis.law.ranking import p_value, ranked, responses
+from toolkit.diagnosis.law.ranking import p_value, ranked
+from toolkit.diagnosis.law.resembling import resembling
 from toolkit.diagnosis.law.terms import pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
-    amplitudes,
     curve_trial,
     tells_runs_apart_alone,
     trials_of,
@@ -30,7 +30,7 @@ from toolkit.diagnosis.law.unseen_runs import laws_on_unseen_runs
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.bends import at_bound
 from toolkit.diagnosis.search.forward_step import joint_fit
-from toolkit.diagnosis.search.screen import LinearisedFit, best_of
+from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
 
@@ -172,7 +172,7 @@ def _next(
     for events in (False, True):
         entries = [entry for entry in fitted if (entry[1].form == "event") is events]
         for _, trial, refit in _simplest_first(entries)[: LAWS.judged]:
-            law = _judged(search, base, held_out, trial, refit, looked)
+            law = _judged(search, base, held_out, screen, trial, refit, looked)
             if law is not None:
                 return law
     return _by_unseen_runs(search, base, held_out, screen, trials, weight)
@@ -197,7 +197,7 @@ def _by_unseen_runs(
         scores = next(each.held_out for each in shown if each.fit is refit)
         if _told_from_none(refit):
             p = min(1.0, math.exp(-min(gain, 700.0)))
-            return _law(search, base, held_out, trial, refit, scores, p_value=p), refit, scores
+            return _law(search, base, held_out, screen, trial, refit, scores, p_value=p), refit, scores
     return None
 
 
@@ -226,7 +226,13 @@ def _simplest_first(fitted: Sequence[tuple[float, Trial, Fit]]) -> list[tuple[fl
 
 
 def _judged(
-    search: Search, base: Fit, held_out: HeldOut, trial: Trial, refit: Fit, looked: int
+    search: Search,
+    base: Fit,
+    held_out: HeldOut,
+    screen: LinearisedFit,
+    trial: Trial,
+    refit: Fit,
+    looked: int,
 ) -> tuple[Law, Fit, HeldOut] | None:
     problem = search.problem
     applied = refit.active[-1]
@@ -255,12 +261,20 @@ def _judged(
             runs = [tuple(column[at] for column in columns) for at in counting if len(at)]
             if tells_runs_apart_alone(trial, looked, runs):
                 return None
-    law = _law(search, base, held_out, trial, refit, scores, p_value=p_value(trial, looked))
+    law = _law(search, base, held_out, screen, trial, refit, scores, p_value=p_value(trial, looked))
     return law, refit, scores
 
 
 def _law(
-    search: Search, base: Fit, held_out: HeldOut, trial: Trial, refit: Fit, scores: HeldOut, *, p_value: float
+    search: Search,
+    base: Fit,
+    held_out: HeldOut,
+    screen: LinearisedFit,
+    trial: Trial,
+    refit: Fit,
+    scores: HeldOut,
+    *,
+    p_value: float,
 ) -> Law:
     """Return a law that stands; an event's shares are those of the rows that it was fitted to."""
     problem, applied = search.problem, refit.active[-1]
@@ -281,7 +295,7 @@ def _law(
         held_out_gain=None if event else scores.total - held_out.total,
         share=_taken(problem, *errors),
         confounded=tuple(moved),
-        resembles=_resembling(search, base, replace(trial, applied=applied)),
+        resembles=resembling(problem, screen, search.scored, refit, applied),
     )
 
 
@@ -307,25 +321,3 @@ def _taken(problem: Problem, before: dict[str, np.ndarray], after: dict[str, np.
     }
     shares = [1 - left / max(there, 1e-300) for there, left in squares.values()]
     return max(shares, default=0.0)
-
-
-def _resembling(search: Search, base: Fit, trial: Trial) -> tuple[tuple[str, float], ...]:
-    """Return known effects whose responses are like the law's, with what is left of it beside each."""
-    problem = search.problem
-    directions = responses(problem, base, trial)
-    if directions is None:
-        return ()
-    screen = LinearisedFit.of(problem, base)
-    amount = np.array([trial.applied.values[name] for name in amplitudes(trial.applied)])
-    law = {name: columns @ amount[:, None] for name, columns in directions.items()}
-    _, response = screen.quick(law)
-    distances: dict[str, float] = {}
-    for scored in best_of(search.scored):
-        _, block = screen.quick(scored.directions)
-        if not response.shape[1] or not block.shape[1]:
-            continue
-        distance = math.sqrt(max(0.0, 1 - float(np.sum((block.T @ response[:, 0]) ** 2))))
-        name = scored.active.effect.name
-        distances[name] = min(distance, distances.get(name, 1.0))
-    near = sorted(((d, name) for name, d in distances.items() if d < LAWS.alike))
-    return tuple((name, distance) for distance, name in near[: LAWS.resembling])

@@ -32,11 +32,6 @@ if TYPE_CHECKING:
 _LARGEST = 1e100  # of a response: the squares of larger ones are no numbers any more
 
 
-def responses(problem: Problem, base: Fit, trial: Trial) -> Stacked | None:
-    """Return the responses of all outputs to a law, one column for each amplitude; None where it has none."""
-    return next(all_responses(problem, base, [trial]))
-
-
 def all_responses(problem: Problem, base: Fit, trials: Sequence[Trial]) -> Iterator[Stacked | None]:
     """Give the responses to several laws, one after the other: of long recordings all are too much to hold.
 

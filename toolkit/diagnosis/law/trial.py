@@ -72,7 +72,7 @@ class Trial:
     """One law at one place from one start, with its linearised gain of twice the log-likelihood.
 
     ``unit`` is that of what it adds, or of its factor. ``looked`` counts the laws that were looked at to find
-    it: its p-value is among as many.
+    it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
     """
 
     shape: Shape
@@ -82,6 +82,7 @@ class Trial:
     unit: str
     gain: float = 0.0
     looked: int = 1
+    sds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def form(self) -> Form:
@@ -237,32 +238,62 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
 def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
     """Return a tone whose phase differs from run to run, with its mean amplitude; None without a clear one.
 
-    It explains and does not predict: of another run nobody knows the phase.
+    It explains and does not predict: of another run nobody knows the phase. Its frequency and amplitude are
+    as certain as the noise at the frequencies beside it lets them be.
+
+    Source: Rife and Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, the bounds of a tone's variances.
     """
     line = strongest_line(problem, output, base.residual[output])
     if line is None or line.p_value >= STRUCTURE.line or line.share <= STRUCTURE.line_share:
         return None
     if beyond_its_past(problem, output, base.residual[output], line) >= STRUCTURE.line:
         return None
-    longest = max(float(np.ptp(run.t)) for run in problem.runs if run.rows)
-
-    def amplitudes_at(frequency: float) -> Array:
-        listed = []
-        for run, rows in zip(problem.runs, problem.slices, strict=True):
-            good = problem.kept[output][rows]
-            turn = 2 * math.pi * frequency * run.t[good]
-            columns = np.stack([np.sin(turn), np.cos(turn)], axis=1)
-            solution = np.linalg.lstsq(columns, base.residual[output][rows][good], rcond=None)[0]
-            listed.append(float(np.hypot(*solution)))
-        return np.array(listed)
+    good = [problem.kept[output][rows] for rows in problem.slices]
+    runs = [
+        (run.t[kept], base.residual[output][rows][kept])
+        for run, rows, kept in zip(problem.runs, problem.slices, good, strict=True)
+        if kept.any()
+    ]
+    longest = max(float(np.ptp(t)) for t, _ in runs)
 
     # A line is as wide as a run is short: between the frequencies of a spectrum stands the true one.
     near = line.frequency + np.linspace(-1, 1, LAWS.tones) / longest
-    frequency = float(max(near, key=lambda candidate: float(np.sum(amplitudes_at(candidate) ** 2))))
-    amplitudes_of = amplitudes_at(frequency)
+    frequency = _strongest(runs, near)
+    frequency = _strongest(runs, frequency + np.linspace(-1, 1, LAWS.tones) * (near[1] - near[0]))
+    amplitudes_of, left = _waves(runs, frequency)
+    lines = [k for k in range(-STRUCTURE.line_around, STRUCTURE.line_around + 1) if abs(k) > 1]
+    beside = [
+        _waves(left, frequency + k / longest)[0] for k in lines if frequency + k / longest > 1 / longest
+    ]
+    rows_of = np.array([len(t) for t, _ in runs])
+    noise = float(np.mean(np.stack(beside) ** 2 * rows_of / 4))
+    lengths = np.array([np.ptp(t) for t, _ in runs])
+    told = float(np.sum(amplitudes_of**2 * rows_of * lengths**2)) * (2 * math.pi) ** 2 / (24 * noise)
+    sds = {
+        "a": math.sqrt(float(np.sum(2 * noise / rows_of))) / len(runs), "frequency": 1 / math.sqrt(told)
+    }  # fmt: skip
     time = signals_of(problem, base, output)[-1:]
     start = {"a": float(np.mean(amplitudes_of)), "frequency": frequency, "phase": math.nan}
-    return replace(trial_at(problem, UNLOCKED, time, "adds", output, start), gain=line.share)
+    return replace(trial_at(problem, UNLOCKED, time, "adds", output, start), gain=line.share, sds=sds)
+
+
+def _strongest(runs: Sequence[tuple[Array, Array]], frequencies: Array) -> float:
+    """Return at which of some frequencies waves with a phase of their own in each run take most."""
+    return float(max(frequencies, key=lambda each: float(np.sum(_waves(runs, each)[0] ** 2))))
+
+
+def _waves(
+    runs: Sequence[tuple[Array, Array]], frequency: float
+) -> tuple[Array, tuple[tuple[Array, Array], ...]]:
+    """Return a frequency's amplitude in each run of (times, values), (runs,), and the runs without it."""
+    amplitudes_of, left = [], []
+    for t, values in runs:
+        turn = 2 * math.pi * frequency * t
+        columns = np.stack([np.sin(turn), np.cos(turn)], axis=1)
+        solution = np.linalg.lstsq(columns, values, rcond=None)[0]
+        amplitudes_of.append(float(np.hypot(*solution)))
+        left.append((t, values - columns @ solution))
+    return np.array(amplitudes_of), tuple(left)
 
 
 def curve_trial(problem: Problem, trial: Trial) -> Trial | None:

@@ -147,7 +147,7 @@ def candidates(
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
             on_inputs = effect.on_channel is not None and "input" in effect.on_channel.where
-            of_many = bool(effect.parameters) and channel not in problem.model.capability.cells
+            of_many = effect.discrete and effect.parameters and channel not in problem.model.capability.cells
             if on_inputs and channel in inputs and of_many:
                 continue  # asked where the declared simulation is grossly wrong: `wrong_units`
             case = view(problem, channel, source)

@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.parameter_units import channel_unit
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import UnitError
-from toolkit.units import unit
+from toolkit.units import is_unit, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -139,12 +139,10 @@ class CaseView:
                 return float(np.ptp(np.concatenate(columns)))
         return 1.0
 
-    def dimension(self) -> str | None:
-        """Return the dimension of the place's channel, None where its unit is not known."""
-        try:
-            return unit(channel_unit(self._problem.case, self._problem.model, self.channel)).dimension
-        except UnitError:
-            return None
+    def unit(self) -> str | None:
+        """Return the unit of the place's channel, None where it is not known."""
+        text = channel_unit(self._problem.case, self._problem.model, self.channel)
+        return text if is_unit(text) else None
 
     def conditions(self, key: str) -> frozenset[str]:
         """Return the values that a condition has in the runs."""

@@ -18,6 +18,7 @@ from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.fit.run_scatter import RunScatter, held_out_beside_scatter, with_run_scatter
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
+from toolkit.diagnosis.search.channel_factors import with_units_judged
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise
@@ -155,7 +156,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     wrong = wrong_units(problem, (nominal, refitted))
     listed = candidates(problem)
     if wrong and not is_listed(wrong[0], listed):
-        listed = (*wrong, *listed)
+        listed = (*(candidate for candidate in wrong if candidate.discrete), *listed)
     skipped: list[str] = []
     steps: list[Step] = []
     base = refitted
@@ -195,8 +196,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 before = structure
             if turn == STEP.most_effects:
                 break
-            seen = {trial.candidate.key for trial in view.significant}
-            if turn == 0 and not any(candidate.key in seen for candidate in wrong):
+            if turn == 0 and wrong:
                 budget.check(f"step {turn + 1}: wrong units")
                 outcome = unit_step(problem, folds, base, held_base, wrong)
                 if outcome is not None:
@@ -242,6 +242,9 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             for step in sorted(pair, key=lambda step: step.active.effect.is_zero):
                 if not _is_nuisance(step, steps):
                     steps.append(step)
+        base, held_base, steps = with_units_judged(
+            problem, folds, base, held_base, steps, structured=bool(structure)
+        )
         base, held_base = refined(problem, folds, base, held_base, listed)
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:

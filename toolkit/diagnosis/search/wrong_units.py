@@ -4,6 +4,8 @@ A number that was recorded in another unit is off by a ratio that is known befor
 within its prior makes up for it. The search of small effects would describe it by a law of a factor. Here
 every ratio between the units of a channel's dimension, and every power of ten, is simulated from the declared
 parameters and from the refitted ones, and what takes nearly all of the error is a candidate like any other.
+So is a free factor of each channel: a number may be wrong by what is no ratio of units, and what no factor of
+its own channel confirms is no unit (`channel_factors`).
 """
 
 from __future__ import annotations
@@ -16,15 +18,21 @@ import numpy as np
 
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
 from toolkit.diagnosis.fit.sensor_noise import spread
-from toolkit.diagnosis.policy import UNITS
+from toolkit.diagnosis.policy import UNITS, VERDICT
 from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.candidates import CandidateEffect, Start
+from toolkit.diagnosis.search.channel_factors import (
+    factor_of,
+    free_factor,
+    is_ratio,
+    unit_of_factor,
+)
 from toolkit.diagnosis.search.forward_step import Rival, Step, joint_fit, shows_signal
 from toolkit.diagnosis.search.unseen_runs import gains_of, takes_most
 from toolkit.diagnosis.simulators.parameter_units import channel_unit
-from toolkit.diagnosis.simulators.unit_ratios import unit_ratios
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
+from toolkit.effects.unit_ratios import unit_ratios
 from toolkit.errors import FitError, UnitError
 
 if TYPE_CHECKING:
@@ -36,7 +44,9 @@ if TYPE_CHECKING:
 
 
 def wrong_units(problem: Problem, fits: Sequence[Fit]) -> tuple[CandidateEffect, ...]:
-    """Return wrong units that take nearly all of a gross error, the best first; none where none is gross.
+    """Return wrong units and factors that take nearly all of a gross error; none where none is gross.
+
+    Units and signs come first, the best before others, and then a free factor of every channel.
 
     Parameters
     ----------
@@ -57,7 +67,50 @@ def wrong_units(problem: Problem, fits: Sequence[Fit]) -> tuple[CandidateEffect,
                 amplitudes=applied.effect.names,
             )
             found.append((min(left), CandidateEffect(active=applied, starts=(start,))))
-    return tuple(candidate for _, candidate in sorted(found, key=lambda entry: entry[0])[: UNITS.most])
+    found.sort(key=lambda entry: entry[0])
+    units = [candidate for _, candidate in found]
+    return (*units[: UNITS.most], *_free_factors(problem, fits, wrong, units, UNITS.left * before))
+
+
+def _free_factors(
+    problem: Problem,
+    fits: Sequence[Fit],
+    wrong: Sequence[str],
+    units: Sequence[CandidateEffect],
+    most: float,
+) -> Iterator[CandidateEffect]:
+    """Give every channel's free factor, from where it leaves least, if that is little enough.
+
+    Parameters
+    ----------
+    units : that leave little, the best first: a factor may be farther off than is looked for without them
+    most : of the error that a factor may leave
+    """
+    from scipy.optimize import minimize_scalar
+
+    ratios = {unit.active.channel: factor_of(unit.active) for unit in units[::-1] if _is_ratio(unit)}
+    for place in {each.channel: each for each in _ratios(problem) if is_ratio(each.effect)}.values():
+
+        def left(log_factor: float, place: AppliedEffect = place) -> float:
+            applied = free_factor(place, math.exp(log_factor))
+            errors = [_left(problem, made, applied, wrong) for made in fits]
+            return min((error for error in errors if error is not None), default=math.inf)
+
+        reach, step = math.log(UNITS.farthest), 2 * math.log(UNITS.farthest) / (UNITS.steps - 1)
+        logs = [step * i - reach for i in range(UNITS.steps)]
+        logs += [math.log(ratios[place.channel])] if place.channel in ratios else []
+        best = min(logs, key=left)
+        ends = (best - step, best + step)
+        nearer = minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": UNITS.steps})
+        if nearer.fun < most:
+            applied = free_factor(place, math.exp(nearer.x))
+            values = dict(applied.values)
+            start = Start(values=values, directions=(values,), amplitudes=applied.effect.names)
+            yield CandidateEffect(active=applied, starts=(start,))
+
+
+def _is_ratio(candidate: CandidateEffect) -> bool:
+    return is_ratio(candidate.active.effect)
 
 
 def is_listed(candidate: CandidateEffect, listed: Sequence[CandidateEffect]) -> bool:
@@ -82,20 +135,30 @@ def unit_step(
     the signal finds the small rest of the right unit, which is rougher, the less likely.
     """
     shown: list[tuple[Fit, HeldOut]] = []
-    for candidate in wrong:
-        made = joint_fit(problem, base, (candidate.active,), plain=True)
+    sought = [candidate.active for candidate in wrong if not _is_ratio(candidate)]
+    for applied in sought:
+        made = joint_fit(problem, base, (applied,), plain=True)
         if made is None or only_bends(problem, made):
             continue
         try:
             held_out = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
-        if takes_most(problem, held_base, held_out) and shows_signal(problem, held_out, candidate.active):
-            shown.append((made, held_out))
+        if not (takes_most(problem, held_base, held_out) and shows_signal(problem, held_out, applied)):
+            continue
+        shown.append((made, held_out))
+        exact = unit_of_factor(problem, made, made.active[-1]) if made.active[-1].searched else None
+        if exact is not None:
+            sought.append(exact)
     if not shown:
         return None
     gains = gains_of(problem, held_base, shown)
-    best = max(range(len(shown)), key=lambda i: gains[i])
+    least = max(gains) - VERDICT.close
+
+    def order(i: int) -> tuple[bool, bool, float]:
+        return gains[i] <= least, not shown[i][0].active[-1].effect.discrete, -gains[i]
+
+    best = min(range(len(shown)), key=order)
     made, held_out = shown[best]
     tests = sum(1 for _ in _ratios(problem))
     step = Step(
@@ -106,7 +169,7 @@ def unit_step(
         rivals=tuple(
             Rival(active=each.active[-1], difference=gains[i] - gains[best])
             for i, (each, _) in enumerate(shown)
-            if i != best
+            if each.active[-1].channel != made.active[-1].channel
         ),
     )
     return made, held_out, step
@@ -121,7 +184,7 @@ def _ratios(problem: Problem) -> Iterator[AppliedEffect]:
     """Give every ratio at every channel where an effect of units may act."""
     inputs = {driver.name for driver in problem.case.drivers}
     for effect in effects().values():
-        if effect.on_channel is None or "input" not in effect.on_channel.where:
+        if not effect.discrete or effect.on_channel is None or "input" not in effect.on_channel.where:
             continue
         for channel, source in problem.model.places(effect):
             if channel not in problem.names and channel not in inputs:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -96,17 +96,16 @@ def averaged(case: Case, rows: int) -> Case:
     return dataclasses.replace(case, channels=channels, runs=tuple(runs))
 
 
-def smoothed(case: Case, rows: int) -> Case:
-    """Return a case with every row, its inputs and covariates without what is quicker than means show."""
+def smoothed(case: Case, rows: int, names: Collection[str]) -> Case:
+    """Return a case with every row, and some of its channels without what is quicker than means show."""
     from scipy.signal import savgol_filter
 
-    names = {driver.name for driver in case.drivers}
     runs = []
     for run in case.runs:
         count = _count(case, run, rows)
         width = 2 * _reach(count) + 1
         columns = dict(run.columns)
-        for name in names & set(columns) if count > 1 else ():
+        for name in set(names) & set(columns) if count > 1 else ():
             column = columns[name].copy()
             for piece in _pieces(run):
                 if piece.stop - piece.start >= width:

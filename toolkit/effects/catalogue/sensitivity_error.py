@@ -44,11 +44,12 @@ EFFECT = Effect(
     channel=_scaled,
     confined_by=("date", ANY_OTHER),
     on_channel=ChannelFacts(
-        where=("output", "cell", "program_cell", "program_load"),
+        where=("output", "input", "cell", "program_cell", "program_load"),
         tare="alike",
         by_value=True,
         about_zero=True,
         inverse=_restored,
+        proportion=1.0,
     ),
     not_correctable="a cell's sensitivity belongs into a new calibration",
 )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter
 from toolkit.effects.facts import ChannelFacts, Values
-from toolkit.units import unit
+from toolkit.effects.unit_ratios import unit_ratios, units_mistaken
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,42 +15,17 @@ if TYPE_CHECKING:
     from toolkit.effects.signals import Setting
     from toolkit.effects.surroundings import Surroundings
 
-
-# Units that files of this field mix up, each with the one it is taken for; both ways.
-_MIXED = (
-    ("lbf", "N"), ("kgf", "N"), ("kgf", "lbf"), ("kN", "lbf"), ("lbf*ft", "N*m"), ("lbf*in", "N*m"),
-    ("kgf*m", "N*m"), ("lbf*ft", "lbf*in"), ("deg", "rad"), ("m/s", "km/h"), ("mph", "km/h"), ("mph", "m/s"),
-    ("inch", "mm"), ("inch", "cm"), ("ft", "m"), ("inch", "m"), ("psi", "kPa"), ("bar", "kPa"),
-    ("bar", "psi"), ("min", "s"), ("percent", "1"),
-)  # fmt: skip
 _PREFIXES = {"kilo": 1000.0, "milli": 0.001}
-
-
-@cache
-def _all() -> dict[str, tuple[str | None, float]]:
-    """Return for every confusion its dimension, None for any, and the factor of the number."""
-    confusions: dict[str, tuple[str | None, float]] = {
-        name: (None, value) for name, value in _PREFIXES.items()
-    }
-    for pair in _MIXED:
-        for true, assumed in (pair, pair[::-1]):
-            right, wrong = unit(true), unit(assumed)
-            confusions[f"{true} read as {assumed}"] = (right.dimension, wrong.factor / right.factor)
-    return confusions
 
 
 def factors() -> dict[str, float]:
     """Return the factor of every confusion by its name, such as ``N read as lbf``."""
-    return {name: factor for name, (_, factor) in _all().items()}
+    return _PREFIXES | units_mistaken()
 
 
-def factors_for(dimension: str | None) -> tuple[float, ...]:
-    """Return the factors that a channel of a dimension can be wrong by; None is an unknown one."""
-    return tuple(dict.fromkeys(factor for of, factor in _all().values() if of is None or of == dimension))
-
-
-def _confusions(case: Surroundings) -> tuple[float, ...]:
-    return factors_for(case.dimension())
+def _ratios(case: Surroundings) -> tuple[float, ...]:
+    text = case.unit()
+    return tuple(_PREFIXES.values()) if text is None else tuple(unit_ratios(text).values())
 
 
 def _converted(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
@@ -80,7 +54,7 @@ EFFECT = Effect(
             typical=(0.1, 10.0),
             off=1.0,
             starts=tuple(_PREFIXES.values()),
-            start_values=_confusions,
+            start_values=_ratios,
             words=factors,
         ),
     ),
@@ -92,6 +66,7 @@ EFFECT = Effect(
         by_value=False,
         about_zero=True,
         inverse=_restored,
+        proportion=0.0,
     ),
     discrete=True,
     needs_signal=True,

@@ -282,6 +282,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
                 f"  {parameter.name} = {value} {parameter.unit}"
                 + (f"  (95 %: {interval})" if interval else "")
             )
+        lines += [f"  {law.likeness}"] if law.resembles else []
         lines.append(f"  takes {100 * law.evidence.share_of_gap:.0f} % of the mean square that was left")
     structures = list(
         dict.fromkeys((by.channel, tuple(by.variables)) for by in diagnosis.depends_on)

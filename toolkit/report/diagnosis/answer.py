@@ -291,7 +291,8 @@ def not_found(source: Told, style: Style) -> Rows:
     for effect in source.answer.not_found:
         if effect.observable:
             size = effect.minimum_detectable
-            yield effect.name, "-" if size is None else _n(size, style), printed(effect.unit) or "-"
+            told = effect.why or "-" if size is None else _n(size, style)
+            yield effect.name, told, printed(effect.unit) or "-"
 
 
 @DIAGNOSIS.table("next", "what to measure next", "measure|measurement")

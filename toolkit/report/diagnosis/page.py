@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.answer.answer import ChannelMismatch, DiagnosedEffect, DiagnosedLaw, Diagnosis
+    from toolkit.diagnosis.answer.answer import (
+        ChannelMismatch,
+        DiagnosedEffect,
+        DiagnosedLaw,
+        Diagnosis,
+        EffectEstimate,
+    )
     from toolkit.diagnosis.diagnose import Result
 
 _NEAREST = 8  # candidates that are listed as rejected
@@ -231,7 +237,7 @@ def _effect(result: Result, effect: DiagnosedEffect) -> _Effect:
             if isinstance(parameter.value, str)
             else rounded(parameter.value, parameter.ci95)[0],
             parameter.unit,
-            "" if isinstance(parameter.value, str) else rounded(parameter.value, parameter.ci95)[1],
+            _interval(effect, parameter),
             "all runs"
             if parameter.runs is None
             else ", ".join(parameter.runs) + condition(result, parameter.runs),
@@ -244,6 +250,18 @@ def _effect(result: Result, effect: DiagnosedEffect) -> _Effect:
         parameters=table(("parameter", "value", "unit", "95 % interval", "in"), rows, numbers=(1,)),
         reason=_reason(effect),
     )
+
+
+def _interval(effect: DiagnosedEffect, parameter: EffectEstimate) -> str:
+    """Return an interval as it is printed, or why there is none of a level that a state cannot pass."""
+    if isinstance(parameter.value, str):
+        return ""
+    declared = effects().get(effect.name)
+    if parameter.ci95 is None and declared is not None and declared.term is not None:
+        off = next((each.off for each in declared.parameters if each.name == parameter.name), None)
+        if off is not None and math.isinf(off):
+            return "none: its likelihood has a kink at every row that reaches it"
+    return rounded(parameter.value, parameter.ci95)[1]
 
 
 def _law(law: DiagnosedLaw) -> _Law:
@@ -266,8 +284,7 @@ def _law(law: DiagnosedLaw) -> _Law:
     if law.confounded_with:
         notes.append(f"It may be taken for {', '.join(law.confounded_with)}, which moved far because of it.")
     if law.resembles:
-        near = ", ".join(f"{near.name} ({100 * near.distance:.0f} % apart)" for near in law.resembles)
-        notes.append(f"Known effects that are like it, and explain less: {near}.")
+        notes.append(f"It {law.likeness}.")
     return _Law(
         sentence=law.sentence,
         parameters=table(("parameter", "value", "unit", "95 % interval"), rows, numbers=(1,)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from toolkit.units import is_unit, unit, units_alike
+from toolkit.units import RECORDED_IN, is_unit, unit, units_alike
 
 _TENS = range(1, 7)
 _ALIKE = 1e-3  # two ratios of units as near as that are told apart by no recording
@@ -34,6 +34,22 @@ def unit_ratios(text: str) -> dict[str, float]:
         add(f"{10**power} times the value", 10.0**power)
         add(f"1/{10**power} of the value", 10.0**-power)
     return ratios
+
+
+@cache
+def units_mistaken() -> dict[str, float]:
+    """Return by what a number is too large for every two units of one dimension, by the words for them.
+
+    >>> round(units_mistaken()["N read as lbf"], 6)
+    0.224809
+    """
+    return {
+        f"{right} read as {wrong}": unit(wrong).factor / unit(right).factor
+        for right in RECORDED_IN
+        if not unit(right).offset
+        for wrong in units_alike(right)
+        if wrong != right and not unit(wrong).offset
+    }
 
 
 def near_ratio(low: float, high: float, text: str) -> str | None:

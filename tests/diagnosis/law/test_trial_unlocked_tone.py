@@ -1,0 +1,52 @@
+"""A tone with a phase of its own in every run: frequency and amplitude with intervals that hold the truth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+from scipy.stats import binom
+
+from tests.diagnosis.case_text import case_text
+from tests.diagnosis.cases import CELL, write_case
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.law.trial import unlocked_tone
+from toolkit.diagnosis.simulators.build_simulator import model_of
+
+HEAD = case_text(
+    "python", parameters={"gain": (1.0, "1", 0.005)}, inputs={"L": "N"}, outputs={"F": "N"}, runs=3
+)
+TRIES = 12
+
+
+def ringing(rng: np.random.Generator, frequency: float) -> pd.DataFrame:
+    """Return a loaded cell with a tone of 0.1 N in AR(1) noise of 0.1 N."""
+    t = np.arange(200) * 0.1
+    noise = lfilter([0.06], [1, -0.8], rng.normal(0, 1.0, 300))[100:]
+    L = 10 * np.sin(0.7 * t + rng.uniform(0, 6))
+    tone = 0.1 * np.sin(2 * math.pi * frequency * t + rng.uniform(0, 6))
+    return pd.DataFrame({"t": t, "L": L, "F": L + tone + noise})
+
+
+def test_intervals_of_a_tone_hold_it(tmp_path):
+    off: dict[str, list[float]] = {"a": [], "frequency": []}
+    for seed in range(TRIES):
+        rng = np.random.default_rng(seed)
+        true = {"a": 0.1, "frequency": rng.uniform(0.8, 1.6)}
+        runs = {f"r{k}__csv": ringing(rng, true["frequency"]) for k in range(3)}
+        case = read_case(write_case(tmp_path / str(seed), HEAD, simulator=CELL, **runs))
+        problem = problem_of(case, model_of(case, None))
+        tone = unlocked_tone(problem, fit(problem, plain=True), "F")
+        assert tone is not None
+        for name, departures in off.items():
+            fitted = dict(tone.applied.values)
+            departures.append((fitted[name] - true[name]) / tone.sds[name])
+    # Fewer than so many hold the truth once in a thousand tries, where each does by 95 %.
+    fewest = binom.ppf(0.001, TRIES, 0.95)
+    for departures in off.values():
+        assert sum(abs(each) < 1.96 for each in departures) >= fewest
+        assert np.sqrt(np.mean(np.square(departures))) > 0.5  # nor are they far wider than they need be
