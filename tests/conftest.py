@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import sys
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ import pytest
 from hypothesis import settings
 
 from tests.declared_answers import hold_to_declarations
+from tests.kept_office import kept_office
 from toolkit.audit import workers
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
@@ -59,6 +61,13 @@ if can_fork():
 # The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _office() -> Iterator[None]:
+    with kept_office():
+        yield
+
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "toolkit" / "examples"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -66,8 +66,8 @@ def environment(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def clean(home: Path) -> dict[str, str]:
-    """Return this process's variables without those that could lead back to the checkout."""
-    gone = {"PYTHONPATH", "TOOLKIT_HOME", "VIRTUAL_ENV"}
+    """Return this process's variables without those that could lead back to the checkout or to its tests."""
+    gone = {"PYTHONPATH", "TOOLKIT_HOME", "TOOLKIT_SOFFICE", "VIRTUAL_ENV"}
     return {name: text for name, text in os.environ.items() if name not in gone} | {"HOME": str(home)}
 
 
