@@ -16,10 +16,10 @@ from docx import Document
 from toolkit.report.word.office import Guard, find_soffice
 from toolkit.system import can_fork
 
-# A start costs 1.2 s of processor time, a short document 0.1 s. LibreOffice hands a job over to the instance that has
-# its profile, and that instance stays for as long as it has a document open; the lock beside the document tells that
-# it has. The toolkit's own instance, which waits for a job, has nothing to do. One job at a time; who asks for anything
-# but a conversion gets LibreOffice itself.
+# A start costs 1.2 s of processor time, a short document 0.1 s. LibreOffice hands a job over to the instance
+# that has its profile, and that instance stays for as long as it has a document open; the lock beside the
+# document tells that it has. The toolkit's own instance, which waits for a job, has nothing to do. One job at
+# a time; who asks for anything but a conversion gets LibreOffice itself.
 _SCRIPT = """#!/bin/sh
 folder={folder} office={office} profile=-env:UserInstallation=file://{folder}/profile
 case "$1$*" in
@@ -32,8 +32,8 @@ flock 9
 if ! kill -0 "$(cat "$folder/pid" 2>&-)" 2>&-; then
     rm -f "$folder/.~lock.open.docx#"
     cd "$folder"
-    env -i PATH="$PATH" HOME={home} TMPDIR="$folder" LC_ALL=C.UTF-8 SAL_USE_VCLPLUGIN=svp setsid "$office" "$profile" \\
-        --headless --norestore --nologo --nodefault open.docx </dev/null >/dev/null 2>&1 9>&- &
+    env -i PATH="$PATH" HOME={home} TMPDIR="$folder" LC_ALL=C.UTF-8 SAL_USE_VCLPLUGIN=svp setsid "$office" \\
+        "$profile" --headless --norestore --nologo --nodefault open.docx </dev/null >/dev/null 2>&1 9>&- &
     echo $! >"$folder/pid"
     while kill -0 $! && ! test -e ".~lock.open.docx#"; do sleep 0.05; done
     cd "$OLDPWD"
@@ -44,7 +44,7 @@ fi
 
 @contextlib.contextmanager
 def kept_office() -> Iterator[None]:
-    """Have every conversion done by one LibreOffice, which starts with the first; nothing where there is none."""
+    """Have one LibreOffice do every conversion, started with the first; nothing where there is none."""
     if not (can_fork() and shutil.which("soffice") and shutil.which("flock") and shutil.which("setsid")):
         yield
         return

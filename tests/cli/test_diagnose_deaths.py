@@ -73,7 +73,11 @@ def refused(case: Path, *words: object) -> dict[str, str]:
         ("os.kill(os.getpid(), signal.SIGKILL)", "SIGKILL"),
         ("os.abort()", "SIGABRT"),
         ("ctypes.string_at(0)", "SIGSEGV"),
-        ("sys.setrecursionlimit(10**9); a = []\n    for _ in range(10**6): a = [a]\n    repr(a)", "SIGSEGV"),
+        pytest.param(
+            "sys.setrecursionlimit(10**9); a = []\n    for _ in range(10**6): a = [a]\n    repr(a)",
+            "SIGSEGV",
+            marks=pytest.mark.campaign("a second way to the same signal"),
+        ),
         ("os.closerange(0, 4096)", "closed"),
         ("os.execv('/bin/true', ['true'])", "exit code 0"),
     ],
@@ -174,7 +178,10 @@ def test_a_fork_bomb_is_ended(tmp_path):
     assert alive(mark) == []
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+BETWEEN = pytest.mark.campaign("a signal that is told neither as the interrupt is nor cannot be caught")
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=BETWEEN), signal.SIGKILL])
 def test_the_worker_ends_with_the_tool(tmp_path, sent):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     waits = f"open({str(tmp_path / 'begun')!r}, 'w').close(); time.sleep(600)\n    "

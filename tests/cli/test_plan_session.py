@@ -149,6 +149,7 @@ def test_a_template_without_a_folder_is_an_error_before_the_search(home: Path) -
     assert "add --out DIR" in refused.stderr
 
 
+@pytest.mark.campaign("the session of three cells: that of one cell serves in place of a record in every run")
 def test_a_session_file_serves_in_place_of_the_record(home: Path, tmp_path: Path) -> None:
     folder = CALIBRATIONS / "m15-virtual"
     for name in ("loads", "check"):

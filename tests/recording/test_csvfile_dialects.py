@@ -296,8 +296,8 @@ def test_plain_numbers_take_no_object_for_each_cell(tmp_path, separator, decimal
         tracemalloc.stop()
         return high
 
-    more = 20_000
-    assert peak(20_000 + more) - peak(20_000) < 16 * more * len(HEADERS)
+    more = 10_000
+    assert peak(10_000 + more) - peak(10_000) < 16 * more * len(HEADERS)
 
 
 @pytest.mark.parametrize(("titles", "words"), [(1, "1 line stands"), (3, "3 lines stand")])
