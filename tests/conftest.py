@@ -18,6 +18,7 @@ from hypothesis import settings
 
 from tests.declared_answers import hold_to_declarations
 from tests.kept_office import kept_office
+from tests.remembered_fits import remember_fits
 from toolkit.audit import workers
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
@@ -57,6 +58,8 @@ if can_fork():
     _READY = multiprocessing.get_context("forkserver")
     _READY.set_forkserver_preload(["toolkit.audit.archive"])
     workers.mp = SimpleNamespace(get_context=lambda _: _READY)
+
+remember_fits()
 
 # The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
 sys.dont_write_bytecode = False
