@@ -160,7 +160,10 @@ def alive(mark: str) -> list[int]:
 LEAVES = "import subprocess\n    subprocess.Popen(['sleep', '600'], start_new_session=True)\n    "
 
 
-@pytest.mark.parametrize("end", ["", "os._exit(1)\n    "])
+DIES = pytest.mark.campaign("the simulator dies as well: every cause of its death is told in every run")
+
+
+@pytest.mark.parametrize("end", ["", pytest.param("os._exit(1)\n    ", marks=DIES)])
 def test_no_process_of_a_simulator_outlives_the_tool(tmp_path, end):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     case = write_case(tmp_path, simulator=START + LEAVES + end + GOOD)
