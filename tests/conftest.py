@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import sys
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,8 @@ import pytest
 from hypothesis import settings
 
 from tests.declared_answers import hold_to_declarations
+from tests.kept_office import kept_office
+from tests.remembered_fits import remember_fits
 from toolkit.audit import workers
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
@@ -23,8 +26,8 @@ from toolkit.system import can_fork
 from toolkit.worker import posix
 
 # Machines are shared and noisy: no example is judged by its time. CI repeats the same examples; a developer's
-# machine draws new ones each time.
-settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.get("CI")))
+# machine draws new ones each time, so that fewer than the usual hundred a run add up.
+settings.register_profile("toolkit", deadline=None, max_examples=40, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("toolkit")
 hold_to_declarations()
 
@@ -56,9 +59,18 @@ if can_fork():
     _READY.set_forkserver_preload(["toolkit.audit.archive"])
     workers.mp = SimpleNamespace(get_context=lambda _: _READY)
 
+remember_fits()
+
 # The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _office() -> Iterator[None]:
+    with kept_office():
+        yield
+
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "toolkit" / "examples"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -73,20 +73,27 @@ def follow(title: str, folder: Path) -> list[tuple[str, str, str]]:
             printed += [
                 (command, expected, _print_of(command, folder)) for command, expected in commands_of(block)
             ]
-        elif path := _NEW.search(block.above):
-            assert not (folder / path[1]).exists(), f"{path[1]} is no new file"
-            (folder / path[1]).write_text(block.text, encoding="utf-8")
-        elif path := _END.search(block.above):
-            with (folder / path[1]).open("a", encoding="utf-8") as stream:
-                stream.write(block.text)
         else:
-            path = _BELOW.search(block.above)
-            assert path, f"where does this block go? {block.above}"
-            lines = (folder / path[1]).read_text(encoding="utf-8").splitlines(keepends=True)
-            place = [line.strip() for line in lines].index(path[2])
-            lines.insert(place + 1, block.text)
-            (folder / path[1]).write_text("".join(lines), encoding="utf-8")
+            write(block, folder)
     return printed
+
+
+def write(block: Block, folder: Path) -> Path:
+    """Write what a block says into its place below a copy of the checkout; return the file."""
+    if path := _NEW.search(block.above):
+        assert not (folder / path[1]).exists(), f"{path[1]} is no new file"
+        (folder / path[1]).write_text(block.text, encoding="utf-8")
+    elif path := _END.search(block.above):
+        with (folder / path[1]).open("a", encoding="utf-8") as stream:
+            stream.write(block.text)
+    else:
+        path = _BELOW.search(block.above)
+        assert path, f"where does this block go? {block.above}"
+        lines = (folder / path[1]).read_text(encoding="utf-8").splitlines(keepends=True)
+        place = [line.strip() for line in lines].index(path[2])
+        lines.insert(place + 1, block.text)
+        (folder / path[1]).write_text("".join(lines), encoding="utf-8")
+    return folder / path[1]
 
 
 def commands_of(block: Block) -> list[tuple[str, str]]:

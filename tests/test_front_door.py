@@ -274,8 +274,12 @@ def test_tire_models_of_a_test_and_of_a_table(processed: toolkit.ProcessedTest, 
 # --- archives, cases, reports ------------------------------------------------------------------------------
 
 
-def test_an_archive_is_audited(laboratory: toolkit.Laboratory, simulation: toolkit.Simulation) -> None:
-    audit = laboratory.audit_archive(simulation.folder)
+def test_an_archive_is_audited(
+    laboratory: toolkit.Laboratory, simulation: toolkit.Simulation, tmp_path: Path
+) -> None:
+    for name in ("test.toml", "FM_run_1.xlsx", "FM_run_2.xlsx"):
+        shutil.copy(simulation.folder / name, tmp_path)
+    audit = laboratory.audit_archive(tmp_path)
     assert audit.grades["sign_variant"] == len(audit.to_dataframe())
     assert not audit.clean
     assert audit.written == ()
@@ -284,7 +288,7 @@ def test_an_archive_is_audited(laboratory: toolkit.Laboratory, simulation: toolk
 
 def test_a_case_is_diagnosed(simulation: toolkit.Simulation, tmp_path: Path) -> None:
     case = simulation.folder.with_name("case") / "CASE.toml"
-    diagnosis = toolkit.diagnose(case, home=toolkit.example("home"), budget_s=4.0)
+    diagnosis = toolkit.diagnose(case, home=toolkit.example("home"), budget_s=2.0)
     assert diagnosis.verdict in {"named", "equivalent", "unknown", "nothing", "untestable"}
     assert diagnosis.verdict in repr(diagnosis)
     assert "effect" in diagnosis.to_dataframe().columns

@@ -12,6 +12,7 @@ from jinja2 import Environment, nodes
 from jinja2.runtime import LoopContext
 
 import toolkit
+from tests.house.source import read_package
 from tests.house.structure import NO_COMMAND_ASKED
 
 ROOT = Path(toolkit.__file__).parent
@@ -129,7 +130,7 @@ def _written(tree: ast.AST) -> set[str]:
 
 def test_what_a_page_reads_is_written_somewhere() -> None:
     """A template asks for its values by name at run time: what only pages ask for looks dead in the code."""
-    written = {name for path in ROOT.rglob("*.py") for name in _written(ast.parse(path.read_text("utf-8")))}
+    written = {name for module in read_package() for name in _written(module.tree)}
     written |= {name for builtin in (str, dict, list, LoopContext) for name in dir(builtin)}
     pages = sorted(ROOT.rglob("*.j2"))
     parse = Environment(autoescape=True, extensions=["jinja2.ext.do", "jinja2.ext.i18n"]).parse

@@ -60,14 +60,16 @@ def environment(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "--disable-pip-version-check",
     ]
     subprocess.run(
-        [*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)], check=True, env=clean(folder)
+        [*pip, "install", "--quiet", "--no-deps", "--no-index", "--no-compile", str(wheel)],
+        check=True,
+        env=clean(folder),
     )
     return folder
 
 
 def clean(home: Path) -> dict[str, str]:
-    """Return this process's variables without those that could lead back to the checkout."""
-    gone = {"PYTHONPATH", "TOOLKIT_HOME", "VIRTUAL_ENV"}
+    """Return this process's variables without those that could lead back to the checkout or to its tests."""
+    gone = {"PYTHONPATH", "TOOLKIT_HOME", "TOOLKIT_SOFFICE", "VIRTUAL_ENV"}
     return {name: text for name, text in os.environ.items() if name not in gone} | {"HOME": str(home)}
 
 

@@ -15,18 +15,15 @@ import openpyxl
 import pytest
 
 from tests import commands
+from tests.cli.test_compare import maker
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry, today
 from toolkit.cli.main import run
 from toolkit.lab.home import packaged_home
 from toolkit.recording.marks import is_own_output
-from toolkit.simulation.plan import read_plan
-from toolkit.simulation.run import simulate
-from toolkit.simulation.write import write_test
 
 PACKAGED = packaged_home()
-VIRTUAL = PACKAGED / "toolkit" / "examples" / "virtual"
 REFUSED = "m15-virtual-r2"
 office_needed = pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")),
@@ -173,15 +170,11 @@ def test_a_draft_of_a_certificate_and_of_a_comparison(home: Path, draft_file: Pa
     assert (code, answer["draft"]) == (1, True)
     assert "failed gates sign" in answer["draft_reasons"][0]
     assert all("DRAFT, NOT APPROVED" in one for one in text_of(Path(answer["pdf"])))
-    other = tmp_path / "other"
-    plan = tmp_path / "plan.toml"
-    text = (VIRTUAL / "test_plan.toml").read_text()
-    plan.write_text(re.sub(r"(?m)^seed = .*$", "seed = 77", text))
-    write_test(simulate(read_plan(plan)), other)
     out = tmp_path / "compared"
-    code, answer = toolkit(home, "compare", other, draft_file, "--draft", "--out", out)
+    table = maker(tmp_path / "maker.csv")
+    code, answer = toolkit(home, "compare", table, draft_file, "--draft", "--out", out)
     assert (code, answer["draft"]) == (1, True)
-    assert [one["calibration"].get("draft", False) for one in answer["entries"]] == [False, True]
+    assert [bool((one["calibration"] or {}).get("draft")) for one in answer["entries"]] == [False, True]
     assert all("DRAFT, NOT APPROVED" in one for one in text_of(out / "comparison.pdf"))
 
 

@@ -20,7 +20,7 @@ from toolkit.simulation.write import write_test
 def turned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A whole virtual test in which E5 was turned after the calibration, its tare too."""
     folder = tmp_path_factory.mktemp("turned") / "test"
-    write_test(simulate(with_effects(campaign.base_plan(rows=8), ["channel_sign.E5"])), folder)
+    write_test(simulate(with_effects(campaign.base_plan(rows=4), ["channel_sign.E5"])), folder)
     return folder
 
 

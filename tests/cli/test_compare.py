@@ -112,6 +112,9 @@ def test_a_reduced_test_compares_as_its_folder_does(
     assert from_file["differences"] == from_folder["differences"]
 
 
+@pytest.mark.campaign(
+    "a second reading of the same tests: that two documents of them agree holds in every run"
+)
 def test_two_runs_answer_the_same(
     virtual_test: Path,
     other_test: Path,
@@ -285,6 +288,7 @@ def test_bad_input_ends_with_2_and_writes_nothing(
     assert not figures.exists()
 
 
+@pytest.mark.usefixtures("read_once")
 def test_a_protocol_for_a_test_that_is_reduced_already(virtual_test: Path, tmp_path: Path) -> None:
     reduced = tmp_path / "t.xlsx"
     toolkit("process", virtual_test, "--out", reduced)

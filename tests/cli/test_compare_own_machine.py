@@ -55,6 +55,7 @@ def test_a_reduced_test_is_compared_and_planned_by_without_its_machines_file(
     assert (code, planned["machine"]) == (0, "m15-virtual")
 
 
+@pytest.mark.campaign("a plan by the folder of the test: that by its reduced test is made in every run")
 def test_a_test_by_a_path_is_planned_by(home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     asked = ("--u", "conicity", "--load", "833 lbf", "--out", "p")

@@ -73,7 +73,11 @@ def refused(case: Path, *words: object) -> dict[str, str]:
         ("os.kill(os.getpid(), signal.SIGKILL)", "SIGKILL"),
         ("os.abort()", "SIGABRT"),
         ("ctypes.string_at(0)", "SIGSEGV"),
-        ("sys.setrecursionlimit(10**9); a = []\n    for _ in range(10**6): a = [a]\n    repr(a)", "SIGSEGV"),
+        pytest.param(
+            "sys.setrecursionlimit(10**9); a = []\n    for _ in range(10**6): a = [a]\n    repr(a)",
+            "SIGSEGV",
+            marks=pytest.mark.campaign("a second way to the same signal"),
+        ),
         ("os.closerange(0, 4096)", "closed"),
         ("os.execv('/bin/true', ['true'])", "exit code 0"),
     ],
@@ -156,7 +160,10 @@ def alive(mark: str) -> list[int]:
 LEAVES = "import subprocess\n    subprocess.Popen(['sleep', '600'], start_new_session=True)\n    "
 
 
-@pytest.mark.parametrize("end", ["", "os._exit(1)\n    "])
+DIES = pytest.mark.campaign("the simulator dies as well: every cause of its death is told in every run")
+
+
+@pytest.mark.parametrize("end", ["", pytest.param("os._exit(1)\n    ", marks=DIES)])
 def test_no_process_of_a_simulator_outlives_the_tool(tmp_path, end):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     case = write_case(tmp_path, simulator=START + LEAVES + end + GOOD)
@@ -174,7 +181,10 @@ def test_a_fork_bomb_is_ended(tmp_path):
     assert alive(mark) == []
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+BETWEEN = pytest.mark.campaign("a signal that is told neither as the interrupt is nor cannot be caught")
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=BETWEEN), signal.SIGKILL])
 def test_the_worker_ends_with_the_tool(tmp_path, sent):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     waits = f"open({str(tmp_path / 'begun')!r}, 'w').close(); time.sleep(600)\n    "

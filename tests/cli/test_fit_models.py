@@ -138,14 +138,14 @@ def test_all_names_every_model_of_the_catalogue():
 
 
 def test_robust_and_weights_are_told(tire):
-    _, out = run(tire, *models("mf52"), "--loss", "robust", "--weights", "noise", "--json")
+    _, out = run(tire, *models("brush"), "--loss", "robust", "--weights", "noise", "--json")
     for one in json.loads(out)["fits"]:
         assert (one["loss"], one["weights"]) == ("robust", "noise")
 
 
 def test_negative_loads_are_loads(tire, tmp_path):
     other = write(tmp_path / "down.csv", turn=-1.0, FZ_sign=-1.0)
-    first, second = (json.loads(run(path, *models("mf52"), "--json")[1])["fits"] for path in (tire, other))
+    first, second = (json.loads(run(path, *models("brush"), "--json")[1])["fits"] for path in (tire, other))
     assert first == second
 
 

@@ -4,29 +4,27 @@ from __future__ import annotations
 
 import ast
 import json
-from pathlib import Path
 
 import pytest
 
-import toolkit
+from tests.house.source import Module, read_package
 from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED
 from toolkit.cli.main import run
 from toolkit.effects.catalogue import effects
 from toolkit.lab.rules import rules_catalogue
 from toolkit.report.word.check import RULES
 
-SOURCES = sorted(Path(toolkit.__file__).parent.rglob("*.py"))
 REFUSERS = {"_refuse", "refuse_cell", "problem"}
 
 
-def rules_in(path: Path) -> set[str]:
+def rules_in(module: Module) -> set[str]:
     """Return the constants given as ``rule=...``, or as the first argument of a function that refuses."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(module.tree):
         if not isinstance(node, ast.Call):
             continue
         named = [k.value for k in node.keywords if k.arg == "rule"]
-        if getattr(node.func, "id", None) in REFUSERS and path.parts[-2] in ("recording", "tires"):
+        if getattr(node.func, "id", None) in REFUSERS and module.path.parts[-2] in ("recording", "tires"):
             named += node.args[:1]
         found |= {n.value for n in named if isinstance(n, ast.Constant) and isinstance(n.value, str)}
     return found
@@ -34,8 +32,9 @@ def rules_in(path: Path) -> set[str]:
 
 def test_every_rule_of_a_module_is_explained() -> None:
     explained = rules_catalogue().keys()
-    unexplained = {path.name: lacking for path in SOURCES if (lacking := rules_in(path) - explained)}
-    assert len(SOURCES) > 500
+    modules = read_package()
+    unexplained = {module.name: lacking for module in modules if (lacking := rules_in(module) - explained)}
+    assert len(modules) > 500
     assert unexplained == {}
 
 

@@ -131,8 +131,8 @@ def test_a_plan_never_overwrites_readings(planned: tuple[Path, dict[str, Any]], 
 def test_a_template_makes_the_sheet_of_the_same_steps(home: Path, tmp_path: Path) -> None:
     out = tmp_path / "next"
     said = toolkit(
-        "plan", "session", "m15-virtual", "--loads", 30, "--out", out, "--home", home, "--json",
-        "--template", CALIBRATIONS.parent / "report_templates" / "plan.docx",
+        "plan", "session", "cell", "--session", cell_session(tmp_path), "--loads", 33, "--out", out, "--home",
+        home, "--json", "--template", CALIBRATIONS.parent / "report_templates" / "plan.docx", code=None,
     )  # fmt: skip
     document = json.loads(said.stdout)["document"]
     assert document["warnings"] == []
@@ -149,6 +149,7 @@ def test_a_template_without_a_folder_is_an_error_before_the_search(home: Path) -
     assert "add --out DIR" in refused.stderr
 
 
+@pytest.mark.campaign("the session of three cells: that of one cell serves in place of a record in every run")
 def test_a_session_file_serves_in_place_of_the_record(home: Path, tmp_path: Path) -> None:
     folder = CALIBRATIONS / "m15-virtual"
     for name in ("loads", "check"):
@@ -233,8 +234,8 @@ minutes = 1.5
 """
 
 
-def candidate(folder: Path) -> Path:
-    """Return a home with a record of a cell that nobody has approved."""
+def cell_session(folder: Path) -> Path:
+    """Write a session of a cell of one load; return its file."""
     rng = np.random.default_rng(5)
     rows = [
         f"{force / 500 + 1e-4 * rng.normal():.7f},{force},{run},{way}"
@@ -247,8 +248,13 @@ def candidate(folder: Path) -> Path:
         'schema = 1\ninstrument = "cell"\ndate = 2026-01-05\noperator = "A"\nindications = ["S"]\n'
         'loads = ["FY"]\ndata = "loads.csv"\n'
     )
+    return folder / "SESSION.toml"
+
+
+def candidate(folder: Path) -> Path:
+    """Return a home with a record of a cell that nobody has approved."""
     toolkit("init", folder / "lab")
-    toolkit("calibrate", folder / "SESSION.toml", "--home", folder / "lab", code=None)
+    toolkit("calibrate", cell_session(folder), "--home", folder / "lab", code=None)
     return folder / "lab"
 
 

@@ -26,9 +26,10 @@ def bench(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Bench:
 
 @pytest.mark.parametrize("command", QUICK, ids=lambda command: command.name)
 def test_nothing_is_lost_or_mixed_and_the_next_run_gives_the_same(bench: Bench, command) -> None:
-    count = bench.judge(command, most=3)
+    # An error of the disk is answered as a full one is: the commands that sign have it.
+    count = bench.judge(command, most=3, faults=("kill", "no space"))
     assert (count.lost, count.mixed) == ([], [])
-    assert count.recovered == count.points >= 9
+    assert count.recovered == count.points >= 6
 
 
 @pytest.fixture(scope="module")

@@ -25,5 +25,7 @@ def plain_report(tmp_path_factory: pytest.TempPathFactory) -> Delivered:
         make_result(simulated=True), make_record(), style=read_style(path.with_suffix(".toml")),
         issued=dt.date(2026, 11, 21),
     )  # fmt: skip
-    with Drawer() as drawer:
+    # By a LibreOffice of its own, as a command has it.
+    with pytest.MonkeyPatch.context() as patch, Drawer() as drawer:
+        patch.delenv("TOOLKIT_SOFFICE", raising=False)
         return deliver(read_template(path), content, tmp_path_factory.mktemp("plain") / "out", drawer=drawer)

@@ -7,8 +7,10 @@ from toolkit.report.drawer import Drawer
 from toolkit.report.figures import Picture, draw
 from toolkit.report.test.content import build_content
 
+OTHER = pytest.mark.campaign("another number of hands: a worker draws with two in every run")
 
-@pytest.mark.parametrize("hands", [1, 2, 5])
+
+@pytest.mark.parametrize("hands", [pytest.param(1, marks=OTHER), 2, pytest.param(5, marks=OTHER)])
 def test_a_worker_draws_what_this_process_draws_with_any_number_of_hands(hands: int) -> None:
     plots = dict(list(build_content(make_result(), make_record()).plots.items())[:3])
     with Drawer(hands=hands) as drawer:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.house.source import read_package
 from tests.report.template_factory import FOLDER
 from toolkit.report.word.package import open_package, read_template
 from toolkit.report.word.scan import fixed_texts, phrase_of
@@ -27,8 +28,8 @@ def texts_of(template: Path) -> list[str]:
 
 def literals() -> Iterator[str]:
     """Yield every text that the code spells, with a hole for each value."""
-    for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for module in read_package():
+        for node in ast.walk(module.tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 yield node.value
             elif isinstance(node, ast.JoinedStr):

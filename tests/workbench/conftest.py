@@ -8,6 +8,7 @@ import http.client
 import re
 import shutil
 import socket
+import tempfile
 import threading
 import time
 from collections.abc import Iterable, Iterator
@@ -17,6 +18,7 @@ from pathlib import Path
 from urllib.parse import urlencode
 
 import pytest
+from playwright.sync_api import BrowserContext, sync_playwright
 
 from tests.cli.test_calibration_control import session
 from toolkit.calibration.control.calibrate import calibrate
@@ -27,6 +29,12 @@ from toolkit.workbench.guard import Guard, Keys
 from toolkit.workbench.server import Listening, server_of
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+CHROMIUM_WORDS = (
+    "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync"
+).split()
 
 
 @dataclass
@@ -196,3 +204,15 @@ def own(lab: Path, tmp_path: Path) -> Iterator[Served]:
 def plain(body: str) -> str:
     """Return the text of a page without its tags."""
     return " ".join(re.sub(r"<[^>]*>", " ", body).split())
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[BrowserContext]:
+    """One browser with a fresh profile for the pages of this folder."""
+    with tempfile.TemporaryDirectory() as profile, sync_playwright() as playwright:
+        context = playwright.chromium.launch_persistent_context(
+            profile, executable_path="/usr/bin/chromium", args=CHROMIUM_WORDS, headless=True,
+            viewport={"width": 1280, "height": 900},
+        )  # fmt: skip
+        yield context
+        context.close()

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import axe_playwright_python
 import pytest
-from playwright.sync_api import BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.workbench.conftest import Served, serving
 
 AXE = (Path(axe_playwright_python.__file__).parent / "axe.min.js").read_text()
-WORDS = (
-    "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync"
-).split()
 LIGHT = ("light", 1280)
 DARK_PHONE = ("dark", 390)
 LOOKS = {
@@ -24,18 +18,6 @@ LOOKS = {
     "/record/m15-r1": (LIGHT,), "/nothing": (LIGHT,),
 }  # fmt: skip
 """What is looked at how: each page in one look at least, those with cards and charts in both."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[BrowserContext]:
-    """One browser with a fresh profile for this module."""
-    with tempfile.TemporaryDirectory() as profile, sync_playwright() as playwright:
-        context = playwright.chromium.launch_persistent_context(
-            profile, executable_path="/usr/bin/chromium", args=WORDS, headless=True,
-            viewport={"width": 1280, "height": 900},
-        )  # fmt: skip
-        yield context
-        context.close()
 
 
 def opened(browser: BrowserContext, bench: Served, requests: list[str], messages: list[str]) -> Page:

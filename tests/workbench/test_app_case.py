@@ -9,13 +9,11 @@ import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.workbench.conftest import Served, serving
-from tests.workbench.test_app import browser, opened, settled
+from tests.workbench.test_app import opened, settled
 from tests.workbench.test_app_tasks import looked_at, photographed
 from tests.workbench.test_app_work import ended
 from tests.workbench.test_diagnosis_page import CASE_FILES
 from toolkit.lab.home import make_home
-
-__all__ = ["browser"]
 
 
 @pytest.fixture

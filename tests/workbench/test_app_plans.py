@@ -6,11 +6,11 @@ import pytest
 from playwright.sync_api import BrowserContext, expect
 
 from tests.workbench.conftest import Served
-from tests.workbench.test_app import browser, opened, settled
+from tests.workbench.test_app import opened, settled
 from tests.workbench.test_app_tasks import looked_at, photographed
 from tests.workbench.test_plan_page import planned
 
-__all__ = ["browser", "planned"]
+__all__ = ["planned"]
 
 
 def test_an_interval_is_planned_by_the_keyboard(browser: BrowserContext, own: Served) -> None:

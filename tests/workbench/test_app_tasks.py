@@ -13,7 +13,7 @@ from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.cli.test_calibration_control import session
 from tests.workbench.conftest import Served, serving
-from tests.workbench.test_app import DARK_PHONE, LIGHT, browser, objections, opened, settled
+from tests.workbench.test_app import DARK_PHONE, LIGHT, objections, opened, settled
 from toolkit.calibration.registry.registry import Registry
 from toolkit.lab.home import make_home
 from toolkit.lab.signatures.people import enrol_person, set_demand
@@ -21,7 +21,6 @@ from toolkit.trust.keys import open_signer
 from toolkit.trust.people import Role
 from toolkit.trust.requests import read_request
 
-__all__ = ["browser"]
 PEOPLE: dict[str, Role] = {"anna": "head", "dora": "checker", "carl": "operator"}
 STATEMENTS = (
     'zero = "tared"\n[cells.S]\nresolution = 0.0000001\n[[polarity]]\nload = "FY"\n'

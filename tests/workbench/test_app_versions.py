@@ -10,12 +10,10 @@ from playwright.sync_api import BrowserContext, Page, Request, expect
 
 from tests.cli.test_calibration_control import session
 from tests.workbench.conftest import Served
-from tests.workbench.test_app import browser, opened
+from tests.workbench.test_app import opened
 from tests.workbench.test_app_tasks import looked_at, photographed
 from tests.workbench.test_session_page import dropped, typed
 from toolkit.lab.desk.drafts import open_draft
-
-__all__ = ["browser"]
 
 
 def draft_page(browser: BrowserContext, bench: Served, draft: str) -> Page:

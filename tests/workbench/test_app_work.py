@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.workbench.conftest import ROOT, Served, serving
-from tests.workbench.test_app import browser, opened, settled
+from tests.workbench.test_app import opened, settled
 from tests.workbench.test_app_tasks import looked_at, photographed
 from tests.workbench.test_diagnosis_page import CASE_FILES
 from toolkit.files import sha256_file
@@ -20,7 +20,6 @@ from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.home import make_home
 from toolkit.lab.laboratory import example
 
-__all__ = ["browser"]
 STATED = 'schema = 1\nmachine = "m15"\ndate = 2019-05-31\n'
 """The day of the packaged recording, which was computed by the record with the wrong sign of E5, m15-r1."""
 

@@ -11,12 +11,11 @@ import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.workbench.conftest import ROOT, Served, serving
-from tests.workbench.test_app import DARK_PHONE, LIGHT, browser, objections, opened, settled
+from tests.workbench.test_app import DARK_PHONE, LIGHT, objections, opened, settled
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.desk.jobs import Job, write_job
 from toolkit.lab.laboratory import example, open_laboratory
 
-__all__ = ["browser"]
 ONE, FEW, AUDIT, MANY = map(holding_id, ("tests/one", "tests/few", "audits/one", "audits/many"))
 
 DIAGNOSIS = holding_id("diagnoses/cell")

@@ -12,8 +12,10 @@ from typing import Any
 
 import pytest
 
+from tests import commands
 from tests.built_once import built_once
 from tests.planning.class_factory import answer, found, write_case
+from tests.planning.planning_factory import LOADS, earlier
 from tests.workbench.conftest import Served, filled, plain, serving
 from tests.workbench.test_app_numbers import numbers
 from tests.workbench.test_home_page import command
@@ -23,6 +25,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.desk.kept_plans import fixtures_of, plan_words, read_plan
+from toolkit.lab.plans import protocol_plan
 
 ANSWER = holding_id("diagnoses/late")
 FORMS: dict[str, dict[str, str]] = {
@@ -58,13 +61,34 @@ def _plan_all(folder: Path) -> None:
     (late / "diagnosis.json").write_text(json.dumps({"schema": 1, **json_value(leaves)}), encoding="utf-8")
     (late / "model.toml").write_text('[answer]\ncase = "../../cases/late/CASE.toml"\n', encoding="utf-8")
     ids = {}
+    ids["test"] = _planned_here(home)
     with serving(home) as bench:
         for kind, form in FORMS.items():
+            if kind == "test":
+                continue
             page = done(bench, bench.send(f"/plans/{kind}", form))
             link = re.search(r"/plan/([0-9a-f]{16})", page.body)
             assert link is not None, plain(page.body)
             ids[kind] = link[1]
     (folder / "ids.json").write_text(json.dumps(ids), encoding="utf-8")
+
+
+def _planned_here(home: Path) -> str:
+    """Make the plan that the form of a test asks for, of an earlier test of fewer loads; return its id.
+
+    Its job would try every load of the virtual machine, which takes as long as all other plans together.
+    """
+    words = plan_words(home, "test", FORMS["test"], None, None)
+    with pytest.MonkeyPatch.context() as patch:
+        fewer_loads(patch)
+        patch.chdir(home)
+        ended = commands.said(*words)
+    assert ended.code == 0, ended.err
+    return holding_id(words[words.index("--out") + 1])
+
+
+def fewer_loads(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(protocol_plan, "_virtual", lambda _order, _like: earlier(LOADS[1:4]))
 
 
 def kept(bench: Served, plan_id: str) -> dict[str, Any]:
@@ -95,9 +119,14 @@ TWICE = pytest.mark.campaign("the longest plan a second time: what is kept of th
     "kind", [pytest.param(kind, marks=TWICE) if kind == "test" else kind for kind in COMMANDS]
 )
 def test_a_kept_plan_is_what_the_command_answers(
-    planned: tuple[Served, dict[str, str]], kind: str, capsys: pytest.CaptureFixture[str]
+    planned: tuple[Served, dict[str, str]],
+    kind: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     bench, ids = planned
+    if kind == "test":
+        fewer_loads(monkeypatch)
     said = command(capsys, "plan", kind, *COMMANDS[kind], "--home", bench.home)
     for key in ("timing", "out", "files"):
         said.pop(key, None)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.report.template_factory import make, p
 from tests.workbench.conftest import ROOT, Served, plain, serving
 from tests.workbench.test_home_page import command
 from tests.workbench.test_jobs_page import done
@@ -70,6 +71,10 @@ def test_a_template_is_seen_page_by_page_and_only_those_of_the_home(home: Path) 
 
 
 def test_a_report_is_seen_with_its_holes_before_it_is_issued(home: Path) -> None:
+    turn = '<w:p><w:r><w:br w:type="page"/></w:r></w:p>'
+    required = p("{{tk:report.id}}, {{tk:test.name}}, {{tk:calibration.id}}")
+    body = required + turn + p("{{tk:tire.size}}, {{tk:test.operator}}")
+    make(home / "report_templates", body, name="org.docx")
     with serving(home) as bench:
         assert "No preview was made yet" in bench.page(f"/test/{TEST}/report/part").body
         assert bench.page(f"/test/{TEST}/report/page/1.png").status == 404

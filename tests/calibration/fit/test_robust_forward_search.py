@@ -30,7 +30,7 @@ BETWEEN = pytest.mark.campaign(
         pytest.param(20, 4, 300, marks=BETWEEN),
         (81, 4, 300),
         pytest.param(81, 8, 300, marks=BETWEEN),
-        (120, 13, 40),
+        (120, 13, 15),
     ],
 )
 def test_sound_rows_are_named_at_the_stated_risk(rows: int, terms: int, sessions: int) -> None:

@@ -67,7 +67,10 @@ def held(folder: Path, method: str, draws: int, *, runs: float) -> NDArray[np.fl
     return np.asarray(np.mean(inside, axis=0))
 
 
-@pytest.mark.parametrize("runs", [0.0, 1.0], ids=["runs-alike", "runs-differ"])
+ALIKE = pytest.mark.campaign("runs that are alike, an easier case: those that differ hold by every method")
+
+
+@pytest.mark.parametrize("runs", [pytest.param(0.0, marks=ALIKE), 1.0], ids=["runs-alike", "runs-differ"])
 @pytest.mark.parametrize("method", METHODS)
 def test_intervals_of_every_method_hold_the_truth(tmp_path: Path, method: str, runs: float) -> None:
     # 95 % of 40 are 38; under 34 has a chance of one in a hundred.
@@ -83,7 +86,14 @@ def test_intervals_of_every_method_hold_the_truth_in_200(tmp_path: Path, method:
     assert (share <= 0.995).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
+BETWEEN = pytest.mark.campaign(
+    "a method between the plain one and that of most scatter, which hold in every run"
+)
+
+
+@pytest.mark.parametrize(
+    "method", [pytest.param(name, marks=[BETWEEN] * (name in ("wls", "odr"))) for name in METHODS]
+)
 def test_the_covariance_is_that_of_the_map_from_loads_to_coefficients(tmp_path: Path, method: str) -> None:
     """Each load moved by itself gives A; A V A^T by dense algebra, V as the scatter has it."""
     path = drawn_session(tmp_path / "s", method, 3, runs=1.0)

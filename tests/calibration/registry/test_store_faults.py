@@ -113,11 +113,11 @@ EACH_CALL = pytest.mark.campaign(
     ("name", "fault", "most"),
     [
         # The places where another kind of call begins: a call that follows one of its kind is as far.
-        *(("approve", fault, 10) for fault in ("full", "eio", "kill")),
+        *(("approve", fault, 6) for fault in ("full", "eio", "kill")),
         *(pytest.param("approve", fault, None, marks=EACH_CALL) for fault in ("full", "eio", "kill")),
         pytest.param("approve", "broken", None, marks=LASTS),
-        ("first", "kill", 6),
-        ("calibrate", "eio", 6),
+        ("first", "kill", 4),
+        ("calibrate", "eio", 4),
         pytest.param("first", "kill", None, marks=EACH_CALL),
         pytest.param("calibrate", "eio", None, marks=EACH_CALL),
         *(

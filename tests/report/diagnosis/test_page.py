@@ -27,13 +27,20 @@ def dragged(tmp_path_factory):
     return diagnose(read_case(write_case(tmp_path_factory.mktemp("case"), **files)), None)
 
 
+def words_of(result):
+    """Return the page for its words alone: its figures, which take most of its time, are not drawn."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "draw_svg", lambda _size, _draw: b'<svg xmlns="http://www.w3.org/2000/svg"/>')
+        return page(result)
+
+
 def test_the_chart_comes_before_every_table_and_heading(dragged):
     html = page(dragged)
     assert html.index('<div class="verdict') < html.index("<img") < html.index("<h2>") < html.index("<table")
 
 
 def test_a_table_scrolls_by_itself_and_a_narrow_window_is_as_wide_as_it_is(dragged):
-    html = page(dragged)
+    html = words_of(dragged)
     assert html.count('<div class="wide"><table>') == html.count("<table>") > 0
     assert 'name="viewport"' in html
     assert ".wide { overflow-x: auto;" in html
@@ -68,7 +75,7 @@ def test_a_search_that_was_cut_off_does_not_say_that_no_effect_explains(dragged)
 @pytest.mark.parametrize(("step", "is_said"), [("laws", True), ("swaps", True), ("predictions", False)])
 def test_a_name_whose_last_test_was_skipped_is_provisional_in_the_first_line(dragged, step, is_said):
     cut = dataclasses.replace(dragged.diagnosis, complete=False, skipped=(step,))
-    html = page(dataclasses.replace(dragged, diagnosis=cut))
+    html = words_of(dataclasses.replace(dragged, diagnosis=cut))
     console = diagnosis_text(cut, "out").splitlines()[0]
     for first in (html.split('<div class="verdict')[1], headline(cut), console.split(": ", 1)[1]):
         assert ("Provisional: the budget was spent" in first) is is_said
@@ -77,7 +84,7 @@ def test_a_name_whose_last_test_was_skipped_is_provisional_in_the_first_line(dra
 
 def test_the_noise_of_the_sensor_stands_beside_what_is_left(dragged):
     (fit,) = dragged.diagnosis.fit.held_out
-    assert f"{fit.noise.sensor_sd:.4g}" in page(dragged)
+    assert f"{fit.noise.sensor_sd:.4g}" in words_of(dragged)
     lines = diagnosis_text(dragged.diagnosis, "out").splitlines()
     (titles,) = [line for line in lines if line.startswith("output ")]
     (row,) = [line for line in lines if line.startswith("F ") and " N " in line]
@@ -92,7 +99,7 @@ def test_a_rest_that_is_slower_than_its_sensor_is_not_called_its_noise(dragged):
         dragged.diagnosis, verdict="nothing", remaining="nothing", effects=(), mismatch=(),
         fit=dataclasses.replace(dragged.diagnosis.fit, held_out=(slow,)),
     )  # fmt: skip
-    html = page(dataclasses.replace(dragged, diagnosis=clean))
+    html = words_of(dataclasses.replace(dragged, diagnosis=clean))
     assert "F is 5 times its sensor" in html
     assert "larger than the sensor has from row to row" in html
 
@@ -101,7 +108,7 @@ def test_what_is_left_says_no_variable_that_is_none(dragged):
     large = ("a floor above a tenth of the output's spread",)
     left = tuple(Dependence(channel="F", variables=names) for names in (large, ("F",), ("v", "F")))
     unknown = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=(), depends_on=left)
-    for text in (page(dataclasses.replace(dragged, diagnosis=unknown)), diagnosis_text(unknown, "out")):
+    for text in (words_of(dataclasses.replace(dragged, diagnosis=unknown)), diagnosis_text(unknown, "out")):
         assert "F leaves a floor above a tenth" in text
         assert "F over its own size" in text
         assert "F over v and its own size" in text
@@ -119,14 +126,14 @@ def test_what_is_there_or_not_has_no_smallest_size_and_says_so(dragged):
     absent = {each.name: each for each in dragged.diagnosis.not_found}
     for each in absent.values():
         assert each.minimum_detectable is not None or each.why
-    assert "it has no size" in page(dragged)
+    assert "it has no size" in words_of(dragged)
 
 
 def test_no_chance_is_zero(dragged):
     assert chance(0.0) == "p < 1e-300"
     assert chance(float("nan")) == "p unknown"
     assert chance(0.0312) == "p = 0.031"
-    assert not re.search(r"(p =|is) 0[.)]", page(dragged))
+    assert not re.search(r"(p =|is) 0[.)]", words_of(dragged))
 
 
 def test_a_mean_over_loads_that_repeat_has_no_point_where_none_was_recorded():
@@ -156,7 +163,7 @@ def test_the_page_says_on_which_condition_an_effect_acts(dragged):
 
 
 def test_an_effect_that_has_no_place_takes_no_row(dragged):
-    html = page(dragged)
+    html = words_of(dragged)
     hidden = [one.name for one in dragged.diagnosis.not_found if not one.observable]
     shown = [one.name for one in dragged.diagnosis.not_found if one.observable]
     assert hidden
@@ -192,7 +199,7 @@ def simulate(inputs, p):
     places = [at for one in result.diagnosis.mismatch for at in one.where if at.variable == "time"]
     assert places
     assert all(at.unit == "day" and 0 <= at.start < at.end <= 99 for at in places)
-    assert "day" in page(result)
+    assert "day" in words_of(result)
 
 
 def test_a_residual_is_mapped_over_every_kind_of_variable():
@@ -255,7 +262,7 @@ def test_a_residual_that_is_only_too_large_depends_on_nothing(dragged):
         mismatch=(large,),
         depends_on=(Dependence(channel="F", variables=cause),),
     )
-    html = page(dataclasses.replace(dragged, diagnosis=made))
+    html = words_of(dataclasses.replace(dragged, diagnosis=made))
     assert "F is off by more than its stated noise" in html
     assert "over more than" not in html
     assert ": 0 %" not in html
@@ -272,7 +279,7 @@ def test_the_first_line_has_the_cause_its_size_and_what_it_explains(dragged):
     share = 100 * (fit.refitted_rmse**2 - fit.augmented_rmse**2) / above
     assert f"explains {share:.0f} % of the mean square by which F" in line
     assert cause(dataclasses.replace(dragged.diagnosis, effects=())) is None
-    assert line.split("(")[0] in page(dragged)
+    assert line.split("(")[0] in words_of(dragged)
 
 
 def test_a_spent_budget_is_not_the_recordings_fault(dragged):
@@ -285,13 +292,13 @@ def test_a_spent_budget_is_not_the_recordings_fault(dragged):
 
 def test_nothing_is_shown_beside_the_recording(dragged):
     clean = dataclasses.replace(dragged.diagnosis, verdict="nothing", effects=(), mismatch=())
-    assert "nothing stands out of the noise" in page(dataclasses.replace(dragged, diagnosis=clean))
+    assert "nothing stands out of the noise" in words_of(dataclasses.replace(dragged, diagnosis=clean))
 
 
 def test_what_has_no_name_has_a_list_of_what_it_is_not(dragged):
     unknown = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=())
-    assert "why it is not named" in page(dataclasses.replace(dragged, diagnosis=unknown))
-    assert "why it is not named" not in page(dragged)
+    assert "why it is not named" in words_of(dataclasses.replace(dragged, diagnosis=unknown))
+    assert "why it is not named" not in words_of(dragged)
 
 
 def test_a_long_curve_keeps_its_extremes():
@@ -310,6 +317,6 @@ def test_a_long_curve_keeps_its_extremes():
 def test_simulated_recordings_are_marked_on_the_page_and_the_console(dragged, tmp_path):
     note = Finding(rule="case-simulated", where="CASE.toml", level="note", message="simulated")
     marked = dataclasses.replace(dragged.diagnosis, findings=(note,))
-    assert "SIMULATED DATA" in page(dataclasses.replace(dragged, diagnosis=marked))
+    assert "SIMULATED DATA" in words_of(dataclasses.replace(dragged, diagnosis=marked))
     assert diagnosis_text(marked, tmp_path).startswith("SIMULATED DATA")
-    assert "SIMULATED" not in page(dragged) + diagnosis_text(dragged.diagnosis, tmp_path)
+    assert "SIMULATED" not in words_of(dragged) + diagnosis_text(dragged.diagnosis, tmp_path)

@@ -15,6 +15,7 @@ import pytest
 
 import proof
 import toolkit
+from tests.house.source import read_module, read_package
 from toolkit.report.audit.svg import Drawing
 from toolkit.report.pages.kit import Column, Figure, Table, environment, facts, page_parts, quantity, table
 
@@ -211,14 +212,12 @@ def test_no_module_writes_html_by_string():
     tag = re.compile(
         r"</(?:table|tr|td|th|p|ul|li|details|section)>|</?(?:html|head|body|div|span|h[1-6]|svg)\b"
     )
-    modules = [*TOOLKIT.rglob("*.py"), PROOF / "page.py"]
-    for path in modules:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+    for module in [*read_package(), read_module(PROOF / "page.py")]:
         texts = [
             node.value
-            for node in ast.walk(tree)
+            for node in ast.walk(module.tree)
             if isinstance(node, ast.Constant) and isinstance(node.value, str)
         ]
-        assert not [text for text in texts if tag.search(text)], path
-        if path.parent.name != "pages":
-            assert "Markup(" not in path.read_text(encoding="utf-8"), path
+        assert not [text for text in texts if tag.search(text)], module.path
+        if module.path.parent.name != "pages":
+            assert "Markup(" not in module.text, module.path

@@ -78,7 +78,7 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         findings += stated_findings(load)
         findings += scatter_findings(judged)
     alone = _single(fit.session, doubted.union(*(load.diagnostics.outliers for load in fit.loads)))
-    findings += difference_findings(_without(fit, alone))
+    findings += difference_findings(sound if alone == doubted else _without(fit, alone))
     findings += _robust_findings(fit, wrong)
     findings += [
         finding for load in fit.loads for finding in _scale_findings(load, scales[load.setting.name])

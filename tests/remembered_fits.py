@@ -1,0 +1,53 @@
+"""Fits that the registry has asked for before: hundreds of tests enter and approve the same few sessions."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+from toolkit.calibration.fit import readings_findings
+from toolkit.calibration.fit.findings import session_findings
+from toolkit.calibration.fit.session_fit import SessionFit, fit_session
+from toolkit.calibration.registry import candidate, judgement
+from toolkit.calibration.session.read import Session
+
+_answers: dict[bytes, bytes] = {}
+
+
+def remember_fits() -> None:
+    """Have the registry fit and judge a session once, wherever a copy of it lies; a refusal is found anew.
+
+    The tests of the fit itself ask `fit_session` and `session_findings`, which remember nothing.
+    """
+    for module in (candidate, judgement):
+        module.fit_session = _fitted  # type: ignore[attr-defined]
+    for room in (candidate, readings_findings):
+        room.session_findings = _judged  # type: ignore[attr-defined]
+
+
+def _fitted(session: Session) -> SessionFit:
+    # The place of a session is in what refuses it alone.
+    fit: SessionFit = _once(fit_session, session, None)
+    return dataclasses.replace(fit, session=dataclasses.replace(fit.session, path=session.path))
+
+
+def _judged(fit: SessionFit) -> Any:
+    return _once(session_findings, fit, fit.session.path.name)
+
+
+def _once(ask: Callable[[Any], Any], given: Session | SessionFit, place: object) -> Any:
+    """Return a copy of what is answered to the same content under the same name."""
+    key = hashlib.sha256(pickle.dumps((ask.__name__, place, _without_path(given)))).digest()
+    if key not in _answers:
+        _answers[key] = pickle.dumps(ask(given))
+    return pickle.loads(_answers[key])  # noqa: S301  written above
+
+
+def _without_path(given: Session | SessionFit) -> tuple[object, ...]:
+    session = given if isinstance(given, Session) else given.session
+    rest = () if given is session else (given.loads,)  # type: ignore[union-attr]
+    fields = [field.name for field in dataclasses.fields(session) if field.name != "path"]
+    return (*(getattr(session, name) for name in fields), *rest)
