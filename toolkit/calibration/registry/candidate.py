@@ -156,7 +156,9 @@ def calibrate(
             unnumbered, history=history, machine=definition, loads=session.table, check=session.check
         )
         # What a gate says takes the place of the same in the session's own words: its level is the gate's.
-        by_gates = {(result.rule, result.where): result.finding() for result in (*judged.results, *read_again)}
+        by_gates = {
+            (result.rule, result.where): result.finding() for result in (*judged.results, *read_again)
+        }
         findings = tuple(by_gates.pop((entry.rule, entry.where), entry) for entry in findings)
         findings += tuple(by_gates.values())
     return Candidate(
