@@ -1,6 +1,6 @@
 """All rows at once of what turns: the motion, and its derivatives, of a stiff solver.
 
-The reference integrates Dahl's equation as a third state by an implicit method (BDF of LSODA); derivatives are
+The reference integrates Dahl's equation as a third state by an implicit method (LSODA); derivatives are
 central differences of its solutions.
 """
 
