@@ -36,7 +36,6 @@ _AGAIN = 3
 _BENT = 0.3  # of a step's response: more off the straight line, and derivatives are taken anew
 _STRAIGHT = 0.02  # of the whole way's response: less off, and they were good enough to end on
 _NOTHING = 0.1  # standard deviations of the noise, over the whole recording: no way at all
-_FLAT = 1e-5  # of the sum of squares: less by the next step moves no parameter by a tenth of its error
 _RAN_AWAY = 1e100  # standard deviations: the square of more is no number
 
 
@@ -161,7 +160,7 @@ def descend(
             bounds=(space.low, space.high),
             x_scale=1.0,
             max_nfev=_TRIALS,
-            ftol=_FLAT,
+            ftol=1e-6,
             xtol=1e-5,  # of a parameter's size: the step after it would be smaller by orders
             gtol=1e-9,
         ).x
