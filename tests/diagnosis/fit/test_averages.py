@@ -170,8 +170,12 @@ def test_rows_without_a_clock_are_never_averaged(tmp_path: Path) -> None:
     assert rows_of(case_of(tmp_path / "uneven", *uneven)) == 1
 
 
-def test_a_simulator_that_takes_its_inputs_for_numbers_keeps_its_rows(tmp_path: Path) -> None:
-    """A gear that is looked up has no mean; the rows stay, and the answer says nothing of means."""
+@pytest.mark.parametrize("shifts", ["once", "all the time"])
+def test_a_simulator_that_takes_its_inputs_for_numbers_is_given_them(tmp_path: Path, shifts: str) -> None:
+    """A gear that is looked up has no mean: where it has no noise it is none of what is smoothed.
+
+    One that looks like noise is smoothed, and the simulation does not take it: then the rows stay.
+    """
     looked_up = """
 import pandas as pd
 def simulate(inputs, p):
@@ -180,12 +184,16 @@ def simulate(inputs, p):
 """
     toml = HEAD.replace("F = {", 'gear = { unit = "1", role = "input" }\nF = {')
     frames = []
+    rng = np.random.default_rng(1)
     for frame in (swept(0), swept(1)):
         gear = np.where(frame["t"] < 4, 1.0, 2.0)
+        if shifts == "all the time":
+            gear = rng.integers(1, 3, len(frame)).astype(float)
         frames.append(frame.assign(gear=gear, F=frame["F"] * np.where(gear == 1.0, 1.0, 0.5)))
     case = case_of(tmp_path, *frames, toml=toml, simulator=looked_up)
     assert rows_of(case) > 1
-    assert "case-averaged" not in {one.rule for one in diagnose(case, None, budget_s=4).diagnosis.findings}
+    told = {one.rule for one in diagnose(case, None, budget_s=30).diagnosis.findings}
+    assert ("case-averaged" in told) is (shifts == "once")
 
 
 def test_a_simulation_that_bends_within_a_mean_is_not_that_of_means(tmp_path: Path) -> None:
