@@ -134,9 +134,15 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     # What is given is judged as it was given: an unknown entry has no place in the file.
     text = outline(cls, {})
     stated = {key: entry for key, entry in toml_entries(text).items() if key == "schema"} | values
-    faults = [fault for fault in attempt(cls, stated)[1] if fault.kind != "missing"]
     # What a guess cannot tell is still to be stated, and is no error of anybody's.
-    refuse([fault for fault in faults if _top(fault.name) not in guess.values], Source(where=file))
+    refuse(
+        [
+            fault
+            for fault in attempt(cls, stated)[1]
+            if fault.kind != "missing" and _top(fault.name) not in guess.values
+        ],
+        Source(where=file),
+    )
     if word == "session":
         reference = values.get("reference")
         named = {**values, "reference.dcc": reference.get("dcc") if isinstance(reference, dict) else None}

@@ -110,9 +110,8 @@ def sweeps_of(
         if t is None or fault is not None:
             why = "it has no time: name a column 't [s]', or the machine's rate"
             if fault is not None:
-                why = (
-                    f"{fault.problem} (rows: {len(fault.rows)}, the first is {fault.rows[0]}): {fault.remedy}"
-                )
+                count, first = len(fault.rows), fault.rows[0]
+                why = f"{fault.problem} ({count} rows, the first is row {first}): {fault.remedy}"
             findings.append(_unused(name, why))
             continue
         findings += health_findings(
