@@ -9,6 +9,7 @@ from tests.diagnosis.cases import HEAD, ONE, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import CellError
 from toolkit.recording.clock import time_fault
+from toolkit.words.phrasebook import phrasebook
 
 
 @pytest.mark.parametrize(
@@ -41,3 +42,16 @@ def test_a_case_says_how_many_rows_have_a_time_that_stands_twice_and_what_to_do(
     assert "rows 4 and 6" in caught.value.got
     assert "drop one row" in caught.value.next_step
     assert "sort" not in caught.value.next_step
+
+
+@pytest.mark.parametrize("language", ["de", "fr"])
+@pytest.mark.parametrize("times", [[0, 1, 1], [0, 2, 1], [0, np.nan, 1]])
+def test_a_sweep_that_is_not_used_for_its_times_says_why_in_every_language(
+    times: list[float], language: str
+) -> None:
+    fault = time_fault(np.array(times, dtype=float))
+    assert fault is not None
+    why = f"{fault.problem} ({len(fault.rows)} rows, the first is row {fault.rows[0]}): {fault.remedy}"
+    said = phrasebook(language).say(f"the sweep says nothing: {why}")
+    for english in ("the sweep", "row", fault.problem, fault.remedy):
+        assert english not in said
