@@ -170,21 +170,48 @@ def test_a_case_shows_every_kind_of_simulation_and_the_chosen_one_alone(folder: 
 
 def test_a_case_of_a_recording_names_its_channels_and_leaves_open_what_no_header_tells(folder: Path) -> None:
     rows = "".join(f"{i},{i % 5},3000,{-900 * (i % 5)},{-890 * (i % 5)},7\n" for i in range(40))
-    (folder / "r.csv").write_text(f"Time [s],SA [deg],FZ [N],FY [N],FY_sim,x\n{rows}")
+    (folder / "r.csv").write_text(f"Time [s],SA [deg],FZ [N],FY [N],FY_sim,x [m]\n{rows}")
     code, told = commands.answer("case", "new", "c.toml", "--from", "r.csv")
-    assert (code, told["open"], told["not_guessed"]) == (0, [], ["x: what it is to the simulation"])
+    assert (code, told["open"]) == (0, [])
+    assert told["not_guessed"] == ["x: an input, an output or a covariate of the simulation"]
     channels = {channel.name: (channel.unit, channel.role) for channel in read_case(Path("c.toml")).channels}
     assert channels == {
         "Time": ("s", "time"), "SA": ("deg", "input"), "FZ": ("N", "input"), "FY": ("N", "output"),
+        "x": ("m", "input"),
     }  # fmt: skip
     assert told["guessed"]["simulation"] == {"kind": "columns", "simulated": {"FY": "FY_sim"}}
     # What somebody states goes before a guess, which is then none.
     _, told = commands.answer("case", "new", "p.toml", "--from", "r.csv", "--set", "simulation.kind=python")
     assert (set(told["guessed"]), told["open"]) == ({"recording"}, ["simulation.path"])
-    # A channel without a unit is one: its unit is asked for.
-    (folder / "bare.csv").write_text("t,FY\n0,1\n")
-    _, told = commands.answer("case", "new", "b.toml", "--from", "bare.csv", "--set", "simulation.kind=ode")
-    assert {"recording.channels.t.unit", "recording.channels.FY.unit"} <= set(told["open"])
+
+
+def test_every_column_of_numbers_is_a_channel_of_a_new_case(folder: Path) -> None:
+    (folder / "part1.csv").write_text("t,gas,co2 [%],operator\n0,-0.1,53.8,first\n9,0,53.6,first\n")
+    words = ("--from", "part1.csv", "--set", "simulation.kind=python", "--set", "simulation.path=sim.py")
+    _, told = commands.answer("case", "new", "f.toml", *words)
+    assert told["guessed"]["recording"]["channels"] == {
+        "t": {"unit": "s", "role": "time"}, "gas": {"role": "input"}, "co2": {"unit": "%", "role": "input"},
+    }  # fmt: skip
+    assert told["open"] == ["recording.channels.gas.unit"]
+    assert list(told["lacking"]) == ["recording.channels"]
+    assert "operator: it holds texts, and is no channel" in told["not_guessed"]
+    text = (folder / "f.toml").read_text()
+    assert "\n[recording.channels]\n" in text
+    assert '\ngas = { role = "input" }   # FILL IN: unit\n' in text
+    assert "t is the time, in s where its header states no unit" in text.replace("\n# ", " ")
+    # Filled in as the file and the command say, it is a case.
+    text = text.replace('{ role = "input" }   # FILL IN: unit', '{ unit = "1", role = "input" }')
+    (folder / "f.toml").write_text(text.replace('unit = "%", role = "input"', 'unit = "%", role = "output"'))
+    (folder / "sim.py").write_text("def simulate(inputs, p): ...\n")
+    assert [channel.role for channel in read_case(Path("f.toml")).channels] == ["time", "input", "output"]
+
+
+def test_a_case_whose_outputs_no_header_tells_is_begun_and_asks_for_them(folder: Path) -> None:
+    (folder / "r.csv").write_text("t [s],x [m]\n0,1\n1,2\n")
+    code, told = commands.answer(
+        "case", "new", "c.toml", "--from", "r.csv", "--set", "simulation.kind=machine"
+    )
+    assert (code, told["open"]) == (0, ["recording.channels"])
 
 
 def test_a_plan_is_read(folder: Path) -> None:

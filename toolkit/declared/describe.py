@@ -295,7 +295,7 @@ def _entries(
     kind: TableKind, path: tuple[str, ...], values: Mapping[str, Any], notes: Notes, root: Root | None
 ) -> Iterator[str]:
     offered = [field for field in kind.fields if not field.kind.entry.by_command or field.key in values]
-    below = [declared for declared in offered if _is_below(declared)]
+    below = [declared for declared in offered if _is_below(declared, values.get(declared.key))]
     for declared in offered:
         if declared in below:
             continue
@@ -317,12 +317,25 @@ def _entries(
             for part in entry:
                 yield from (f"[[{header}]]", *table_lines(part, names), *_lacking(inner, part, root))
         elif isinstance(declared.kind, ListKind | KeyedKind) and entry is not None:
-            yield from (f"[{header}]", *table_lines(entry, names))
+            yield from (f"[{header}]", *_keyed_lines(inner, entry, names))
         elif inner is not None and (entry is not None or _is_needed(declared)):
             yield f"[{header}]"
             yield from _entries(inner, names, entry or {}, {}, root)
         elif inner is not None:
             yield from _inner_lines(declared, names, on=False, root=root, marked=True)
+
+
+def _keyed_lines(inner: TableKind | None, entry: Mapping[str, Any], names: tuple[str, ...]) -> Iterator[str]:
+    """Yield the tables of names, each with what it does not state yet."""
+    fields = () if inner is None else inner.fields
+    required = [declared.key for declared in fields if declared.required]
+    lines = table_lines(entry, names)
+    if len(lines) != len(entry):  # one of them is too long for one line
+        yield from lines
+        return
+    for line, part in zip(lines, entry.values(), strict=True):
+        absent = [key for key in required if isinstance(part, Mapping) and key not in part]
+        yield f"{line}{_FILL_IN}: {', '.join(absent)}" if absent else line
 
 
 def _lacking(inner: TableKind | None, part: Mapping[str, Any], root: Root | None) -> Iterator[str]:
@@ -369,7 +382,12 @@ def _chosen(
             yield f"#{key_of(declared.key)} = {_example(declared, root)}{mark}"
 
 
-def _is_below(declared: Field) -> bool:
+def _is_below(declared: Field, entry: Any = None) -> bool:
+    """Tell whether an entry has a table of its own; tables that are known have one, however short."""
+    if isinstance(declared.kind, ListKind | KeyedKind) and _inner_table(declared.kind) is not None and entry:
+        return all(
+            isinstance(part, Mapping) for part in (entry if isinstance(entry, list) else entry.values())
+        )
     if isinstance(declared.kind, FormsKind):
         return declared.kind.tag is not None and declared.kind.entry.example is None
     return _inner_table(declared.kind) is not None and declared.kind.entry.example is None

@@ -402,6 +402,9 @@ class _Structure:
     line_even: float = _set(0.05, "of the mean step", "by which the runs' clocks may differ to be added")
     line_cycles: int = _set(8, "cycles a run", "slower is a trend, not a line")
     line_jitter: float = _set(0.9, "of a step", "by which single steps may differ: an even clock is put in")
+    order_cycles: float = _set(
+        0.25, "cycles", "by which a line may part from an angle that it keeps step with"
+    )
     line_kept: float = _set(0.9, "of a run's rows", "fewer recorded ones make lines of their own")
 
 

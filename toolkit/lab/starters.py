@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -41,6 +41,10 @@ _CASE_ROLES = {"t": "time", "T": "covariate"} | dict.fromkeys(("FX", "FY", "MX",
 """What a channel is to a simulation; the others are inputs."""
 _READ_FROM_CELLS = ("bridge_ratio", "voltage", "count")
 _OF_SEVERAL_ROLES = ("force", "moment", "angle", "time", "ratio")
+
+
+Column = tuple[str, str, str | None]
+"""Header, name, unit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +134,15 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     # What is given is judged as it was given: an unknown entry has no place in the file.
     text = outline(cls, {})
     stated = {key: entry for key, entry in toml_entries(text).items() if key == "schema"} | values
-    refuse([fault for fault in attempt(cls, stated)[1] if fault.kind != "missing"], Source(where=file))
+    # What a guess cannot tell is still to be stated, and is no error of anybody's.
+    refuse(
+        [
+            fault
+            for fault in attempt(cls, stated)[1]
+            if fault.kind != "missing" and _top(fault.name) not in guess.values
+        ],
+        Source(where=file),
+    )
     if word == "session":
         reference = values.get("reference")
         named = {**values, "reference.dcc": reference.get("dcc") if isinstance(reference, dict) else None}
@@ -141,6 +153,10 @@ def start(word: str, entries: Mapping[str, Any], recording: Path | None, *, file
     _, faults = attempt(cls, toml_entries(text))
     helps = {fault.name: fault.expected for fault in faults} | asked_of(cls, values)
     return Starter(text=text, guess=guess, helps=helps)
+
+
+def _top(name: str) -> str:
+    return re.split(r"[.\[]", name, maxsplit=1)[0]
 
 
 def starter_text(word: str, file: Path, starter: Starter) -> str:
@@ -179,18 +195,21 @@ def guess_from(word: str, recording: Path, folder: Path) -> Guess:
     ConfigError
         ``usage``: a file of this format says nothing of columns
     """
-    guesses = {"session": _session, "machine": _machine, "case": guess_case}
-    if word not in guesses:
+    guesses = {"session": _session, "machine": _machine}
+    if word not in guesses and word != "case":
         raise ConfigError(
             f"a recording says nothing of a {word}", where="--from", got=recording,
             expected="--from beside 'session new', 'machine new' or 'case new'",
             next_step="leave --from away", rule="usage",
         )  # fmt: skip
     name = os.path.relpath(recording.absolute(), folder.absolute())
-    return guesses[word](Path(name).as_posix(), headers_of(recording))
+    columns, texts = _columns(recording)
+    if word == "case":
+        return _case(Path(name).as_posix(), columns, texts)
+    return guesses[word](Path(name).as_posix(), columns)
 
 
-def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
+def headers_of(recording: Path) -> list[Column]:
     """Return the columns of a recording: header, name, unit; None for a unit that is not stated.
 
     Raises
@@ -198,6 +217,11 @@ def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
     RecordingError
         the file cannot be read, or has no header
     """
+    return _columns(recording)[0]
+
+
+def _columns(recording: Path) -> tuple[list[Column], set[str]]:
+    """Return the columns of a recording, and the names of those that hold texts."""
     from toolkit.calibration.session.cells import read_cells
 
     def is_name(text: str, whole: str = "") -> bool:
@@ -210,13 +234,25 @@ def headers_of(recording: Path) -> list[tuple[str, str, str | None]]:
             expected="a header that names each column with its unit, such as 'C1 [mV/V]', above the rows",
             next_step="write the header, or leave --from away", rule="no-header",
         )  # fmt: skip
-    columns = []
-    for header in (text.strip() for text in cells.header if text.strip()):
+    columns, texts = list[Column](), set[str]()
+    for header, column in zip(map(str.strip, cells.header), cells.columns, strict=True):
+        if not header:
+            continue
         # Any text may be a name here, and a unit is what is known as one.
         name, unit = split_header(header, partial(is_name, whole=header))
         known = unit is not None and is_unit(unit)
         columns.append((header, name if known else header, unit if known else None))
-    return columns
+        if not _is_number(next((cell for cell in column if str(cell or "").strip()), 0.0)):
+            texts.add(columns[-1][1])
+    return columns, texts
+
+
+def _is_number(cell: Any) -> bool:
+    try:
+        float(cell.strip().replace(",", ".") if isinstance(cell, str) else cell)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _dimension(unit: str | None) -> str | None:
@@ -228,7 +264,7 @@ def _dimension(unit: str | None) -> str | None:
         return None
 
 
-def _session(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess:
+def _session(name: str, columns: Sequence[Column]) -> Guess:
     stated = [(plain, _dimension(unit)) for _, plain, unit in columns if plain.lower() not in _BOOKKEEPING]
     loads = [plain for plain, dimension in stated if dimension in ("force", "moment")]
     indications = [plain for plain, dimension in stated if dimension not in (None, "force", "moment", "time")]
@@ -247,7 +283,7 @@ def _session(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
     return Guess(values=values, notes=notes, silent=tuple(silent), lacking=lacking)
 
 
-def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess:
+def _machine(name: str, columns: Sequence[Column]) -> Guess:
     entries, silent = [], []
     for header, plain, unit in columns:
         dimension = _dimension(unit)
@@ -281,14 +317,12 @@ def _machine(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess
     return Guess(values=values, notes={"column": note} if entries else {}, silent=tuple(silent))
 
 
-def guess_case(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Guess:
+def guess_case(name: str, columns: Sequence[Column]) -> Guess:
     """Return what the columns of a recording, as `headers_of` gives them, say of a case."""
     units = {plain: unit for _, plain, unit in columns}
     roles = {plain: _CASE_ROLES.get(found.symbol, "input") for plain in units if (found := channel_of(plain))}
-    channels = {
-        plain: {"unit": units[plain], "role": role} if units[plain] else {"role": role}
-        for plain, role in roles.items()
-    }
+    units |= {plain: "s" for plain, role in roles.items() if role == "time" and units[plain] is None}
+    channels = {plain: _channel(units[plain], role) for plain, role in roles.items()}
     # Another program's output stands beside the recorded one, under a name that begins as its own.
     others = {
         plain: [other for other in units.keys() - roles.keys() if other.startswith(plain)]
@@ -306,6 +340,57 @@ def guess_case(name: str, columns: Sequence[tuple[str, str, str | None]]) -> Gue
         notes={"recording": f"guessed from {name}: forces and moments but the load are outputs"},
         silent=tuple(f"{plain}: what it is to the simulation" for plain in units if plain in unknown),
     )
+
+
+def _case(name: str, columns: Sequence[Column], texts: Collection[str]) -> Guess:
+    """Return what a recording says of a case: every column of numbers is a channel.
+
+    What no name tells of is proposed as an input: which of them the simulation gives, a person says.
+    """
+    guess = guess_case(name, columns)
+    units = {plain: unit for _, plain, unit in columns}
+    channels = guess.values["recording"].get("channels", {})
+    simulated = guess.values.get("simulation", {}).get("simulated", {}).values()
+    proposed = [plain for plain in units if plain not in {*channels, *simulated, *texts}]
+    known = dict(channels)
+    channels = {
+        plain: known.get(plain) or _channel(units[plain], "input")
+        for plain in units
+        if plain in {*known, *proposed}
+    }
+    times = [plain for plain, channel in known.items() if channel["role"] == "time"]
+    notes = [
+        f"guessed from {name}, to be confirmed: forces and moments but the load are outputs",
+        *(f"{plain} is the time, in s where its header states no unit" for plain in times),
+    ]
+    if proposed:
+        notes.append(
+            f'{", ".join(proposed)} proposed as inputs: give role = "output" to what the simulation gives, '
+            '"covariate" to what only goes along, and take out what is neither'
+        )
+    recording = ({"channels": channels} if channels else {}) | {"run": [{"file": name}]}
+    return replace(
+        guess,
+        values={**guess.values, "recording": recording},
+        notes={"recording": "; ".join(notes)},
+        silent=(
+            *(f"{plain}: an input, an output or a covariate of the simulation" for plain in proposed),
+            *(f"{plain}: it holds texts, and is no channel" for plain in units if plain in texts),
+        ),
+        lacking=_outputs_lacking(channels),
+    )
+
+
+def _outputs_lacking(channels: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """Return what to say where no channel is an output and the reader, short of units, cannot say it yet."""
+    entries = channels.values()
+    if any(entry["role"] == "output" for entry in entries) or all("unit" in entry for entry in entries):
+        return {}
+    return {"recording.channels": 'recording.channels: role = "output" for what the simulation gives'}
+
+
+def _channel(unit: str | None, role: str) -> dict[str, str]:
+    return {"unit": unit, "role": role} if unit else {"role": role}
 
 
 def _symbol(name: str) -> str:

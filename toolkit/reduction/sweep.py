@@ -16,6 +16,7 @@ import numpy as np
 from toolkit.calibration.apply import apply_record
 from toolkit.channels import Rotation, seen_by_cells, signs
 from toolkit.findings import Finding
+from toolkit.recording.clock import time_fault
 from toolkit.reduction.corrections import corrected
 from toolkit.reduction.health import health_findings
 from toolkit.reduction.hub import with_load
@@ -105,9 +106,13 @@ def sweeps_of(
     offsets = None if tare is None or tare.source == "none" else dict(tare.values)
     for name, recording, rotation, speed in recordings:
         t = _times(recording, machine)
-        if t is None or not (np.diff(t) > 0).all():
-            problem = "no time" if t is None else "times that do not rise"
-            findings.append(_unused(name, f"it has {problem}: name a column 't [s]', or the machine's rate"))
+        fault = None if t is None else time_fault(t)
+        if t is None or fault is not None:
+            why = "it has no time: name a column 't [s]', or the machine's rate"
+            if fault is not None:
+                count, first = len(fault.rows), fault.rows[0]
+                why = f"{fault.problem} ({count} rows, the first is row {first}): {fault.remedy}"
+            findings.append(_unused(name, why))
             continue
         findings += health_findings(
             recording, name, stretches=[slice(0, recording.rows)], read=record.indications, settled=False

@@ -11,9 +11,9 @@ from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.next_measurements import apart, to_find_it
 
 
-def found(*variables):
-    drivers = tuple(Of(name=name) for name in ("SA", "FZ"))
-    problem = Of(case=Of(drivers=drivers), model=Of(outputs=(Of(name="FY"),)))
+def found(*variables, inputs=("SA", "FZ"), unit="N"):
+    drivers = tuple(Of(name=name, unit="N", role="input") for name in inputs)
+    problem = Of(case=Of(drivers=drivers), model=Of(outputs=(Of(name="FY", unit=unit),)), runs=())
     return Of(problem=problem, structure=tuple(Of(variables=(one,)) for one in variables))
 
 
@@ -22,6 +22,7 @@ def found(*variables):
     [
         ("SA", "SA alone varied"),
         ("dSA/dt", "the rate of SA alone varied"),
+        ("FY", "apply known loads"),
         ("run", "from run to run: repeat one run unchanged"),
         ("time", "hold all inputs still"),
         ("time (a line at 1.55 Hz)", "swings at 1.55 Hz: record what turns"),
@@ -30,6 +31,61 @@ def found(*variables):
 )
 def test_the_advice_is_about_what_the_mismatch_depends_on(variable, told):
     (said,) = to_find_it(found(variable))
+    assert told in said
+
+
+@pytest.mark.parametrize(
+    ("inputs", "variable", "told", "never"),
+    [
+        (("tau",), "tau", "with tau varied in another way", "alone"),
+        (("tau",), "time", "give tau the same course twice", "hold all inputs"),
+        (("tau",), "a floor", "Vary tau slowly and fast", "one input alone"),
+        ((), "time", "repeat the run unchanged", "inputs"),
+        ((), "a floor", "Begin runs from other states", "input"),
+    ],
+)
+def test_the_advice_is_for_the_inputs_that_there_are(inputs, variable, told, never):
+    (said,) = to_find_it(found(variable, inputs=inputs))
+    assert told in said
+    assert never not in said
+
+
+@pytest.mark.parametrize(
+    ("unit", "is_load"),
+    [("kN", True), ("N*m", True), ("kg", True), ("mV/V", True), ("mH", False), ("rad/s", False), ("%", False),
+     ("V", False), ("m", False)],
+)  # fmt: skip
+def test_known_loads_are_applied_to_what_carries_a_load(unit, is_load):
+    (said,) = to_find_it(found("FY", unit=unit))
+    assert ("known loads" in said) is is_load
+    assert ("small and large" in said) is not is_load
+
+
+@pytest.mark.parametrize(
+    ("speeds", "wave", "wrapped", "told"),
+    [
+        ((1.0, 1.0), 0.0, False, "24 times per turn of angle"),
+        ((2.0, 2.0), 0.0, True, "12 times per turn of angle"),
+        (
+            (1.0, 1.1),
+            0.0,
+            False,
+            "record what turns",
+        ),  # at two speeds a line of the angle has two frequencies
+        ((1.0, 1.0), 0.1, False, "record what turns"),  # it turns unevenly
+        ((0.0, 0.0), 0.3, False, "record what turns"),  # it swings to and fro
+    ],
+)
+def test_a_line_in_step_with_a_recorded_angle_is_told_by_its_number_per_turn(speeds, wave, wrapped, told):
+    t = np.arange(0, 10, 0.005)
+    search = found("time (a line at 24 Hz)", inputs=("angle", "load"))
+    search.problem.case.drivers[0].unit = "deg"
+    for speed in speeds:
+        turns = speed * t + wave * np.sin(2 * np.pi * 0.7 * t)
+        angle = 360 * (turns % 1 if wrapped else turns)
+        search.problem.runs += (Of(t=t + 3, columns={"angle": angle}, rows=len(t)),)
+    (said,) = to_find_it(search)
+    assert "24 Hz" in said
     assert told in said
 
 

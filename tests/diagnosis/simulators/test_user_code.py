@@ -24,6 +24,10 @@ START = "import numpy as np\nimport pandas as pd\ndef simulate(inputs, p):\n    
     [
         ("raise ValueError('no oil')", "ValueError: no oil"),
         ("raise SystemExit(0)", "SystemExit"),
+        ("return inputs['V_drum']", "KeyError: 'V_drum'; inputs has t, v, a; p has mass, c"),
+        ("return inputs['masss']", "did you mean p['mass']?"),
+        ("return p['v']", "did you mean inputs['v']?"),
+        ("return inputs.aa", "inputs has t, v, a; p has mass, c; did you mean inputs['a']?"),
         ("return None", "NoneType"),
         ("return {'F': inputs['v']}", "dict"),
         ("return pd.DataFrame({'F': inputs['v'][:-3]})", "77 rows for 80"),
@@ -43,6 +47,62 @@ def test_output_that_cannot_be_used_is_told_with_file_and_run(tmp_path, body, sa
     assert said in str(caught.value.got)
     assert str(caught.value.where).endswith("sim.py, r0.csv")
     assert caught.value.rule == "simulator"
+
+
+EQUATION = """
+def rhs(t, x, u, p):
+    return [{rate}]
+def outputs(x, u, p):
+    return {{"Y": {output}}}
+def initial(p, run):
+    return [{start}]
+"""
+LAG = """schema = 1
+[simulation]
+kind = "ode"
+path = "sim.py"
+parameters.T = { value = 2.5, unit = "s" }
+[recording.channels]
+t = { unit = "s", role = "time" }
+U = { unit = "1", role = "input" }
+Y = { unit = "1", role = "output" }
+[[recording.run]]
+file = "r0.csv"
+T0 = { value = 20.0, unit = "degC" }
+"""
+
+
+def equation_case(folder, **parts):
+    text = EQUATION.format(**{"rate": "(u['U'] - x[0]) / p['T']", "output": "x[0]", "start": "0.0"} | parts)
+    table = "t,U,Y\n" + "".join(f"{0.1 * k:.1f},{k % 3},{k % 2}\n" for k in range(30))
+    return read_case(write_case(folder, LAG, simulator=text, r0__csv=table))
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"rate": "u['UU'] / p['T']"}, "rhs: KeyError: 'UU'; p has T; u has U; did you mean u['U']?"),
+        ({"output": "p['gain']"}, "outputs: KeyError: 'gain'; p has T; u has U"),
+        ({"start": "run['speed']"}, "initial: KeyError: 'speed'; p has T; run has t, U, Y, file, T0"),
+        ({"start": "[0.0]"}, "initial gives an array of shape (1, 1)"),
+        ({"rate": "0.0, 0.0"}, "rhs gives 2 rates for 1 state"),
+        ({"rate": "[0.0]"}, "rhs gives rates of shape (1, 1)"),
+    ],
+)
+def test_a_name_that_an_equation_has_not_is_told_beside_those_that_it_has(tmp_path, parts, said):
+    with pytest.raises(FitError) as caught:
+        model_of(equation_case(tmp_path, **parts), None)
+    assert said in caught.value.got
+
+
+@pytest.mark.parametrize(("start", "count"), [("0.0", 1), ("0.0, 0.0", 2)])
+def test_a_number_in_place_of_rates_is_told(tmp_path, start, count):
+    case = equation_case(tmp_path, start=start)
+    text = case.file().read_text().replace("[(u['U'] - x[0]) / p['T']]", "0.0 * p['T']")
+    case.file().write_text(text)
+    with pytest.raises(FitError) as caught:
+        model_of(case, None)
+    assert f"a number; expected a sequence of rates, one for each state ({count})" in caught.value.got
 
 
 @pytest.mark.parametrize(

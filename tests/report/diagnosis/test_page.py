@@ -1,6 +1,7 @@
 """The page of a diagnosis: what is read in ten seconds stands first, and is true of this search."""
 
 import dataclasses
+import math
 import re
 from types import SimpleNamespace
 
@@ -105,13 +106,38 @@ def test_a_rest_that_is_slower_than_its_sensor_is_not_called_its_noise(dragged):
 
 
 def test_what_is_left_says_no_variable_that_is_none(dragged):
-    large = ("a floor above a tenth of the output's spread",)
-    left = tuple(Dependence(channel="F", variables=names) for names in (large, ("F",), ("v", "F")))
+    large = Dependence(channel="F", variables=(), reason="a floor above a tenth of the output's spread")
+    left = (large, *(Dependence(channel="F", variables=names) for names in (("F",), ("v", "F"))))
     unknown = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=(), depends_on=left)
     for text in (words_of(dataclasses.replace(dragged, diagnosis=unknown)), diagnosis_text(unknown, "out")):
         assert "F leaves a floor above a tenth" in text
         assert "F over its own size" in text
         assert "F over v and its own size" in text
+
+
+def test_a_rest_that_no_test_tells_from_noise_has_no_probability(dragged):
+    untested = dataclasses.replace(
+        dragged.diagnosis.mismatch[0], p_value=math.nan, share_of_variance=0.0, where=()
+    )
+    made = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=(), mismatch=(untested,))
+    html = words_of(dataclasses.replace(dragged, diagnosis=made))
+    assert "F: the residual is too large to be taken for noise, and no test tells it from noise." in html
+    assert "p unknown" not in html
+
+
+def test_a_size_below_what_the_rows_resolve_is_printed_as_that(dragged):
+    effect = dragged.diagnosis.effects[0]
+    small = dataclasses.replace(
+        effect.parameters[0], name="reach", value=1.28e-17, unit="m", ci95=(0.0, 3.1e-5)
+    )
+    made = dataclasses.replace(
+        dragged.diagnosis, effects=(dataclasses.replace(effect, parameters=(*effect.parameters, small)),)
+    )
+    assert "reach: not resolved, below 3.1e-05 m" in diagnosis_text(made, "out")
+    for text in (words_of(dataclasses.replace(dragged, diagnosis=made)), diagnosis_text(made, "out")):
+        assert "not resolved" in text
+        assert "below 3.1e-05" in text
+        assert "e-17" not in text
 
 
 def test_a_class_says_first_which_channel_may_be_what(dragged):
@@ -253,14 +279,14 @@ def test_a_load_in_newton_is_no_power_of_ten(value, digits, told):
 
 
 def test_a_residual_that_is_only_too_large_depends_on_nothing(dragged):
-    cause = ("more than its stated noise",)
+    cause = "more than its stated noise"
     large = dataclasses.replace(dragged.diagnosis.mismatch[0], share_of_variance=0.0, where=())
     made = dataclasses.replace(
         dragged.diagnosis,
         verdict="unknown",
         effects=(),
         mismatch=(large,),
-        depends_on=(Dependence(channel="F", variables=cause),),
+        depends_on=(Dependence(channel="F", variables=(), reason=cause),),
     )
     html = words_of(dataclasses.replace(dragged, diagnosis=made))
     assert "F is off by more than its stated noise" in html

@@ -254,10 +254,11 @@ class HeldOutFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dependence:
-    """What an unexplained remainder depends on."""
+    """What an unexplained remainder depends on; where no variable foretells it, why it is no noise."""
 
     channel: str
     variables: tuple[str, ...]
+    reason: Annotated[str, Entry("why something is left though no variable foretells it")] = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,7 +35,9 @@ from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.policy import PRIORS, SCREENING, UNITS, VERDICT
 from toolkit.diagnosis.search.channel_factors import factor_of, is_ratio
 from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.search.noise_floor import LARGE, LONG
 from toolkit.diagnosis.search.search import Search
+from toolkit.diagnosis.search.unexplained import TOO_LARGE, StructureFound, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.effects.unit_ratios import near_ratio
@@ -85,7 +87,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         ),
         depends_on=tuple(
             dict.fromkeys(
-                Dependence(channel=structure.output, variables=structure.variables)
+                _dependence(structure)
                 for structure in search.structure or (search.structure_before if unknown else ())
             )
         ),
@@ -113,6 +115,19 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         recordings=recorded(case.runs),
         laws=found_laws(search, laws),
     )
+
+
+_LISTED = 8
+"""Values left out that are named one by one."""
+_UNTESTED = ((LARGE,), (LONG,))
+"""What is said of a rest that no test tells from noise: it has a reason, and no chance."""
+
+
+def _dependence(structure: StructureFound) -> Dependence:
+    """Return on what structure depends; a sentence that stands in place of variables is its reason."""
+    if structure.variables in (*_UNTESTED, TOO_LARGE):
+        return Dependence(channel=structure.output, variables=(), reason=structure.variables[0])
+    return Dependence(channel=structure.output, variables=structure.variables)
 
 
 def _verdict(
@@ -261,6 +276,10 @@ def _parameters(
         half = active.values.get(f"_half_{parameter.name}")
         if half is not None:
             ci = (value - half, value + half)
+        # What is smaller than the equation can tell acts as if it were as large as that.
+        least = active.values.get(f"least_{parameter.name}", 0.0)
+        if active.searched and value < least:
+            ci = (parameter.bounds[0], least if ci is None else max(ci[1], least))
         turned = parameter.sign_in(problem.case.axes)
         if turned < 0:
             value, ci = -value, None if ci is None else (-ci[1], -ci[0])
@@ -309,7 +328,8 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[ChannelMismatch, ...]
         if not counted.any():
             continue
         before, after = search.refitted.residual[name], search.augmented.residual[name]
-        p_values = [structure.p_value for structure in search.structure_before if structure.output == name]
+        mine = [structure for structure in search.structure_before if structure.output == name]
+        p_values = [structure.p_value for structure in mine if structure.variables not in _UNTESTED]
         if search.steps:
             share = max(
                 0.0, 1 - float(np.sum(after[counted] ** 2)) / max(float(np.sum(before[counted] ** 2)), 1e-300)
@@ -322,14 +342,17 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[ChannelMismatch, ...]
                 p_values.append(search.steps[0].p_value)
         else:
             share, signal = structured(search, name)
-        if not p_values:
+        if not p_values and not mine:
             continue
         if unknown:
             share, signal = max((share, signal), structured(search, name), key=lambda pair: pair[0])
+        if any(variable.startswith("time (a line at") for each in mine for variable in each.variables):
+            line = strongest_line(problem, name, before)
+            share = max(share, 0.0 if line is None else line.share)
         mismatches.append(
             ChannelMismatch(
                 channel=name,
-                p_value=min(p_values),
+                p_value=min(p_values, default=math.nan),
                 share_of_variance=share,
                 where=places(
                     problem, name, signal, search.refitted.simulated[name], _depends_on(search, name)
@@ -353,14 +376,29 @@ def _outliers(case: Case, search: Search) -> tuple[Finding, ...]:
     findings = []
     problem = search.problem
     for name, counted in problem.kept.items():
-        left_out = int(np.isfinite(problem.observed[name]).sum() - counted.sum())
-        if left_out:
-            findings.append(
-                Finding(
-                    rule="case-outlier",
-                    where=f"{case.path.name}: {name}",
-                    level="note",
-                    message=f"{left_out} single values far off all neighbours were left out of every fit",
-                )
+        left_out = np.flatnonzero(np.isfinite(problem.observed[name]) & ~counted)
+        if not len(left_out):
+            continue
+        places = [_place_of(problem, name, row) for row in left_out[:_LISTED].tolist()]
+        more = len(left_out) - len(places)
+        listed = ", ".join(places) + (f" and {more} more" if more else "")
+        findings.append(
+            Finding(
+                rule="case-outlier",
+                where=f"{case.path.name}: {name}",
+                level="note",
+                message=f"single values far off all neighbours, {len(left_out)} in number, were left out of "
+                f"every fit: {listed}",
             )
+        )
     return tuple(findings)
+
+
+def _place_of(problem: Problem, name: str, row: int) -> str:
+    """Return file, row below the header, time and value of one recorded value."""
+    at = next(i for i, place in enumerate(problem.slices) if place.start <= row < place.stop)
+    run, inside = problem.runs[at], row - problem.slices[at].start
+    time = f" at {run.t[inside]:.6g} s" if problem.case.has_time else ""
+    text = channel_unit(problem.case, problem.model, name)
+    value = f"{problem.observed[name][row]:.6g}" + ("" if text == "1" else f" {text}")
+    return f"row {inside + 1} of the file {run.name}{time} ({value})"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.diagnosis.answer.answer import DiagnosedEffect, Verdict, cut_short
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.policy import PRIORS, VERDICT
+from toolkit.diagnosis.policy import PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.effects.applied import AppliedEffect
@@ -19,6 +22,9 @@ if TYPE_CHECKING:
 
 _OF_CELLS = ("force", "moment", "pressure", "bridge_ratio", "voltage", "count", "ratio")
 """Dimensions of what strain gauges read; of a unit that is not known it may be one."""
+
+_OF_LOADS = ("force", "moment", "mass", "bridge_ratio")
+"""Dimensions of what known loads are applied to: a voltage or a count may be of anything."""
 
 # Classes of effects that a recording cannot tell apart, and the measurement that would.
 
@@ -117,7 +123,8 @@ def next_measurements(
         )
     elif verdict == "untestable":
         sentences.append(
-            "Tighten the priors of the parameters that moved (certificate, data sheet), or vary the inputs."
+            "Tighten the priors of the parameters that moved (certificate, data sheet), or "
+            + ("vary the inputs." if search.problem.case.drivers else "begin runs from other states.")
         )
     if len(search.problem.runs) == 1:
         sentences.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
@@ -125,33 +132,98 @@ def next_measurements(
 
 
 def to_find_it(search: Search) -> list[str]:
-    """Return what would narrow down a mismatch that no effect explains, by what it depends on."""
+    """Return what would narrow down a mismatch that no effect explains, by what it depends on.
+
+    What can be varied, held or applied follows from the case: how many inputs it has, and of what kind.
+    """
+    case = search.problem.case
     variables = dict.fromkeys(name for structure in search.structure for name in structure.variables)
-    channels = {channel.name for channel in search.problem.case.drivers}
+    inputs = [channel.name for channel in case.drivers if channel.role == "input"]
+    channels = {channel.name for channel in case.drivers}
     rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
     varied = [rates.get(name, name) for name in variables if name in channels or name in rates]
     sentences = []
     if varied:
+        alone = "alone varied, everything else held" if len(channels) > 1 else "varied in another way"
         sentences.append(
-            f"The mismatch depends on {', '.join(varied)}: repeat the run with {varied[0]} alone varied, "
-            "everything else held."
+            f"The mismatch depends on {', '.join(varied)}: repeat the run with {varied[0]} {alone}."
         )
-    outputs = [output.name for output in search.problem.model.outputs if output.name in variables]
-    if outputs:
-        sentences.append(
-            f"The mismatch depends on the size of {', '.join(outputs)}: apply known loads over its range."
+    outputs = [output for output in search.problem.model.outputs if output.name in variables]
+    for is_load in (True, False):
+        names = ", ".join(output.name for output in outputs if _is_load(output.unit) is is_load)
+        known = (
+            "apply known loads over its range" if is_load else "record it small and large, beside a reference"
         )
+        if names:
+            sentences.append(f"The mismatch depends on the size of {names}: {known}.")
     lines = [
         name.removeprefix("time (a line at ").removesuffix(")") for name in variables if "a line at" in name
     ]
     if lines:
-        sentences.append(
-            f"The mismatch swings at {' and '.join(lines)}: record what turns or swings at this frequency."
-        )
+        sentences += _swinging(search.problem, lines)
     if "run" in variables:
         sentences.append(
             "The mismatch differs from run to run: repeat one run unchanged, and note what else changed."
         )
     if "time" in variables:
-        sentences.append("The mismatch goes with time: hold all inputs still for as long as a run takes.")
-    return sentences or ["Vary one input alone, everything else held, and record what else may act."]
+        sentences.append(
+            f"The mismatch goes with time: {_TO_PART_TIME[min(len(inputs), 2)].format(*inputs)}."
+        )
+    return sentences or [_WHERE_NOTHING_TELLS[min(len(inputs), 2)].format(*inputs)]
+
+
+# By the number of inputs, two of them for several.
+_TO_PART_TIME = (
+    "repeat the run unchanged; what drifts does not come again as it was",
+    "give {} the same course twice within one run; what drifts differs the second time",
+    "hold all inputs still for as long as a run takes",
+)
+_WHERE_NOTHING_TELLS = (
+    "Begin runs from other states, and record what else may act.",
+    "Vary {} slowly and fast, little and much, and record what else may act.",
+    "Vary one input alone, everything else held, and record what else may act.",
+)
+
+
+def _is_load(text: str) -> bool:
+    """Tell whether a channel is what known loads are applied to: a force, a moment, a mass, a bridge."""
+    return unit(text).dimension in _OF_LOADS
+
+
+def _swinging(problem: Problem, lines: Sequence[str]) -> list[str]:
+    """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
+    sentences, unturned = [], []
+    for line in lines:
+        order = _order(problem, float(line.removesuffix(" Hz")))
+        if order is None:
+            unturned.append(line)
+            continue
+        name, cycles = order
+        sentences.append(
+            f"The mismatch swings at {line}, {cycles:.3g} times per turn of {name}: repeat the run at "
+            "another speed; what is of the shaft keeps its number per turn, what is of time its frequency."
+        )
+    if unturned:
+        listed = " and ".join(unturned)
+        sentences.append(f"The mismatch swings at {listed}: record what turns or swings at this frequency.")
+    return sentences
+
+
+def _order(problem: Problem, frequency: float) -> tuple[str, float] | None:
+    """Return the recorded angle that a line [Hz] keeps step with in every run, and its cycles per turn."""
+    for channel in problem.case.drivers:
+        if unit(channel.unit).dimension != "angle":
+            continue
+        orders, parted = [], 0.0
+        for run in problem.runs:
+            turns = np.unwrap(run.columns[channel.name] * unit(channel.unit).factor) / (2 * np.pi)
+            speed, _ = np.polyfit(run.t - run.t[0], turns, 1) if run.rows > 1 else (0.0, 0.0)
+            uneven = float(np.ptp(turns - speed * (run.t - run.t[0])))
+            if abs(turns[-1] - turns[0]) < 1:
+                break  # it swings to and fro, or stands
+            orders.append(frequency / abs(speed))
+            parted = max(parted, uneven * orders[-1])
+        else:
+            if parted < STRUCTURE.order_cycles and np.ptp(orders) < STRUCTURE.order_cycles:
+                return channel.name, float(np.mean(orders))
+    return None

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 NO_PLACE = "no place for it in this case"
+NO_STEPS = "the values stand on no steps coarser than their last digits that matter beside what is left"
 NO_SIZE = "it is there or not: it has no size"
 
 
@@ -66,11 +67,15 @@ def not_found(
             continue
         if name not in best:
             why = "found, but what stays without a name outweighs it" if name in withdrawn else NO_PLACE
+            visible = name in withdrawn
+            if not visible and effects()[name].from_digits:
+                visible, why = (
+                    True,
+                    NO_STEPS,
+                )  # its place is every output, and the digits are read, not fitted
             entries.append(
-                AbsentEffect(
-                    name=name, minimum_detectable=None, unit="", observable=name in withdrawn, why=why
-                )
-            )  # fmt: skip
+                AbsentEffect(name=name, minimum_detectable=None, unit="", observable=visible, why=why)
+            )
             continue
         size, unit, visible = best[name]
         why = NO_SIZE if size is None else ""

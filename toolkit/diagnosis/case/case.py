@@ -28,7 +28,9 @@ class CaseChannel:
     """A column that is used: its unit, its role, and its total sensor noise where it is stated."""
 
     name: str
-    unit: Annotated[str, UnitName(as_written=True), Entry("of the column", expected='unit = "N"')]
+    unit: Annotated[
+        str, UnitName(as_written=True), Entry("of the column", expected='a unit, such as unit = "N"')
+    ]
     role: Annotated[Role, Entry("what it is to the simulation")]
     sd: Annotated[float | None, Above(0), Entry("total noise of the sensor, from its certificate")] = None
 

@@ -20,6 +20,7 @@ from toolkit.diagnosis.case.case import CaseChannel, Run
 from toolkit.errors import CellError, ColumnError, UnitError, UnreadableError
 from toolkit.files import sha256_bytes
 from toolkit.machine import Machine, load_machine
+from toolkit.recording.clock import listed, time_fault
 from toolkit.recording.columns import rig
 from toolkit.recording.csvfile import SEPARATORS, decimal_sign, decode, first_line, separator_of
 from toolkit.recording.read import read_recording
@@ -159,26 +160,19 @@ def _read_recording(
 
 
 def _check_time(path: Path, name: str, t: NDArray[np.float64]) -> None:
-    bad = np.flatnonzero(~np.isfinite(t))
-    if len(bad):
-        raise CellError(
-            "a row has no time",
-            where=f"{path}, row {bad[0] + 1}, column {name}",
-            got="nothing",
-            expected="a time in every row",
-            next_step="remove the row or give its time",
-            rule="case-run",
-        )
-    back = np.flatnonzero(np.diff(t) <= 0)
-    if len(back):
-        raise CellError(
-            "time does not rise",
-            where=f"{path}, row {back[0] + 2}, column {name}",
-            got=f"{t[back[0] + 1]:g} s after {t[back[0]]:g} s",
-            expected="a rising time",
-            next_step="sort the rows, or split the file into runs",
-            rule="case-run",
-        )
+    fault = time_fault(t)
+    if fault is None:
+        return
+    row = fault.rows[0]
+    got = f"{t[row - 1]:.10g} s after {t[row - 2]:.10g} s" if np.isfinite(t[row - 1]) else "nothing"
+    raise CellError(
+        fault.problem,
+        where=f"{path}, row {row}, column {name}",
+        got=f"{got}; the same in {listed(fault.rows)} below the header" if len(fault.rows) > 1 else got,
+        expected="a time in every row that is above that of the row before",
+        next_step=fault.remedy,
+        rule="case-run",
+    )
 
 
 def _filled(path: Path, name: str, t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
 
 
-_TOO_LARGE = ("more than its stated noise",)
+TOO_LARGE = ("more than its stated noise",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,7 +235,7 @@ class StructureFound:
     @property
     def is_too_large(self) -> bool:
         """Tell whether it is all that is known that the residual is larger than the stated noise."""
-        return self.variables == _TOO_LARGE
+        return self.variables == TOO_LARGE
 
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -296,7 +296,7 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
     if p >= STRUCTURE.alpha:
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
-    return StructureFound(output=name, variables=_TOO_LARGE, gain=gain, p_value=p, rest=True)
+    return StructureFound(output=name, variables=TOO_LARGE, gain=gain, p_value=p, rest=True)
 
 
 def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:

@@ -11,8 +11,8 @@ import numpy as np
 
 from toolkit.diagnosis.simulators.columnwise import columnwise
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
-from toolkit.diagnosis.simulators.integrate import OFF
-from toolkit.diagnosis.simulators.user_code import silenced
+from toolkit.diagnosis.simulators.integrate import OFF, wrong_rates
+from toolkit.diagnosis.simulators.user_code import raised, silenced
 from toolkit.effects.law import TIME
 from toolkit.errors import FitError
 
@@ -82,9 +82,17 @@ class Equation:
         try:
             many = len(inspect.signature(self._initial).parameters) > 1
             given = self._initial(dict(p), _as_dict(run)) if many else self._initial(dict(p))
-            return np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
+            start = np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
         except (Exception, SystemExit) as error:
-            raise failed(self.case, run, f"initial: {type(error).__name__}: {error}") from error
+            raise self.failure("initial", error, run, p) from error
+        if start.ndim > 1:
+            raise failed(self.case, run, f"initial gives an array of shape {start.shape}, not one of states")
+        return start
+
+    def failure(self, function: str, error: BaseException, run: Run, p: Mapping[str, float]) -> FitError:
+        """Return the error of what a function of the file raised, with the names that it was given."""
+        beside = {"run": tuple(_as_dict(run))} if function == "initial" else {"u": self._drivers}
+        return failed(self.case, run, f"{function}: {raised(error, p=p, **beside)}")
 
     def kinematics(self, p: Mapping[str, float]) -> dict[int, int]:
         """Return velocity state -> position state where one state's rate is another state as it is."""
@@ -100,7 +108,9 @@ class Equation:
             try:
                 rates.append(np.asarray(self.rhs(float(run.t[0]), x.copy(), u, dict(p)), dtype=np.float64))
             except (Exception, SystemExit) as error:
-                raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+                raise self.failure("rhs", error, run, p) from error
+            if rates[-1].shape != start.shape:
+                raise failed(self.case, run, wrong_rates(rates[-1], len(start)))
             points.append(x)
         for i in range(len(start)):
             for j in range(len(start)):
@@ -198,7 +208,7 @@ class Equation:
                 try:
                     made = self._outputs(x[:, k].copy(), inputs.row(k), values)
                 except (Exception, SystemExit) as error:
-                    raise failed(self.case, run, f"outputs: {type(error).__name__}: {error}") from error
+                    raise self.failure("outputs", error, run, p) from error
                 if not isinstance(made, Mapping):
                     raise failed(self.case, run, f"outputs gives a {type(made).__name__}, not a dict")
                 for name, column in rows.items():

@@ -74,7 +74,7 @@ def integrate(
     step = float(t[1] - t[0]) if len(t) > 1 else 1.0
     rates = rate(float(t[0]), start)
     if rates.shape != start.shape:
-        raise IntegrationError(f"rhs gives {rates.size} rates for {start.size} states")
+        raise IntegrationError(wrong_rates(rates, start.size))
     _check_numbers(float(t[0]), start, rates)
     absolute, k = atol.tolist(), rates.tolist()
     for i in range(len(t) - 1):
@@ -189,6 +189,22 @@ def _at(
         hold(y, after, over)
     rates: list[float] = rate(t + after, np.array(y)).tolist()
     return rates
+
+
+def wrong_rates(rates: NDArray[np.float64], states: int) -> str:
+    """Return what rhs gives where that is not one rate for each state in a sequence.
+
+    >>> wrong_rates(np.array(0.5), 1)
+    'rhs gives a number; expected a sequence of rates, one for each state (1), such as [rate]'
+    >>> wrong_rates(np.zeros(3), 2), wrong_rates(np.zeros((2, 1)), 2)
+    ('rhs gives 3 rates for 2 states', 'rhs gives rates of shape (2, 1) for 2 states')
+    """
+    if rates.ndim == 0:
+        return (
+            f"rhs gives a number; expected a sequence of rates, one for each state ({states}), such as [rate]"
+        )
+    got = f"{rates.size} rates" if rates.ndim == 1 else f"rates of shape {rates.shape}"
+    return f"rhs gives {got} for {states} state{'' if states == 1 else 's'}"
 
 
 def _check_numbers(t: float, x: NDArray[np.float64], rates: NDArray[np.float64]) -> None:

@@ -398,7 +398,7 @@ class OdeModel:
         except IntegrationError as error:
             raise failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
-            raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+            raise self.equation.failure("rhs", error, run, p) from error
         self._near[run] = x[: len(self.states)]
         return x
 
@@ -441,7 +441,7 @@ class OdeModel:
             with silenced():
                 rates = self.equation.rates_at(run, p, acting, len(self.states))(run.t, x)
         except (Exception, SystemExit) as error:
-            raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+            raise self.equation.failure("rhs", error, run, p) from error
         return np.asarray(CubicHermiteSpline(run.t, x, rates, axis=1)(self.finer(run).t))
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:

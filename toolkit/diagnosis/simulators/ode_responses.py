@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from toolkit.diagnosis.simulators.channels import slopes
-from toolkit.diagnosis.simulators.equation import failed
 from toolkit.diagnosis.simulators.linear_response import propagated
 from toolkit.diagnosis.simulators.user_code import silenced
 from toolkit.effects.law import ITSELF, POSITION, TIME
@@ -101,7 +100,7 @@ def pushed(
                 pattern(_signals(model, run, fine, at)), at=at, sizes=sizes,
             )[::finer]  # fmt: skip
     except (Exception, SystemExit) as error:
-        raise failed(model.case, run, f"rhs: {type(error).__name__}: {error}") from error
+        raise model.equation.failure("rhs", error, run, p) from error
     outputs = model.equation.shown(run, p, x[:own_states])
     responses = {name: np.zeros((run.rows, moved.shape[2])) for name in outputs}
     for i in range(own_states):

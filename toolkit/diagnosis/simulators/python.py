@@ -26,7 +26,7 @@ from toolkit.diagnosis.simulators.tire import (
     tire_places,
     tire_signs,
 )
-from toolkit.diagnosis.simulators.user_code import load_functions, silenced
+from toolkit.diagnosis.simulators.user_code import load_functions, raised, silenced
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
@@ -91,7 +91,9 @@ class UserFunction:
             with silenced():
                 answer = self._function(inputs, dict(p))
         except (Exception, SystemExit) as error:
-            raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
+            raise _failed(
+                self.case, run, raised(error, inputs=[str(name) for name in inputs.columns], p=p)
+            ) from error
         if not isinstance(answer, pd.DataFrame):
             raise _failed(self.case, run, f"a {type(answer).__name__}, not a pandas.DataFrame")
         if len(answer) != run.rows:

@@ -8,7 +8,7 @@ import os
 import sys
 import types
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import Any, TextIO, cast
 
@@ -59,6 +59,35 @@ def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
             )  # fmt: skip
         lines.append(cast("Callable[..., Any]", function))
     return tuple(lines)
+
+
+def raised(error: BaseException, **given: Collection[str]) -> str:
+    """Return what a function of others raised; where it asked for a name that is not there, what is there.
+
+    Parameters
+    ----------
+    given : argument of the function -> the names that it holds
+
+    >>> raised(KeyError("sped"), p=["tau"], u=["speed", "load"])
+    "KeyError: 'sped'; p has tau; u has speed, load; did you mean u['speed']?"
+    >>> raised(KeyError("tau"), p=["tau"], u=[])
+    "KeyError: 'tau'; p has tau; u has nothing; did you mean p['tau']?"
+    >>> raised(ValueError("no oil"), p=["tau"])
+    'ValueError: no oil'
+    """
+    text = f"{type(error).__name__}: {error}"
+    name = error.args[0] if isinstance(error, KeyError) and error.args else None
+    # A column of a table may be asked for as its attribute.
+    if isinstance(error, AttributeError) and hasattr(error.obj, "columns"):
+        name = error.name
+    if not isinstance(name, str):
+        return text
+    parts = [f"{key} has {', '.join(names) or 'nothing'}" for key, names in given.items()]
+    near = nearest(name, [known for names in given.values() for known in names])
+    if near is not None:
+        holder = next(key for key, names in given.items() if near in names)
+        parts.append(f"did you mean {holder}[{near!r}]?")
+    return "; ".join([text, *parts])
 
 
 @contextlib.contextmanager

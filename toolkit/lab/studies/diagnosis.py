@@ -244,7 +244,7 @@ def _writable(out: Path) -> None:
 def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
     from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
-    from toolkit.report.diagnosis.numbers import chance, over, rounded
+    from toolkit.report.diagnosis.numbers import UNRESOLVED, chance, over, rounded
     from toolkit.report.diagnosis.page import cause, provisional, simulated
 
     cut = diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped)
@@ -265,6 +265,9 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
                 continue
             value, interval = rounded(parameter.value, parameter.ci95)
             reach = f"  (95 %: {interval})" if interval else ""
+            if value == UNRESOLVED:
+                lines.append(f"  {parameter.name}: {value}, {interval} {parameter.unit}")
+                continue
             lines.append(f"  {parameter.name} = {value} {parameter.unit}{reach}")
         if effect.equivalent_to:
             lines.append(f"  this recording cannot tell it from: {', '.join(effect.equivalent_to)}")
@@ -285,10 +288,10 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
         lines += [f"  {law.likeness}"] if law.resembles else []
         lines.append(f"  takes {100 * law.evidence.share_of_gap:.0f} % of the mean square that was left")
     structures = list(
-        dict.fromkeys((by.channel, tuple(by.variables)) for by in diagnosis.depends_on)
+        dict.fromkeys((by.channel, tuple(by.variables), by.reason) for by in diagnosis.depends_on)
     )  # the largest first
-    for channel, names in structures[:_STRUCTURES]:
-        lines.append(f"structure that no named effect explains: {over(channel, names)}")
+    for channel, names, reason in structures[:_STRUCTURES]:
+        lines.append(f"structure that no named effect explains: {over(channel, names, reason)}")
     if len(structures) > _STRUCTURES:
         lines.append(
             f"and {len(structures) - _STRUCTURES} smaller ones over other variables: see diagnosis.json"

@@ -105,6 +105,12 @@ def _where(source: Told, style: Style) -> str | None:
         text = f"{mismatch.channel}: {share} % of the residual's variance is structure"
         if mismatch.share_of_variance < 0.005:
             text = f"{mismatch.channel}: the residual is more than noise, and no variable alone explains it"
+        if math.isnan(mismatch.p_value):
+            sentences.append(
+                f"{mismatch.channel}: the residual is too large to be taken for noise, "
+                "and no test tells it from noise."
+            )
+            continue
         for at in mismatch.where[:1]:
             ends = at.ends(lambda value: _n(value, style, 4))
             extent = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
@@ -115,7 +121,7 @@ def _where(source: Told, style: Style) -> str | None:
 
 def _remains(source: Told, _style: Style) -> str:
     if source.answer.depends_on:
-        listed = "; ".join(over(by.channel, by.variables) for by in source.answer.depends_on[:6])
+        listed = "; ".join(over(by.channel, by.variables, by.reason) for by in source.answer.depends_on[:6])
         return f"Structure that no named effect explains, a description and not physics: {listed}."
     if source.answer.remaining == "unknown":
         return "Not judged: no search was made, or none to its end."

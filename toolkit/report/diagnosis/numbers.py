@@ -19,6 +19,9 @@ def few(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
+UNRESOLVED = "not resolved"
+
+
 def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, str]:
     """Return a fitted value and its interval, to the digits that the interval knows; no interval is no text.
 
@@ -26,6 +29,11 @@ def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, st
     (('0.1583', '0.1551 to 0.1615'), ('0.0000', '-0.0034 to 0.0034'))
     >>> rounded(5463.5, (5120.0, 5800.0)), rounded(0.2, None)
     (('5460', '5120 to 5800'), ('0.2', ''))
+
+    A size that cannot be negative, of which the interval leaves nothing but that it is small, has no digits:
+
+    >>> rounded(1.28e-17, (0.0, 3.1e-5)), rounded(2e-6, (0.0, 0.31))
+    (('not resolved', 'below 3.1e-05'), ('not resolved', 'below 0.31'))
     """
     if interval is None:
         return few(value, 4), ""
@@ -36,6 +44,8 @@ def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, st
     place = math.floor(math.log10(half)) - 1  # the second digit of the interval's half
     size = max(abs(number) for number in (value, low, high))
     if size >= _PLAIN or (place < -6 and size < 1e-3):
+        if low == 0 and value < 10.0**place:
+            return UNRESOLVED, f"below {few(high, 2)}"
         digits = max(math.floor(math.log10(size)) - place + 1, 2)
         return f"{value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"
 
@@ -43,21 +53,28 @@ def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, st
         at = round(number, -place)
         return f"{at + 0.0:.{max(-place, 0)}f}"
 
+    if low == 0 and float(text(value)) == 0:
+        return UNRESOLVED, f"below {few(high, 2)}"
     return text(value), f"{text(low)} to {text(high)}"
 
 
-def over(channel: str, variables: Sequence[str]) -> str:
-    """Return what an output's mismatch depends on; where only its size or its slowness tells, these.
+_REASONS = {"more than": "is off by", "a ": "leaves"}
 
-    >>> over("FY", ["SA", "FZ"]), over("FY", ["more than its stated noise"]), over("FY", ["a slow rest"])
+
+def over(channel: str, variables: Sequence[str], reason: str = "") -> str:
+    """Return what an output's mismatch depends on; where no variable foretells it, the reason.
+
+    >>> over("FY", ["SA", "FZ"]), over("FY", [], "more than its stated noise"), over("FY", [], "a slow rest")
     ('FY over SA and FZ', 'FY is off by more than its stated noise', 'FY leaves a slow rest')
-    >>> over("FY", ["FY"]), over("FY", ["FY", "SA"])
-    ('FY over its own size', 'FY over its own size and SA')
+    >>> over("FY", ["FY"]), over("FY", ["FY", "SA"]), over("FY", ["a", "v"])
+    ('FY over its own size', 'FY over its own size and SA', 'FY over a and v')
     """
     names = " and ".join("its own size" if name == channel else name for name in variables)
-    words = {"more than": "is off by", "a ": "leaves"}
-    verb = next((verb for start, verb in words.items() if names.startswith(start)), "over")
-    return f"{channel} {verb} {names}"
+    # Answers of earlier versions have the reason among the variables.
+    if len(variables) == 1 and names.startswith(tuple(_REASONS)):
+        reason = names
+    verb = next((verb for start, verb in _REASONS.items() if reason.startswith(start)), "over")
+    return f"{channel} {verb} {reason or names}"
 
 
 # How small a chance is said to be: none is zero.

@@ -201,7 +201,7 @@ def _lead(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         share = f"{100 * diagnosis.laws[0].evidence.share_of_gap:.0f} %"
         return [("", f"It takes {share} of what was left; it is a description, and no known effect's name.")]
     if diagnosis.verdict == "unknown":
-        parts = [over(by.channel, by.variables) for by in diagnosis.depends_on[:3]]
+        parts = [over(by.channel, by.variables, by.reason) for by in diagnosis.depends_on[:3]]
         return [("", f"What remains: {'; '.join(parts)}.")]
     if diagnosis.skipped and diagnosis.verdict == "untestable":
         return [("", f"The budget was spent at: {diagnosis.skipped[0]}. Nothing can be said yet.")]
@@ -362,6 +362,8 @@ def _place_sentence(mismatch: ChannelMismatch) -> str:
     text = f"{channel}: {share:.0f} % of the refitted residual's variance is structure"
     if share < 0.5:
         text = f"{channel}: the refitted residual is more than noise, and no variable alone explains it"
+    if math.isnan(mismatch.p_value):
+        return f"{channel}: the residual is too large to be taken for noise, and no test tells it from noise."
     for place in mismatch.where[:1]:
         ends = place.ends(lambda value: few(value, 4))
         extent = f"over all of {place.variable}," if place.whole else f"most of it where {place.variable} is"
@@ -400,7 +402,7 @@ def _nominal_parameters(diagnosis: Diagnosis) -> Table:
 
 
 def _remaining(diagnosis: Diagnosis) -> Table:
-    rows = [(over(by.channel, by.variables),) for by in diagnosis.depends_on[:8]]
+    rows = [(over(by.channel, by.variables, by.reason),) for by in diagnosis.depends_on[:8]]
     return table(("what is left",), rows)
 
 
