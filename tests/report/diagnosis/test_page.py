@@ -1,7 +1,6 @@
 """The page of a diagnosis: what is read in ten seconds stands first, and is true of this search."""
 
 import dataclasses
-import math
 import re
 from types import SimpleNamespace
 
@@ -117,12 +116,12 @@ def test_what_is_left_says_no_variable_that_is_none(dragged):
 
 def test_a_rest_that_no_test_tells_from_noise_has_no_probability(dragged):
     untested = dataclasses.replace(
-        dragged.diagnosis.mismatch[0], p_value=math.nan, share_of_variance=0.0, where=()
+        dragged.diagnosis.mismatch[0], p_value=1.0, share_of_variance=0.0, where=()
     )
     made = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=(), mismatch=(untested,))
     html = words_of(dataclasses.replace(dragged, diagnosis=made))
     assert "F: the residual is too large to be taken for noise, and no test tells it from noise." in html
-    assert "p unknown" not in html
+    assert "p = 1" not in html
 
 
 def test_a_size_below_what_the_rows_resolve_is_printed_as_that(dragged):

@@ -63,6 +63,11 @@ class ChannelMismatch:
     share_of_variance: Annotated[OrNan, Entry("of the refitted residual")]
     where: tuple[MismatchPlace, ...]
 
+    @property
+    def untested(self) -> bool:
+        """Tell whether no test parts the rest from noise: it counts by its size."""
+        return not self.p_value < 1
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EffectEstimate:

@@ -352,7 +352,7 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[ChannelMismatch, ...]
         mismatches.append(
             ChannelMismatch(
                 channel=name,
-                p_value=min(p_values, default=math.nan),
+                p_value=min(p_values, default=1.0),
                 share_of_variance=share,
                 where=places(
                     problem, name, signal, search.refitted.simulated[name], _depends_on(search, name)

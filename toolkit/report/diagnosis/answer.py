@@ -105,7 +105,7 @@ def _where(source: Told, style: Style) -> str | None:
         text = f"{mismatch.channel}: {share} % of the residual's variance is structure"
         if mismatch.share_of_variance < 0.005:
             text = f"{mismatch.channel}: the residual is more than noise, and no variable alone explains it"
-        if math.isnan(mismatch.p_value):
+        if mismatch.untested:
             sentences.append(
                 f"{mismatch.channel}: the residual is too large to be taken for noise, "
                 "and no test tells it from noise."

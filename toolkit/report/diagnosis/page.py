@@ -362,7 +362,7 @@ def _place_sentence(mismatch: ChannelMismatch) -> str:
     text = f"{channel}: {share:.0f} % of the refitted residual's variance is structure"
     if share < 0.5:
         text = f"{channel}: the refitted residual is more than noise, and no variable alone explains it"
-    if math.isnan(mismatch.p_value):
+    if mismatch.untested:
         return f"{channel}: the residual is too large to be taken for noise, and no test tells it from noise."
     for place in mismatch.where[:1]:
         ends = place.ends(lambda value: few(value, 4))
