@@ -1,8 +1,8 @@
 """Rows of a table without a time: in the order of its inputs, where their own order tells nothing.
 
-Such a table is a set of readings, and no answer may hang on how somebody has sorted it: neighbours, from which
-noise is read, are neighbours in the inputs. A table has an order where a load goes up and down in it, as a
-cell is loaded: there what remembers its way can show.
+Such a table is a set of readings, and no answer may hang on how somebody has sorted it: neighbours, from
+which noise is read, are neighbours in the inputs. A table has an order where a load goes up and down in it,
+as a cell is loaded: there what remembers its way can show.
 
 Source: Kendall and Stuart, The Advanced Theory of Statistics, vol. 3, ch. 45: of n values in any order
 2 (n - 2) / 3 are turning points, with the variance (16 n - 29) / 90.
