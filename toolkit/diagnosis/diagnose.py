@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.diagnosis.answer.build_answer import answer_of
 from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
@@ -25,9 +27,10 @@ from toolkit.diagnosis.fit.averages import (
 )
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
+from toolkit.diagnosis.fit.row_order import by_inputs
 from toolkit.diagnosis.law.foretelling import before_nothing
 from toolkit.diagnosis.law.learn import Laws, learned
-from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations
+from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations, without_untested
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Search, search
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -42,7 +45,6 @@ from toolkit.worker.posix import Limits
 from toolkit.worker.worker import LateError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.fit import Fit
@@ -122,6 +124,9 @@ def _diagnosed(
     declared, outcome, laws = None, None, None
     try:
         declared = _first_look(posed.problem, budget)
+        ordered = _of_readings(posed.problem, declared, calibrations, budget, code)
+        if ordered is not None:
+            posed, declared = ordered
         means = _of_means(posed.problem, declared, calibrations, budget, code)
         if means is not None:
             posed, told = means
@@ -139,6 +144,7 @@ def _diagnosed(
                 laws = learned(outcome, withdrawn=mostly_unknown(outcome), budget=budget)
                 outcome, laws = without_imitations(outcome, laws, budget)
                 outcome, laws = judged_by_laws(outcome, laws, seed=seed, budget=budget)
+                outcome = without_untested(outcome, laws)
             answer = answer_of(posed.case, outcome, laws, findings)
     except BudgetSpentError as error:
         answer = _too_late(posed.case, posed.problem, declared, findings, str(error))
@@ -150,6 +156,35 @@ def _diagnosed(
     if late:
         answer = replace(answer, complete=False, skipped=(*answer.skipped, late))
     return Result(diagnosis=answer, search=outcome, laws=laws, predictions=files)
+
+
+def _of_readings(
+    problem: Problem,
+    declared: dict[str, NDArray[np.float64]],
+    calibrations: Path | None,
+    budget: TimeBudget,
+    code: CaseCode | None,
+) -> tuple[_Posed, dict[str, NDArray[np.float64]]] | None:
+    """Return a case without an order of rows by its inputs; None where rows have one.
+
+    They have one to a simulation too whose rows are others where they stand in another order.
+    """
+    readings = by_inputs(problem.case)
+    if readings is None:
+        return None
+    case, orders = readings
+    if code is not None:
+        code.learn(case.runs)
+    posed = _posed(case, budget.guarded(model_of)(case, calibrations, code), budget)
+    if len(posed.problem.runs) != len(orders):  # some have the phase of a tare, and are no part of it
+        return None
+    at = np.concatenate([rows.start + order for rows, order in zip(problem.slices, orders, strict=True)])
+    simulated = posed.problem.simulate(_values(posed.problem), ())
+    same = all(
+        np.allclose(simulated[name], column[at], rtol=1e-9, atol=0, equal_nan=True)
+        for name, column in declared.items()
+    )
+    return (posed, simulated) if same else None
 
 
 def _of_means(

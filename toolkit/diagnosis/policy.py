@@ -55,6 +55,10 @@ class _Rows:
     fewest_for_outliers: int = _set(12, "rows of a run", "fewer have no scatter that a row could be far off")
     folds: int = _set(5, "parts", "each fit sees four fifths of the rows, at the price of five fits")
     fewest: int = _set(3, "rows of an output", "with as many nothing can be told apart from anything")
+    groups: int = _set(3, "groups of a part", "where rows have no order: none is an end of the range alone")
+    group: int = _set(2, "different inputs", "of a group at least: less is a point between two known ones")
+    step: float = _set(0.01, "of an input's range", "less between two rows is the noise of one that dwells")
+    fewer_turns: float = _set(2.33, "standard deviations", "of an input: one shuffled table in 100 has them")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -423,6 +427,7 @@ class _Laws:
     same: float = _set(
         0.95, "of what laws take of the held-out mean square", "by effects: the laws are their own formulas"
     )
+    outdoes: float = _set(2.0, "times what effects take", "of unseen rows: they are the smaller part")
     kept: float = _set(
         0.5, "of its size", "by which an effect may be smaller or larger beside laws and be the same effect"
     )

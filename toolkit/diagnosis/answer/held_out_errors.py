@@ -68,7 +68,10 @@ def judged_noise(search: Search, name: str) -> ChannelNoise:
 
 
 def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) -> tuple[HeldOutChannel, ...]:
-    """Return held-out errors with those that the laws leave beside them; an event tells nothing there."""
+    """Return held-out errors with those that the laws leave beside them; an event tells nothing there.
+
+    What laws leave is no measure of them: beside them the noise is the sensor's own, where that is less.
+    """
     if not any(law.predicts for law in laws.listed):
         return errors
     problem = search.problem
@@ -78,7 +81,8 @@ def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) ->
         away = problem.judged(name, problem.observed[name] - laws.held_out.simulated[name])
         rmse = math.sqrt(float(np.mean(away**2)))
         stated = problem.stated_sd(output.channel) is not None
-        floor = output.noise_floor if stated else min(output.noise_floor, rmse)
+        sensor = math.inf if output.sensor_sd is None else output.sensor_sd
+        floor = output.noise_floor if stated else min(output.noise_floor, rmse, sensor)
         told.append(replace(output, with_laws_rmse=rmse, noise_floor=floor))
     return tuple(told)
 

@@ -86,7 +86,8 @@ class Case:
 
     ``effects`` are those that its simulation has from the start, of a model file or a corrected machine;
     ``model`` is that file; ``nominal_load_N`` the load to which their parameters are counted, None for that
-    of the recordings; ``simulated`` says that these are no recordings of a real machine.
+    of the recordings; ``simulated`` says that these are no recordings of a real machine; ``has_order``
+    that their rows follow each other, and are no set of readings.
     """
 
     path: Path
@@ -103,6 +104,7 @@ class Case:
     nominal_load_N: float | None = None
     model: Path | None = None
     simulated: bool = False
+    has_order: bool = True
 
     @property
     def outputs(self) -> tuple[CaseChannel, ...]:

@@ -82,6 +82,8 @@ def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregressi
     """Return the noise's covariance matrix times columns, segment by segment."""
     from scipy.signal import fftconvolve
 
+    if not noise.reflection:
+        return noise.sd**2 * columns
     products = np.empty_like(columns)
     for segment in where.segments:
         n = segment.stop - segment.start
@@ -266,6 +268,25 @@ def _solve(
     residual = space.residual(simulated)
     noise = noise_of(space.problem, residual, layouts, used=len(x))
     return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
+
+
+def sizes_off(made: Fit, applied: AppliedEffect) -> tuple[float, list[int]]:
+    """Return how far the sizes of one effect of a fit are off none, all together, and where they stand in it.
+
+    In squared standard deviations, which are chi-squared of as many where there are none (Wald's test).
+    """
+    at = len(made.p)
+    for each in made.active:
+        if each.key == applied.key:
+            break
+        at += len(each.searched)
+    own = [i for i, size in enumerate(applied.searched) if size.off is not None]
+    off = np.array([applied.values[applied.searched[i].name] - (applied.searched[i].off or 0.0) for i in own])
+    places = [at + i for i in own]
+    covariance = made.covariance[np.ix_(places, places)]
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))  # of one scale: units part them by decades
+    apart = off / sd
+    return float(apart @ np.linalg.pinv(covariance / np.outer(sd, sd), hermitian=True) @ apart), places
 
 
 def replace_effects(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...]) -> Fit:

@@ -25,6 +25,7 @@ import numpy as np
 from toolkit.diagnosis.fit.descent import Derivatives, Space
 from toolkit.diagnosis.fit.fit import Fit, fit, jacobian
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, log_likelihood, whiten
+from toolkit.diagnosis.fit.row_order import dealt
 from toolkit.diagnosis.fit.scatter_sizes import likeliest_sizes
 from toolkit.diagnosis.fit.unknown_past import past_responses, taken_by_past
 from toolkit.diagnosis.policy import PAST, ROWS, SCATTER
@@ -68,11 +69,15 @@ def folds_of(problem: Problem, fit: Fit) -> Folds:
                 mask[position] = True
             masks.append(mask)
         return Folds(held=tuple(masks), by_run=True)
+    if problem.case.has_order:
+        blocks = [np.array_split(np.arange(run.start, run.stop), ROWS.folds) for run in runs]
+    else:
+        blocks = [dealt(run, problem.drivers, ROWS.folds) for run in runs]
     masks = []
     for k in range(ROWS.folds):
         mask = np.zeros(problem.rows, dtype=bool)
-        for run in runs:
-            mask[np.array_split(np.arange(run.start, run.stop), ROWS.folds)[k]] = True
+        for parts in blocks:
+            mask[parts[k]] = True
         if mask.any():
             masks.append(mask)
     return Folds(held=tuple(masks), by_run=False)

@@ -86,13 +86,16 @@ class Layout:
         return len(self.index)
 
 
-def layout(times: Sequence[NDArray[np.float64]], counted: Sequence[NDArray[np.bool_]]) -> Layout:
+def layout(
+    times: Sequence[NDArray[np.float64]], counted: Sequence[NDArray[np.bool_]], *, ordered: bool = True
+) -> Layout:
     """Return the layout of one output.
 
     Parameters
     ----------
     times : of each run [s], shape (n_run,)
     counted : of each run, which values count
+    ordered : rows follow each other; else each is a series of its own, and of no other's past
     """
     index, segments, offset, start = [], [], 0, 0
     for t, good in zip(times, counted, strict=True):
@@ -100,7 +103,7 @@ def layout(times: Sequence[NDArray[np.float64]], counted: Sequence[NDArray[np.bo
         if len(at):
             steps = np.diff(t[at])
             usual = np.median(np.diff(t)) if len(t) > 1 else 1.0
-            breaks = np.flatnonzero(steps > NOISE.gap * usual) + 1
+            breaks = np.flatnonzero((steps > NOISE.gap * usual) | (not ordered)) + 1
             for piece in np.split(at, breaks):
                 segments.append(slice(start, start + len(piece)))
                 start += len(piece)

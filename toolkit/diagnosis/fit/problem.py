@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, layout
+from toolkit.diagnosis.fit.row_order import drivers_of
 from toolkit.diagnosis.policy import ROWS
 from toolkit.diagnosis.simulators.simulator import Model, TermPattern
 from toolkit.effects.applied import AppliedEffect
@@ -60,10 +61,20 @@ class Problem:
         """Rows of all runs."""
         return int(self.slices[-1].stop)
 
+    @property
+    def drivers(self) -> list[NDArray[np.float64]]:
+        """What drives the runs, (rows,) each; of another program's output without inputs, that output."""
+        listed = [drivers_of(self.case, run) for run in self.runs]
+        return [np.concatenate([each[name] for each in listed]) for name in listed[0]]
+
     def layout(self, name: str, rows: NDArray[np.bool_] | None = None) -> Layout:
         """Return the layout of an output's kept values, confined to some rows."""
         good = self.kept[name] if rows is None else self.kept[name] & rows
-        return layout([run.t for run in self.runs], [good[rows] for rows in self.slices])
+        return layout(
+            [run.t for run in self.runs],
+            [good[rows] for rows in self.slices],
+            ordered=self.case.has_order,
+        )
 
     def judged(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what counts of an output's values, (rows,): those of its kept rows, or their rates [1/s]."""

@@ -111,9 +111,11 @@ def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
 def _quick_sd(problem: Problem, column: NDArray[np.float64], name: str) -> float:
     where = problem.layout(name)
     values = column[where.index]
-    quick = [
-        np.diff(values[segment], QUICK) for segment in where.segments if segment.stop - segment.start > QUICK
-    ]
+    if problem.case.has_order:
+        series = [values[segment] for segment in where.segments]
+    else:  # neighbours in the inputs, of which none is the other's past
+        series = [column[rows][problem.kept[name][rows]] for rows in problem.slices]
+    quick = [np.diff(part, QUICK) for part in series if len(part) > QUICK]
     if not quick:
         return math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
     return robust_sd(np.concatenate(quick)) / math.sqrt(_WEIGHT)

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.fit import fit
+from toolkit.diagnosis.fit.fit import fit, sizes_off
 from toolkit.diagnosis.fit.folds import hold_out
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import before_nothing
 from toolkit.diagnosis.law.learn import Laws, learned
-from toolkit.diagnosis.policy import LAWS, STEP
+from toolkit.diagnosis.policy import LAWS, STEP, VERDICT
 from toolkit.diagnosis.search.search import without
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
@@ -46,12 +46,8 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     beside = any(step.active.key == applied.key for step in search.steps for applied in laws.fit.active)
     if not beside or not is_asked or not laws.complete:
         return search, laws
-    bare = replace(
-        search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
-        structure=search.structure_before,
-    )  # fmt: skip
     try:
-        bare = before_nothing(bare, seed=seed, budget=budget)
+        bare = before_nothing(_bare(search), seed=seed, budget=budget)
     except BudgetSpentError:
         return search, replace(laws, complete=False)
     alone = learned(bare, withdrawn=False, budget=budget)
@@ -104,6 +100,60 @@ def _process_noise(search: Search, fit: Fit) -> bool:
     return any(part.process_sd > part.sensor_sd for part in parts)
 
 
+def without_untested(search: Search, laws: Laws) -> Search:
+    """Return a search without the names that laws beside them outdo, where their last test was not made.
+
+    It may have taken them away; the laws stand whether they are there or not.
+    """
+    if laws.complete or search.skipped or not outdone(search, laws):
+        return search
+    return _bare(search)
+
+
+def outdone(search: Search, laws: Laws) -> bool:
+    """Tell whether laws take several times what all effects take of unseen rows, in every output they are in.
+
+    The effects then are at best the smaller part of what was left out.
+    """
+    if not search.steps or not any(law.predicts for law in laws.listed):
+        return False
+    problem, shown = search.problem, []
+    for name in problem.names:
+        if problem.kept[name].any():
+            without, named, beside = (
+                _error(problem, held_out, name)
+                for held_out in (search.held_refitted, search.held_augmented, laws.held_out)
+            )
+            if max(without, named) > beside:
+                shown.append(named - beside > LAWS.outdoes * (without - named))
+    return bool(shown) and all(shown)
+
+
+def _is_idle(made: Fit, step: Step) -> bool:
+    """Tell whether the sizes of an effect, all together, are none within their interval."""
+    from scipy.stats import chi2
+
+    for applied in made.active:
+        if applied.key == step.active.key:
+            away, sizes = sizes_off(made, applied)
+            return bool(sizes) and away < float(chi2.ppf(VERDICT.interval, len(sizes)))
+    return False
+
+
+def _bare(search: Search) -> Search:
+    """Return a search without the effects that it found."""
+    return replace(
+        search, steps=(), augmented=search.refitted, held_augmented=search.held_refitted,
+        structure=search.structure_before,
+    )  # fmt: skip
+
+
+def _error(problem: Problem, held_out: HeldOut, name: str) -> float:
+    """Return the mean square of an output's error on unseen rows."""
+    away = problem.judged(name, problem.observed[name] - held_out.simulated[name])
+    return float(np.mean(away**2))
+
+
 def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> bool:
     """Tell whether effects take nearly all that laws in their place take: these are then their own formulas.
 
@@ -112,13 +162,9 @@ def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> 
     without, named, laws : unseen rows with neither, with the effects, and with the laws in their place
     """
 
-    def error(held_out: HeldOut, name: str) -> float:
-        away = problem.judged(name, problem.observed[name] - held_out.simulated[name])
-        return float(np.mean(away**2))
-
     outputs = [name for name in problem.names if problem.kept[name].any()]
     taken = [
-        (error(without, name) - error(named, name), error(without, name) - error(laws, name))
+        tuple(_error(problem, without, name) - _error(problem, each, name) for each in (named, laws))
         for name in outputs
     ]
     return all(by_effects >= LAWS.same * by_laws for by_effects, by_laws in taken)
@@ -170,7 +216,8 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
     try:
         bare = fit(problem, listed, start=laws.fit.p)
         scores = hold_out(problem, search.folds, bare.active, bare)
-        if laws.held_out.total - scores.total >= STEP.least_gain:
+        idle = outdone(search, laws) and all(_is_idle(laws.fit, step) for step in dropped)
+        if laws.held_out.total - scores.total >= STEP.least_gain and not idle:
             return None
         steps = tuple(step for step in search.steps if step not in dropped)
         if steps:

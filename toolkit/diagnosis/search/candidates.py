@@ -144,6 +144,8 @@ def candidates(
     for effect in (*effects().values(), INPUT_NOISE):
         if effect.in_time and not problem.case.has_time:
             continue
+        if effect.remembers and not problem.case.has_order:  # its way was not recorded
+            continue
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
             on_inputs = effect.on_channel is not None and "input" in effect.on_channel.where

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.drift import judged_by_rates
-from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
+from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects, sizes_off
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.fit.run_scatter import RunScatter, held_out_beside_scatter, with_run_scatter
@@ -256,7 +256,11 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     if not steps:
         structure += proposed.unconfirmed(problem)
     with contextlib.suppress(BudgetSpentError):
-        base, held_base, steps = _told_from_none(problem, folds, base, held_base, steps)
+        named, (base, held_base, steps) = (
+            steps,
+            _told_from_none(problem, folds, base, held_base, steps),
+        )
+        structure = structure if steps or not named else before
     scatter: tuple[RunScatter, ...] = ()
     if steps:
         with contextlib.suppress(BudgetSpentError):
@@ -394,39 +398,29 @@ def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, l
 def _told_from_none(
     problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
 ) -> tuple[Fit, HeldOut, list[Step]]:
-    """Return a hypothesis without effects of one size that the others leave open: it may be none.
+    """Return a hypothesis without effects whose sizes, all together, may be none.
 
     The curvature of a fit says where to ask, and the fit without it decides: where friction holds, slides or
     stops, an interval of the curvature reaches to zero for an effect without which nothing is foretold. Then
-    the likelihood's own chord from there to none is the size's standard deviation (profile likelihood).
+    the likelihood's own chord from there to none is the sizes' standard deviation (profile likelihood).
     """
-    from scipy.stats import norm
+    from scipy.stats import chi2
 
-    reach = float(norm.ppf((1 + VERDICT.interval) / 2))
-    at = len(problem.free)
     for applied in base.active:
-        own, at = at, at + len(applied.searched)
-        sizes = [(i, each) for i, each in enumerate(applied.searched) if each.off is not None]
-        if len(sizes) != 1:
-            continue
-        (i, size) = sizes[0]
-        sd = math.sqrt(max(float(base.covariance[own + i, own + i]), 0.0))
-        if not abs(applied.values[size.name] - (size.off or 0.0)) < reach * sd:
-            continue
+        away, own = sizes_off(base, applied)
+        reach = float(chi2.ppf(VERDICT.interval, len(own))) if own else 0.0
         listed = [step for step in steps if step.active.key != applied.key]
-        if len(listed) == len(steps):
+        if not away < reach or len(listed) == len(steps):
             continue
         try:
             bare = fit(problem, without(base.active, applied), start=base.p)
         except FitError:  # the simulation needs it
             continue
         lost = base.log_posterior - bare.log_posterior
-        if lost > reach**2 / 2:  # the likelihood ratio of its interval
+        if lost > reach / 2:  # the likelihood ratio of their interval
             scale = np.ones(len(base.covariance))
-            scale[own + i] = abs(applied.values[size.name] - (size.off or 0.0)) / math.sqrt(2 * lost) / sd
+            scale[own] = math.sqrt(away / (2 * lost))
             base = replace(base, covariance=base.covariance * np.outer(scale, scale))
-            continue
-        if len(steps) < 2:
             continue
         try:
             scores = hold_out(problem, folds, bare.active, bare)
