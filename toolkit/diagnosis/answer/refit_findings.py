@@ -99,7 +99,7 @@ def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:
                     rule="parameter-at-bound",
                     where=f"{case.path.name}: {parameter.name}",
                     level="warning",
-                    message=f"{' and '.join(ends)}, as far off its declared value as its prior lets a fit go",
+                    message=f"{' and '.join(ends)}: as far off its declared value as its prior lets a fit go",
                 )
             )
     return tuple(findings)
@@ -113,19 +113,17 @@ def _worse(case: Case, search: Search) -> tuple[Finding, ...]:
         refitted, declared, still = unseen_errors(
             search.problem, output.name, search.nominal.simulated, search.held_refitted
         )
-        rivals = (
-            (declared, f"the simulation as declared by {declared:.4g} {output.unit}"),
-            (still, f"an output that stands still at its mean by {still:.4g} {output.unit}"),
-        )
-        findings += [
+        if refitted**2 <= VERDICT.shown * min(declared, still) ** 2:
+            continue
+        harm = f"on rows that no fit has seen the refit is off by {refitted:.4g} {output.unit}"
+        findings.append(
             Finding(
                 rule="refit-worse",
                 where=f"{case.path.name}: {output.name}",
                 level="warning",
-                message=f"on rows that no fit has seen the refit is off by {refitted:.4g} {output.unit}, "
-                f"{rival}",
+                message=f"{harm}, the simulation as declared by {declared:.4g} {output.unit}"
+                if declared <= still
+                else f"{harm}, an output that stands still at its mean by {still:.4g} {output.unit}",
             )
-            for error, rival in rivals
-            if refitted**2 > VERDICT.shown * error**2
-        ]
+        )
     return tuple(findings)
