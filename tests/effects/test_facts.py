@@ -27,7 +27,7 @@ class Case:
     outputs = frozenset({"FY", "MZ"})
     cells = frozenset({"D51", "D52", "E5"})
     nominal_load_N = 4000.0
-    rows, row_time, minutes, longest_run = 500, 0.02, 0.4, 12.0
+    rows, row_time, minutes = 500, 0.02, 0.4
     integrates, way = True, (1.0, 0.01)
     motion = MotionSizes(
         force=5.0, speed=0.5, place=0.2, fastest=1.2, farthest=0.6, level=0.4, has_position=True

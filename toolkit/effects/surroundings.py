@@ -17,8 +17,9 @@ class MotionSizes:
 
     ``force``, ``speed`` and ``place`` are what terms are scaled by; ``fastest`` and ``farthest`` the largest
     magnitudes of speed and position, ``level`` the largest value that may run over. ``has_position`` tells
-    whether the equation has the position itself, or only its rate. ``feeds`` is the one other state whose
-    rate depends on this one, None where there is none or there are several.
+    whether the equation has the position itself; where it has only its rate, ``place`` is of the integral.
+    ``feeds`` is the one other state whose rate depends on this one, None where there is none or there are
+    several.
     """
 
     force: float
@@ -77,11 +78,6 @@ class Surroundings(Protocol):
     @property
     def minutes(self) -> float:
         """Duration of all runs together [min]."""
-        ...
-
-    @property
-    def longest_run(self) -> float:
-        """Duration of the longest run [s]."""
         ...
 
     @property

@@ -58,6 +58,18 @@ def test_a_refit_that_makes_unseen_rows_worse_is_told(tmp_path):
     assert "the simulation as declared by" in findings["refit-worse"].message
 
 
+def test_a_refit_that_is_worse_than_standing_still_is_told(tmp_path):
+    # Nothing depends on the warmth; a run with next to none of it leaves the influence where it was declared.
+    text = cell_case(10.0, 'T = { unit = "K", role = "covariate" }\n').replace("gain", "warm")
+    text = text.replace("value = 1.0", "value = 5.0").replace('unit = "1"', 'unit = "N/K"')
+    frames = [table(0, gain=0.0, warmth=0.01), table(1, gain=0.0, warmth=20.0)]
+    findings, answer = told(tmp_path, text, WARM.replace('inputs["L"] + ', ""), frames)
+    (output,) = answer.fit.held_out
+    spread = np.std(np.concatenate([frame["F"] for frame in frames]))
+    assert spread < output.refitted_rmse < 1.04 * output.nominal_rmse
+    assert f"stands still at its mean by {spread:.4g} N" in findings["refit-worse"].message
+
+
 def test_a_refit_within_its_priors_is_not_talked_of(tmp_path):
     findings, _ = told(tmp_path, cell_case(0.01), CELL, [table(k).drop(columns="T") for k in range(2)])
     assert not {"parameter-at-bound", "refit-worse"} & set(findings)

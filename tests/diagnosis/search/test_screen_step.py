@@ -12,6 +12,7 @@ from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.screen_step import from_declared, look
 from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.effects.effect import Effect
 
 SPEED = """
 import pandas as pd
@@ -50,6 +51,20 @@ def test_a_lost_sign_is_seen_from_the_declared_values(tmp_path):
     assert "rectification" not in from_refit
     assert both >= from_refit | {"rectification"}
     assert seen.p_of[id(seen.significant[0])] < 0.003
+
+
+def test_where_a_refit_does_harm_all_effects_are_seen_from_the_declared_values_and_begin_there(
+    tmp_path, monkeypatch
+):
+    case = speeds(tmp_path, unsigned=True)
+    problem = problem_of(case, model_of(case, None, None))
+    base = fit(problem)
+    listed = [each for each in candidates(problem) if each.name == "rectification"]
+    view = look(problem, base, listed, turn=0, seed=1)
+    monkeypatch.setattr(Effect, "misleads", False)
+    assert from_declared(problem, base, view) is view
+    (seen,) = from_declared(problem, base, view, of_all=True).significant
+    assert (seen.candidate.name, seen.p) == ("rectification", (1.0, 0.0))
 
 
 def test_a_refit_that_stays_near_its_priors_is_looked_at_from_there_alone(tmp_path):

@@ -91,14 +91,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
                 for structure in search.structure or (search.structure_before if unknown else ())
             )
         ),
-        not_found=not_found(
-            search.screen,
-            search.scored,
-            names,
-            {step.active.effect.name for step in search.steps} - names,
-            alpha=SCREENING.alpha / tests,
-            units=units,
-        ),
+        not_found=not_found(search, names, alpha=SCREENING.alpha / tests, units=units),
         next_measurements=(
             *_factor_hints(search, effects),
             *_unit_hints(search, laws),

@@ -3,43 +3,51 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer.answer import AbsentEffect
+from toolkit.diagnosis.answer.answer import AbsentEffect, cut_short
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.search.screen import LinearisedFit, Scored
+    from toolkit.diagnosis.search.search import Search
 
 
 NO_PLACE = "no place for it in this case"
-NO_STEPS = "the values stand on no steps coarser than their last digits that matter beside what is left"
+NO_TIME = "it takes time, and the recording has none"
 NO_SIZE = "it is there or not: it has no size"
+NO_ORDER = "it remembers its way, and the rows have no order"
+NO_STEPS = "the values stand on no steps coarser than their last digits that matter beside what is left"
+NOT_TRIED = "it has a place in this case, and the last step of the search left it out"
+OUTWEIGHED = "found, but what stays without a name outweighs it"
+GIVEN_UP = "found, and given up for what explains as much"
+UNDECIDED = "not decided: it shows, but not that it matters on rows that no fit has seen"
+CUT_SHORT = "not decided: the search ended before all was tried"
+VANISHES = "its response vanishes here, or the free parameters take it all"
+TOO_LARGE = "it would not have been seen at any usual size that leaves the outputs in their own range"
 
 
 def not_found(
-    screen: LinearisedFit,
-    scored: Sequence[Scored],
-    names: set[str],
-    withdrawn: set[str],
-    *,
-    alpha: float,
-    units: dict[int, str],
+    search: Search, names: set[str], *, alpha: float, units: dict[int, str]
 ) -> tuple[AbsentEffect, ...]:
     """Return every effect that is not named, with its minimum detectable size.
 
+    A size is the power of a whole search: none is promised by one that was cut short, nor of an effect that
+    the recording seems to have, at whatever size, and that was not confirmed.
+
     Parameters
     ----------
-    scored : every candidate and start about the last fit
     names : of the effects that are named
-    withdrawn : of those that were found and are not named
     alpha : of one test, so that the whole search keeps its own
     units : of the first parameter, by the identity of each scored
     """
+    screen, scored = search.screen, search.scored
+    open_for = dict.fromkeys(search.undecided, UNDECIDED)
+    if cut_short(search.skipped):
+        open_for = dict.fromkeys(effects(), CUT_SHORT) | open_for
     best: dict[str, tuple[float | None, str, bool]] = {}
     beyond: set[str] = set()
     for trial in scored:
@@ -65,28 +73,35 @@ def not_found(
     for name in effects():
         if name in names:
             continue
+        size, unit, visible = best.get(name, (None, "", False))
         if name not in best:
-            why = "found, but what stays without a name outweighs it" if name in withdrawn else NO_PLACE
-            visible = name in withdrawn
-            if not visible and effects()[name].from_digits:
-                visible, why = (
-                    True,
-                    NO_STEPS,
-                )  # its place is every output, and the digits are read, not fitted
-            entries.append(
-                AbsentEffect(name=name, minimum_detectable=None, unit="", observable=visible, why=why)
-            )
-            continue
-        size, unit, visible = best[name]
-        why = NO_SIZE if size is None else ""
-        if not visible:
-            why = "its response vanishes here, or the free parameters take it all"
-        if not visible and name in beyond:
-            why = "it would not have been seen at any usual size that leaves the outputs in their own range"
+            why = _unscored(search, name)
+            visible = why in (OUTWEIGHED, GIVEN_UP, NO_STEPS)
+        elif not visible:
+            why = TOO_LARGE if name in beyond else VANISHES
+        else:
+            why = open_for.get(name, NO_SIZE if size is None else "")
+            size, unit = (None, "") if name in open_for else (size, unit)
         entries.append(
             AbsentEffect(name=name, minimum_detectable=size, unit=unit, observable=visible, why=why)
         )
     return tuple(entries)
+
+
+def _unscored(search: Search, name: str) -> str:
+    """Return why an effect has no response about the last fit."""
+    effect = effects()[name]
+    if any(step.active.effect.name == name for step in search.steps):
+        return OUTWEIGHED
+    if any(applied.effect.name == name for applied in search.screen.base.active):
+        return GIVEN_UP
+    if not search.problem.model.places(effect):
+        return NO_PLACE
+    if effect.in_time and not search.problem.case.has_time:
+        return NO_TIME
+    if effect.remembers and not search.problem.case.has_order:
+        return NO_ORDER
+    return NO_STEPS if effect.from_digits and not cut_short(search.skipped) else NOT_TRIED
 
 
 def _moved(screen: LinearisedFit, trial: Scored) -> float:

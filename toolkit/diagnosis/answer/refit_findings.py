@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from toolkit.diagnosis.policy import PRIORS, VERDICT
+from toolkit.diagnosis.search.unseen_runs import unseen_errors
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -92,6 +91,7 @@ def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:
     ):
         values = {"refitted": refitted} | ({"with the effects": augmented} if search.steps else {})
         shifts = {fit: (value - parameter.value) / (parameter.sd or 1.0) for fit, value in values.items()}
+        # The prior's own end; bounds that a case states are another matter.
         ends = [f"{shift:+.1f} sd {fit}" for fit, shift in shifts.items() if abs(shift) > PRIORS.end]
         if ends:
             findings.append(
@@ -99,7 +99,7 @@ def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:
                     rule="parameter-at-bound",
                     where=f"{case.path.name}: {parameter.name}",
                     level="warning",
-                    message=f"{' and '.join(ends)}: the fit would go farther than its prior allows",
+                    message=f"{' and '.join(ends)}: as far off its declared value as its prior lets a fit go",
                 )
             )
     return tuple(findings)
@@ -108,22 +108,22 @@ def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:
 def _worse(case: Case, search: Search) -> tuple[Finding, ...]:
     findings = []
     for output in search.problem.model.outputs:
-        counted = search.problem.kept[output.name]
-        if not counted.any():
+        if not search.problem.kept[output.name].any():
             continue
-        observed = search.problem.observed[output.name][counted]
-        declared, refitted = (
-            float(np.sqrt(np.mean((observed - simulated[output.name][counted]) ** 2)))
-            for simulated in (search.nominal.simulated, search.held_refitted.simulated)
+        refitted, declared, still = unseen_errors(
+            search.problem, output.name, search.nominal.simulated, search.held_refitted
         )
-        if refitted**2 > VERDICT.shown * declared**2:
-            findings.append(
-                Finding(
-                    rule="refit-worse",
-                    where=f"{case.path.name}: {output.name}",
-                    level="warning",
-                    message=f"on rows that no fit has seen the refit is off by {refitted:.4g} {output.unit}, "
-                    f"the simulation as declared by {declared:.4g} {output.unit}",
-                )
+        if refitted**2 <= VERDICT.shown * min(declared, still) ** 2:
+            continue
+        harm = f"on rows that no fit has seen the refit is off by {refitted:.4g} {output.unit}"
+        findings.append(
+            Finding(
+                rule="refit-worse",
+                where=f"{case.path.name}: {output.name}",
+                level="warning",
+                message=f"{harm}, the simulation as declared by {declared:.4g} {output.unit}"
+                if declared <= still
+                else f"{harm}, an output that stands still at its mean by {still:.4g} {output.unit}",
             )
+        )
     return tuple(findings)

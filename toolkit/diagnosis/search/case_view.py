@@ -62,11 +62,6 @@ class CaseView:
         return sum(float(run.t[-1] - run.t[0]) for run in self._problem.runs if run.rows > 1) / 60
 
     @property
-    def longest_run(self) -> float:
-        """Duration of the longest run [s]."""
-        return max((float(run.t[-1] - run.t[0]) for run in self._problem.runs if run.rows), default=0.0)
-
-    @property
     def integrates(self) -> bool:
         """The simulation integrates its own equation of motion."""
         moving = self._problem.model.capability.motion

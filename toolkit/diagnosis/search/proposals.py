@@ -25,6 +25,7 @@ from toolkit.diagnosis.search.screen import Scored
 from toolkit.diagnosis.search.unexplained import StructureFound
 from toolkit.diagnosis.simulators.following import PARAMETER_STEP
 from toolkit.diagnosis.simulators.simulator import Following, TermPattern
+from toolkit.diagnosis.simulators.states import way_of
 from toolkit.effects.law import ITSELF, POSITION, TIME
 from toolkit.errors import FitError
 
@@ -200,9 +201,13 @@ class _FollowedView(CaseView):
         own = x[names.index(self.channel)]
         position = moving.position(self.channel)
         place = own if position is None else x[names.index(position)]
+        spread = float(np.std(place))
+        if position is None:
+            runs = [own[rows] for rows in self._problem.slices]
+            spread = way_of(runs, [run.t for run in self._problem.runs])
         return replace(
             sizes, fastest=float(np.abs(own).max()), farthest=float(np.abs(place).max()),
-            speed=float(np.std(own)) or sizes.speed, place=float(np.std(place)) or sizes.place,
+            speed=float(np.std(own)) or sizes.speed, place=spread or sizes.place,
             level=float(own.max()) or sizes.level,
         )  # fmt: skip
 

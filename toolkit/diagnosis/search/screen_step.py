@@ -133,12 +133,14 @@ def _is_sought(candidate: CandidateEffect, turn: int) -> bool:
     return not candidate.active.effect.from_digits and not (candidate.discrete and turn > 1)
 
 
-def from_declared(problem: Problem, base: Fit, view: Look) -> Look:
+def from_declared(problem: Problem, base: Fit, view: Look, *, of_all: bool = False) -> Look:
     """Return a look with the effects in it that are significant from the declared parameters alone.
 
     An effect that changes the shape of an answer (a lost sign, a stop, friction at rest) drives a refit
     without it far off, and from there it may not help at all. Seen from the declared values it has to explain
     more than the refit does, by as much as the search asks of every candidate.
+
+    ``of_all`` effects it is asked where the refit does harm: nothing is to be read off from there.
     """
     from scipy.stats import chi2
 
@@ -146,7 +148,7 @@ def from_declared(problem: Problem, base: Fit, view: Look) -> Look:
     reshaping = [
         candidate
         for candidate in view.candidates
-        if candidate.active.effect.misleads and candidate.key not in ranked
+        if (of_all or candidate.active.effect.misleads) and candidate.key not in ranked
     ]
     if not reshaping or np.abs(problem.off_priors(base.p)).max(initial=0.0) < PRIORS.moved:
         return view
@@ -161,7 +163,9 @@ def from_declared(problem: Problem, base: Fit, view: Look) -> Look:
         gain = trial.gain + 2 * (screen.log_likelihood - base.log_posterior)
         p = float(chi2.sf(max(gain, 0.0) * trial.trust, trial.dof)) * (len(view.scored) + len(trials))
         if p < SCREENING.alpha:
-            significant.append(replace(trial, gain=gain))
+            # What misleads begins at the refit as well: any other is seen from here alone.
+            begin = None if trial.candidate.active.effect.misleads else screen.base.p
+            significant.append(replace(trial, gain=gain, p=begin))
             p_of[id(significant[-1])] = p
     together = sorted((*view.significant, *significant), key=lambda trial: -trial.gain)
     return replace(view, significant=tuple(together), p_of=p_of)

@@ -29,7 +29,7 @@ from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
-from toolkit.diagnosis.search.unseen_runs import shown_on_unseen_runs
+from toolkit.diagnosis.search.unseen_runs import does_harm, shown_on_unseen_runs
 from toolkit.diagnosis.search.wrong_units import is_listed, unit_step, wrong_units
 from toolkit.effects.applied import ORIGIN, AppliedEffect
 from toolkit.errors import FitError
@@ -109,7 +109,10 @@ def _with_noise(base: Fit, effect: AppliedEffect) -> tuple[AppliedEffect, ...] |
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Search:
-    """What a search has found, with the fits that show it."""
+    """What a search has found, with the fits that show it.
+
+    ``undecided`` are the effects that the last look of all showed, confirmed by unseen rows or not.
+    """
 
     problem: Problem
     folds: Folds
@@ -125,6 +128,7 @@ class Search:
     scored: tuple[Scored, ...]
     skipped: tuple[str, ...]
     scatter: tuple[RunScatter, ...] = ()
+    undecided: frozenset[str] = frozenset()
 
     def variance(self, at: int) -> float:
         """Return the variance of a parameter of the augmented fit, by its place among them.
@@ -163,6 +167,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     held_base = held_refitted = hold_out(problem, folds, (), refitted)
     screen = LinearisedFit.of(problem, base)
     scored: tuple[Scored, ...] = ()
+    undecided = frozenset[str]()
     before: tuple[StructureFound, ...] = ()
     structure: tuple[StructureFound, ...] = ()
     proposed = NONE
@@ -187,8 +192,10 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                     sought = tuple(candidate for candidate in listed if proposed.is_worth(candidate))
             budget.check(f"step {turn + 1}: screening {len(sought)} candidates")
             view = look(problem, base, sought, turn=turn, seed=seed + turn)
-            view = from_declared(problem, base, view)
+            harmed = does_harm(problem, nominal.simulated, held_refitted)
+            view = from_declared(problem, base, view, of_all=harmed)
             screen, scored = view.screen, view.scored
+            undecided = frozenset(trial.candidate.name for trial in view.significant)
             budget.check(f"step {turn + 1}: structure of the residual")
             structure = remainder(problem, screen, base, seed + 100 + turn)
             structure += hidden_in_noise(problem, folds, base, seed + 200 + turn)
@@ -283,6 +290,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         scored=scored,
         skipped=tuple(skipped),
         scatter=scatter,
+        undecided=undecided,
     )
 
 

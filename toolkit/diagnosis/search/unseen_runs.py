@@ -162,3 +162,33 @@ def gains_of(problem: Problem, before: HeldOut, shown: Sequence[tuple[Fit, HeldO
             after = float(np.mean((observed - held_out.simulated[name][kept]) ** 2))
             gains[i] += 0.5 * worth * math.log(max(left, 1e-300) / max(after, 1e-300))
     return gains
+
+
+def unseen_errors(
+    problem: Problem, name: str, declared: Mapping[str, NDArray[np.float64]], refitted: HeldOut
+) -> tuple[float, float, float]:
+    """Return the errors of a refit on rows that it has not seen, of the declared simulation, and of a mean.
+
+    They are root mean squares of an output; the third is of an output that stands still at its own mean.
+
+    Parameters
+    ----------
+    declared : the simulation as declared, of every output (rows,)
+    """
+    observed, kept = problem.observed[name], problem.kept[name]
+    mean = np.full(len(observed), float(np.mean(observed[kept])))
+    refit, plain, still = (
+        float(np.sqrt(np.mean((observed - simulated)[kept] ** 2)))
+        for simulated in (refitted.simulated[name], declared[name], mean)
+    )
+    return refit, plain, still
+
+
+def does_harm(problem: Problem, declared: Mapping[str, NDArray[np.float64]], refitted: HeldOut) -> bool:
+    """Tell whether a refit is worse, on rows that it has not seen, than no refit or than standing still."""
+    for name, kept in problem.kept.items():
+        if kept.any():
+            refit, *others = unseen_errors(problem, name, declared, refitted)
+            if refit**2 > VERDICT.shown * min(others) ** 2:
+                return True
+    return False

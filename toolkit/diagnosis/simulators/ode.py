@@ -34,6 +34,7 @@ from toolkit.diagnosis.simulators.states import (
     state_names,
     state_units,
     term_places,
+    way_of,
 )
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
 from toolkit.diagnosis.simulators.turning import Turning
@@ -142,6 +143,10 @@ class OdeModel:
             )
             for i, name in enumerate(self.states)
         }
+        times = [run.t for run in runs]
+        self._travelled = {
+            name: way_of([state[i] for state in states], times) for i, name in enumerate(self.states)
+        }
         self._levels = np.quantile(x, np.linspace(0, 1, _LEVELS), axis=1).T
         self._largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
         farthest = np.abs(x).max(axis=1)
@@ -162,13 +167,14 @@ class OdeModel:
         state = str(channel)
         rate, size = self.scale[state]
         position = self.position_of(state)
-        place = size if position is None else self.scale[position][1]
+        place = (self._travelled[state] or size) if position is None else self.scale[position][1]
         fastest, farthest = self._reach[state]
         at = self.feeds.get(self.states.index(state))
         return MotionSizes(
             force=rate, speed=size, place=place, fastest=fastest, farthest=farthest,
             # A state that starts at zero and only falls has no level to run over.
-            level=self._largest[state] or place, has_position=position is not None,
+            level=self._largest[state] or (size if position is None else place),
+            has_position=position is not None,
             feeds=None if at is None else self.states[at],
         )  # fmt: skip
 
@@ -450,9 +456,8 @@ class OdeModel:
         if effect.term is not None:
             if is_law(effect.name):
                 return [(state, None) for state in term_places(self.places)]
-            if effect.term.of == "state":
-                return [(name, None) for i, name in enumerate(self.states) if i not in self.derivative_of]
-            at = [self.states.index(name) for name in self.force_units]
+            named = self.states if effect.term.of == "state" else self.force_units
+            at = [self.states.index(name) for name in named]
             listed = {self.states.index(name): text for name, text in self.case.simulation.force_terms}
             meanings = declared_dimensions(listed) | self._dimensions
             return [(self.states[i], None) for i in fitting(effect.term, at, self.derivative_of, meanings)]

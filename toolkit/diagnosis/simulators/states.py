@@ -134,6 +134,8 @@ def fitting(
     meanings : state -> dimension, where the recording or the declared unit of a term tells it
     """
     pairs = [i for i in states if i in velocities]
+    if term.of == "state":  # a level: no velocity, whether or not its position is a state
+        return [i for i in states if i not in velocities and meanings.get(i) not in SPEEDS]
     if term.of == "velocity":
         return _motions(states, pairs, meanings, SPEEDS)
     if term.of != "position":
@@ -150,6 +152,18 @@ def _motions(
         return list(states)
     # Beside states of another kind, one of which nothing is known is of theirs.
     return [i for i in states if i in pairs or meanings.get(i) in allowed]
+
+
+def way_of(rates: Sequence[NDArray[np.float64]], times: Sequence[NDArray[np.float64]]) -> float:
+    """Return the spread of the position of which only the rate is a state: of every run's from its start.
+
+    Parameters
+    ----------
+    rates, times : of every run, shape (rows,) each
+    """
+    steps = (0.5 * (rate[1:] + rate[:-1]) * np.diff(t) for rate, t in zip(rates, times, strict=True))
+    ways = [np.concatenate([[0.0], np.cumsum(moved)]) for moved in steps]
+    return float(np.std(np.concatenate(ways)))
 
 
 def state_names(case: Case, count: int) -> tuple[str, ...]:

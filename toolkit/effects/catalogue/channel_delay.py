@@ -41,5 +41,6 @@ EFFECT = Effect(
     ),
     channel=_late,
     remembers=True,
+    reshapes=True,  # a lag's own parameter imitates it
     on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True, between_rows=True),
 )

@@ -103,9 +103,7 @@ def _longest(case: Surroundings) -> float | None:
     # A bristle as long as the way itself is a spring: over a fall from rest it grows as drag does.
     if not case.integrates:
         return None
-    motion = case.motion
-    travel = motion.place if motion.has_position else motion.speed * case.longest_run
-    return max(_SHORT * travel, motion.speed * case.row_time)
+    return max(_SHORT * case.motion.place, _way_of_a_row(case))
 
 
 EFFECT = Effect(
