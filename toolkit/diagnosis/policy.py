@@ -34,9 +34,7 @@ class _Worker:
     )
     processes: int = _set(64, "processes", "a pool on every core of a large computer, and no fork bomb")
     scratch_MB: int = _set(1024, "MB of temporary files", "when isolated they lie in the memory")
-    deaths: int = _set(
-        12, "deaths", "of single sets of parameters; a simulator that dies more often bounds no fit"
-    )
+    deaths: int = _set(12, "deaths", "of single sets of parameters: one that dies more often bounds no fit")
     simulate_s: float = _set(600.0, "s", "a model file's code without a --budget: that of a diagnosis")
 
 
@@ -496,7 +494,6 @@ class _Location:
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
 PAST, RATES, SCATTER, AVERAGES, EVEN = _Past(), _Rates(), _Scatter(), _Averages(), _Even()
 SCREENING, STARTS, STEP, PAIRS, LATTICE = _Screening(), _Starts(), _Step(), _Pairs(), _Lattice()
-UNITS = _Units()
-DRIFT, UNSEEN, FOLLOWING = _Drift(), _Unseen(), _Following()
+DRIFT, UNSEEN, FOLLOWING, UNITS = _Drift(), _Unseen(), _Following(), _Units()
 STRUCTURE, LAWS, VERDICT, LOCATION = _Structure(), _Laws(), _Verdict(), _Location()
 SECTIONS = tuple(value for value in list(globals().values()) if type(value).__module__ == __name__)
