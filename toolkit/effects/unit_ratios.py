@@ -41,7 +41,7 @@ def units_mistaken() -> dict[str, float]:
     """Return by what a number is too large for every two units of one dimension, by the words for them.
 
     >>> round(units_mistaken()["N read as lbf"], 6)
-    0.224809
+    4.448222
     """
     return {
         f"{right} read as {wrong}": unit(wrong).factor / unit(right).factor
