@@ -486,6 +486,7 @@ class _Location:
     narrow: float = _set(0.7, "of the rows", "a range that is wider says nothing")
     whole: float = _set(0.95, "of the rows", "a range as wide is all that was recorded")
     ranges: int = _set(3, "ranges", "told of one mismatch, the narrowest first")
+    listed: int = _set(8, "values left out", "named one by one: a page of them says no more")
     run: float = _set(
         0.2, "of the mean energy of a run", "a run with less is not named among those of a range"
     )

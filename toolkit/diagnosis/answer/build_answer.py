@@ -32,7 +32,7 @@ from toolkit.diagnosis.answer.next_measurements import equivalent_to, next_measu
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.answer.refit_findings import confounded_findings, refit_findings
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.policy import PRIORS, SCREENING, UNITS, VERDICT
+from toolkit.diagnosis.policy import LOCATION, PRIORS, SCREENING, UNITS, VERDICT
 from toolkit.diagnosis.search.channel_factors import factor_of, is_ratio
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG
@@ -110,8 +110,6 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
     )
 
 
-_LISTED = 8
-"""Values left out that are named one by one."""
 _UNTESTED = ((LARGE,), (LONG,))
 """What is said of a rest that no test tells from noise: it has a reason, and no chance."""
 
@@ -372,7 +370,7 @@ def _outliers(case: Case, search: Search) -> tuple[Finding, ...]:
         left_out = np.flatnonzero(np.isfinite(problem.observed[name]) & ~counted)
         if not len(left_out):
             continue
-        places = [_place_of(problem, name, row) for row in left_out[:_LISTED].tolist()]
+        places = [_place_of(problem, name, row) for row in left_out[: LOCATION.listed].tolist()]
         more = len(left_out) - len(places)
         listed = ", ".join(places) + (f" and {more} more" if more else "")
         findings.append(
