@@ -30,6 +30,7 @@ from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
 from toolkit.diagnosis.fit.row_order import by_inputs
 from toolkit.diagnosis.law.foretelling import before_nothing
 from toolkit.diagnosis.law.learn import Laws, learned
+from toolkit.diagnosis.law.resembling import with_resemblances
 from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations, without_untested
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Search, search
@@ -145,6 +146,7 @@ def _diagnosed(
                 outcome, laws = without_imitations(outcome, laws, budget)
                 outcome, laws = judged_by_laws(outcome, laws, seed=seed, budget=budget)
                 outcome = without_untested(outcome, laws)
+                laws = with_resemblances(outcome, laws, budget)
             answer = answer_of(posed.case, outcome, laws, findings)
     except BudgetSpentError as error:
         answer = _too_late(posed.case, posed.problem, declared, findings, str(error))

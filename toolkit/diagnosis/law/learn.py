@@ -17,7 +17,6 @@ import numpy as np
 from toolkit.diagnosis.fit.folds import hold_out, matters
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
-from toolkit.diagnosis.law.resembling import resembling
 from toolkit.diagnosis.law.terms import pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
@@ -49,7 +48,8 @@ class Law:
 
     ``held_out_gain`` is None of an event; ``shares`` are what it takes of each output's mean square above
     the noise, on held-out rows where it predicts; ``confounded`` are the nominal parameters that moved far
-    because of it; ``resembles`` the known effects whose responses are most like its own, with their distance.
+    because of it; ``resembles`` the known effects whose responses are most like its own, with their distance
+    (`with_resemblances`).
     """
 
     trial: Trial
@@ -58,7 +58,7 @@ class Law:
     held_out_gain: float | None
     share: float
     confounded: tuple[str, ...]
-    resembles: tuple[tuple[str, float], ...]
+    resembles: tuple[tuple[str, float], ...] = ()
 
     @property
     def predicts(self) -> bool:
@@ -116,7 +116,7 @@ def _unlocked(problem: Problem, base: Fit, outputs: Sequence[str], before: Seque
     return [
         Law(
             trial=trial, applied=trial.applied, p_value=STRUCTURE.line, held_out_gain=None,
-            share=trial.gain, confounded=(), resembles=(),
+            share=trial.gain, confounded=(),
         )
         for trial in trials
         if trial is not None
@@ -172,7 +172,7 @@ def _next(
     for events in (False, True):
         entries = [entry for entry in fitted if (entry[1].form == "event") is events]
         for _, trial, refit in _simplest_first(entries)[: LAWS.judged]:
-            law = _judged(search, base, held_out, screen, trial, refit, looked)
+            law = _judged(search, base, held_out, trial, refit, looked)
             if law is not None:
                 return law
     return _by_unseen_runs(search, base, held_out, screen, trials, weight)
@@ -197,7 +197,7 @@ def _by_unseen_runs(
         scores = next(each.held_out for each in shown if each.fit is refit)
         if _told_from_none(refit):
             p = min(1.0, math.exp(-min(gain, 700.0)))
-            return _law(search, base, held_out, screen, trial, refit, scores, p_value=p), refit, scores
+            return _law(search, base, held_out, trial, refit, scores, p_value=p), refit, scores
     return None
 
 
@@ -229,7 +229,6 @@ def _judged(
     search: Search,
     base: Fit,
     held_out: HeldOut,
-    screen: LinearisedFit,
     trial: Trial,
     refit: Fit,
     looked: int,
@@ -261,7 +260,7 @@ def _judged(
             runs = [tuple(column[at] for column in columns) for at in counting if len(at)]
             if tells_runs_apart_alone(trial, looked, runs):
                 return None
-    law = _law(search, base, held_out, screen, trial, refit, scores, p_value=p_value(trial, looked))
+    law = _law(search, base, held_out, trial, refit, scores, p_value=p_value(trial, looked))
     return law, refit, scores
 
 
@@ -269,7 +268,6 @@ def _law(
     search: Search,
     base: Fit,
     held_out: HeldOut,
-    screen: LinearisedFit,
     trial: Trial,
     refit: Fit,
     scores: HeldOut,
@@ -295,7 +293,6 @@ def _law(
         held_out_gain=None if event else scores.total - held_out.total,
         share=_taken(problem, *errors),
         confounded=tuple(moved),
-        resembles=resembling(problem, screen, search.scored, refit, applied),
     )
 
 

@@ -8,6 +8,7 @@ may be an effect counted from another zero. Whether the effect stands was asked 
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ import numpy as np
 
 from toolkit.diagnosis.policy import LAWS
 from toolkit.diagnosis.search.forward_step import joint_fit
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -25,8 +27,23 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem, Stacked
+    from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.screen import LinearisedFit, Scored
+    from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
+
+
+def with_resemblances(search: Search, laws: Laws, budget: TimeBudget) -> Laws:
+    """Return the laws of an answer with the known effects that each is like; once, when all are known."""
+    listed = list(laws.listed)
+    active = {applied.key for applied in laws.fit.active}
+    with contextlib.suppress(BudgetSpentError):
+        for at, law in enumerate(listed):
+            if law.applied.key in active:
+                budget.check(f"known effects that law {at + 1} is like")
+                near = resembling(search.problem, search.screen, search.scored, laws.fit, law.applied)
+                listed[at] = replace(law, resembles=near)
+    return replace(laws, listed=tuple(listed))
 
 
 def resembling(
