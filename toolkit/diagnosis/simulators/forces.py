@@ -189,7 +189,7 @@ class ForcesTogether:
 
     def __init__(self, sets: Sequence[Forces], own: int, runs: Sequence[Conditioned] = ()) -> None:
         """Take the forces of every set, and the runs in which they act or not; without runs they do."""
-        self.own, self.added, self._sets = own, max(forces.added for forces in sets), len(sets)
+        self.own, self.added = own, max(forces.added for forces in sets)
         groups: dict[object, list[tuple[int, Force]]] = {}
         for k, forces in enumerate(sets):
             for force in forces.listed:
