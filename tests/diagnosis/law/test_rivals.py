@@ -101,7 +101,10 @@ def outdone_name(tmp_path_factory: pytest.TempPathFactory) -> tuple[Search, Laws
     trial = next(
         trial
         for trial in trials_of(problem, refitted, ["gain"])
-        if trial.acts == "multiplies" and "[R]" in trial.signals[0].written and "exp" in trial.shape.text
+        if trial.acts == "multiplies"
+        and "[R]" in trial.signals[0].written
+        and trial.shape.text == "a*exp({x}/d)"
+        and trial.applied.values["d"] < 0  # fading: one minimum, no ridge that each processor climbs its way
     )
     whole = joint_fit(problem, made, (trial.applied,))
     assert whole is not None
