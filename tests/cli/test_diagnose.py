@@ -78,6 +78,7 @@ def test_what_was_left_out_is_named_shown_and_predicted(run, tmp_path):
     assert away["augmented"] < 3 < away["refitted"]
 
 
+@pytest.mark.campaign("two whole diagnoses: frozen answers come again bit by bit in every run (tests/golden)")
 def test_an_answer_repeats_but_for_its_timing(run, tmp_path):
     case = write_case(tmp_path, HEAD + TWO + PREDICT, more__csv=carriage(seed=7, rows=20))
     texts = []

@@ -65,6 +65,7 @@ def test_the_same_tire_without_the_drum_misses_nothing(tmp_path):
     assert found.effects == ()
 
 
+@pytest.mark.campaign("the slowest of the riddles: another one of the same tire is answered in every run")
 def test_sandpaper_against_steel(tmp_path):
     found = answer(tmp_path, read_plan(RIDDLES / "surfaces.toml"))
     effect, parameters = told(found)

@@ -130,6 +130,7 @@ def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path):
     assert json.loads(settled.output)["verdict"] == "nothing"
 
 
+@pytest.mark.campaign("another form of law: a factor over a covariate and an event are learned in every run")
 def test_a_product_of_two_signals_is_learned(learned):
     answer = learned(lambda r, _: r.F + 12 * r.x * r.v)
     (law,) = answer["laws"]
@@ -141,6 +142,7 @@ def test_a_product_of_two_signals_is_learned(learned):
     assert value == pytest.approx(12, rel=0.02)
 
 
+@pytest.mark.campaign("another form of law: a factor over a covariate and an event are learned in every run")
 def test_a_vibration_that_the_force_drives_is_learned(learned):
     from scipy.signal import lsim
 
@@ -171,6 +173,7 @@ def test_an_event_of_one_run_is_told_and_predicts_nothing(learned):
     assert "from 12" in answer["depends_on"][0]["variables"][0]
 
 
+@pytest.mark.campaign("another form of law: the fit of a tone is held in every run (test_trial_unlocked_tone)")
 def test_a_tone_without_a_phase_of_its_own_predicts_nothing(learned):
     answer = learned(lambda r, i: r.F + 6 * np.sin(2 * np.pi * 3.3 * r.t + 1.7 * i))
     law = answer["laws"][0]

@@ -40,6 +40,7 @@ def lagging(seed):
     return pd.DataFrame({"t": t, "U": u, "Y": shown}), np.abs(x).max()
 
 
+@pytest.mark.campaign("an equation that stops by itself: a candidate that cannot run goes alone in every run")
 def test_an_equation_that_stops_within_the_reach_of_a_rival_is_diagnosed(tmp_path):
     # The channel shows too much; a force that would explain it drives the equation past its stop.
     made = [lagging(seed) for seed in range(2)]

@@ -61,6 +61,7 @@ def test_an_input_in_another_unit_is_named_with_both_units(tmp_path, columns, ch
     assert told in names[0].statement
 
 
+@pytest.mark.campaign("an equation in place of a function: the inputs of a function are asked in every run")
 def test_the_inputs_of_an_equation_are_asked_for_their_units(tmp_path):
     rng = np.random.default_rng(3)
     t = np.arange(120) * 0.05
