@@ -19,6 +19,7 @@ from hypothesis import settings
 from tests.declared_answers import hold_to_declarations
 from tests.kept_office import kept_office
 from tests.remembered_fits import remember_fits
+from tests.remembered_work import remembered_work
 from toolkit.audit import workers
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
@@ -68,7 +69,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 @pytest.fixture(scope="session", autouse=True)
 def _office() -> Iterator[None]:
-    with kept_office():
+    with kept_office(), remembered_work():
         yield
 
 

@@ -74,7 +74,9 @@ def test_results_replace_the_old_ones_and_nothing_else(tmp_path: Path, kind: str
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-AMONG = pytest.mark.campaign("beside other files, the most calls: a fresh and an exchanged folder are killed in every run")
+AMONG = pytest.mark.campaign(
+    "beside other files, the most calls: a fresh and an exchanged folder are killed in every run"
+)
 
 
 @pytest.mark.parametrize(

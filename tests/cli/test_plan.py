@@ -213,7 +213,9 @@ def test_a_limit_below_what_was_recorded_is_kept_and_the_repeat_is_still_that_of
     assert json.loads(planned.stdout)["power_of_repeat"] == pytest.approx(free["power_of_repeat"], abs=0.2)
 
 
-@pytest.mark.campaign("a second limit: the range that is stated is kept in every run, and rates by tests/planning/test_drives.py")
+@pytest.mark.campaign(
+    "a second limit: the range that is stated is kept in every run, and rates by tests/planning/test_drives.py"
+)
 def test_a_rate_that_is_stated_is_kept(run, diagnosed, tmp_path):
     planned = run("plan", "next", diagnosed, "--rate", "u=1.5", "--limit", "u=-4..4", "--out", "n", "--json")
     assert planned.return_value == 0, planned

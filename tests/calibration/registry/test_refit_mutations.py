@@ -81,7 +81,9 @@ def test_every_mutated_coefficient_of_the_projects_records_is_refused(tmp_path: 
     assert refuse_all(registry, registry.load(record_id)) > 0
 
 
-OTHER = pytest.mark.campaign("twice the coefficients: those of weights, and of every record, are mutated in every run")
+OTHER = pytest.mark.campaign(
+    "twice the coefficients: those of weights, and of every record, are mutated in every run"
+)
 
 
 @pytest.mark.parametrize("model", [pytest.param("polynomial", marks=OTHER), "wls"])

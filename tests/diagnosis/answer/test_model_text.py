@@ -135,12 +135,12 @@ KINDS = {
 }
 
 
-EQUATION = pytest.mark.campaign("an equation, the slowest kind: the other kinds go back into use in every run")
-
-
-@pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[EQUATION] * (kind == "ode")) for kind in KINDS]
+EQUATION = pytest.mark.campaign(
+    "an equation, the slowest kind: the other kinds go back into use in every run"
 )
+
+
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[EQUATION] * (kind == "ode")) for kind in KINDS])
 def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(answered, kind):
     name = KINDS[kind][1]
     case, found, path = answered(kind)

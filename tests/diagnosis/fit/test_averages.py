@@ -170,7 +170,9 @@ def test_rows_without_a_clock_are_never_averaged(tmp_path: Path) -> None:
     assert rows_of(case_of(tmp_path / "uneven", *uneven)) == 1
 
 
-SMOOTHED = pytest.mark.campaign("a gear that shifts all the time, which is smoothed first: once holds in every run")
+SMOOTHED = pytest.mark.campaign(
+    "a gear that shifts all the time, which is smoothed first: once holds in every run"
+)
 
 
 @pytest.mark.parametrize("shifts", ["once", pytest.param("all the time", marks=SMOOTHED)])

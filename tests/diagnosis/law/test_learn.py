@@ -173,7 +173,9 @@ def test_an_event_of_one_run_is_told_and_predicts_nothing(learned):
     assert "from 12" in answer["depends_on"][0]["variables"][0]
 
 
-@pytest.mark.campaign("another form of law: the fit of a tone is held in every run (test_trial_unlocked_tone)")
+@pytest.mark.campaign(
+    "another form of law: the fit of a tone is held in every run (test_trial_unlocked_tone)"
+)
 def test_a_tone_without_a_phase_of_its_own_predicts_nothing(learned):
     answer = learned(lambda r, i: r.F + 6 * np.sin(2 * np.pi * 3.3 * r.t + 1.7 * i))
     law = answer["laws"][0]

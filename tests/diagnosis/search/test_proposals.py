@@ -145,7 +145,9 @@ def test_the_worker_answers_as_the_same_process_does(tmp_path: Path) -> None:
     assert sizes(here.scored[0])["k3"] == pytest.approx(K3, rel=0.1)
 
 
-@pytest.mark.campaign("a whole diagnosis: what is proposed to an equation, and a late channel, are held in every run")
+@pytest.mark.campaign(
+    "a whole diagnosis: what is proposed to an equation, and a late channel, are held in every run"
+)
 def test_an_output_that_is_read_late_is_not_told_as_forces(tmp_path: Path) -> None:
     """Led along late readings, an equation seems to lack forces; a delay alone explains them."""
     problem = driven(tmp_path, stiffness=12.0, late_s=0.15)

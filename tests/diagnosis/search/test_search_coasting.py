@@ -125,7 +125,9 @@ def test_what_the_form_of_a_drag_may_leave_is_dropped_beside_it(tmp_path: Path) 
     assert names(kept) == ["quadratic_drag"]
 
 
-@pytest.mark.campaign("three more fits of wheels that coast: what is dropped beside the drag is held in every run")
+@pytest.mark.campaign(
+    "three more fits of wheels that coast: what is dropped beside the drag is held in every run"
+)
 def test_an_effect_stays_where_the_likelihood_falls_without_it_whatever_the_curvature(tmp_path: Path) -> None:
     problem, _ = coasting(tmp_path, wave=0.05)
     made, unseen, _, steps = fitted(

@@ -195,7 +195,8 @@ def test_a_model_finds_its_own_curves_again_without_start_values(name):
 
 
 @pytest.mark.parametrize(
-    ("truth", "name"), [("treadsim", "brush"), ("brush", "tmeasy"), pytest.param("lugre", "treadsim", marks=LONG)]
+    ("truth", "name"),
+    [("treadsim", "brush"), ("brush", "tmeasy"), pytest.param("lugre", "treadsim", marks=LONG)],
 )
 def test_a_model_comes_near_the_curves_of_another(truth, name):
     fitted = fit_global(find(name), table(truth), predict=False)
@@ -219,7 +220,8 @@ def test_a_published_passenger_tire_is_described(name):
 
 @pytest.mark.skipif(not SHARED_DATA.is_dir(), reason="no shared data")
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=LONG) if name in ("treadsim", "tmeasy", "lugre") else name for name in NAMES]
+    "name",
+    [pytest.param(name, marks=LONG) if name in ("treadsim", "tmeasy", "lugre") else name for name in NAMES],
 )
 def test_a_real_cornering_run_is_described(name):
     d = np.genfromtxt(SHARED_DATA / "ttc_cornering" / "cornering_IA0_P83kPa.csv", delimiter=",", names=True)
