@@ -1,4 +1,4 @@
-"""What commands have worked out before: tests ask for the same test, its tire file and its figures again and again.
+"""What commands have worked out before: tests ask for the same test, its tire file and figures again.
 
 Only commands get what is remembered, for they look their helpers up when they run: a test of a helper itself
 has imported it before, and asks it anew.
@@ -39,7 +39,7 @@ def remembered_work() -> Iterator[None]:
 
 
 def _remembered(ask: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that answers the same question by a copy of its first answer; a refusal is made anew."""
+    """Return a function that answers the same question by a copy of its first answer."""
     answers: dict[bytes, bytes] = {}
 
     def asked(*given: Any, beside: object = None, **named: Any) -> Any:
@@ -52,7 +52,7 @@ def _remembered(ask: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _Here:
-    """A drawer without a worker, which would import matplotlib anew for every report: `test_drawer.py` has it."""
+    """A drawer without a worker, which imports matplotlib for every report: `test_drawer.py` has it."""
 
     def __enter__(self) -> _Here:
         return self

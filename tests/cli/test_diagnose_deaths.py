@@ -218,6 +218,9 @@ def test_a_call_in_compiled_code_ends_with_the_budget(tmp_path, answered):
     assert json.loads(ended.stdout)["complete"] is False
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis first: the same worker runs a case's code, whose deaths are told in every run"
+)
 def test_a_model_file_runs_its_code_apart_as_well(tmp_path, answered):
     case = write_case(tmp_path, simulator=SIMULATOR)
     assert answered("diagnose", case, "--out", tmp_path / "answer").returncode == 1

@@ -214,7 +214,7 @@ def test_a_limit_below_what_was_recorded_is_kept_and_the_repeat_is_still_that_of
 
 
 @pytest.mark.campaign(
-    "a second limit: the range that is stated is kept in every run, and rates by tests/planning/test_drives.py"
+    "a second limit: a range that is stated is kept in every run, and rates in tests/planning/test_drives.py"
 )
 def test_a_rate_that_is_stated_is_kept(run, diagnosed, tmp_path):
     planned = run("plan", "next", diagnosed, "--rate", "u=1.5", "--limit", "u=-4..4", "--out", "n", "--json")
@@ -294,7 +294,7 @@ def in_time(monkeypatch, sought):
 
 
 def test_sweeps_of_a_relaxation_length_are_simulated_and_processed(run, in_time, tmp_path):
-    planned = run("plan", "test", *SWEPT, "--u", "slope_cornering=4 %", "--out", "p", "--json")
+    planned = run("plan", "test", *SWEPT, "--out", "p", "--json")
     assert planned.return_value == 0, planned
     answer = json.loads(planned.stdout)
     sweeps = answer["sweeps"]

@@ -11,6 +11,7 @@ import pytest
 from tests.characteristics.tire_factory import C_FY, M15, at_load
 from tests.planning.planning_factory import LOADS, earlier
 from toolkit.errors import ConfigError
+from toolkit.planning import protocol_search
 from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import Design, Pace, standard
 from toolkit.planning.protocol_search import (
@@ -120,6 +121,7 @@ def test_a_demand_at_a_slip_angle_that_no_test_measures_is_refused() -> None:
     assert ", 5, " in str(error.value.expected)
 
 
+@pytest.mark.usefixtures("few_starts")
 def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
     asked = question("slope_cornering=4 %", loads=LOADS[2:3], measured=NEAR)
     free = least_plan(asked, tread(measured=NEAR))
@@ -133,6 +135,13 @@ def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
     assert impossible.excess > 0
 
 
+@pytest.fixture
+def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits are kept wherever the exchange starts: of more starts a plan is a little shorter at most."""
+    monkeypatch.setattr(protocol_search, "_STARTS", 2)
+
+
+@pytest.mark.usefixtures("few_starts")
 def test_a_limit_of_warmth_costs_pauses_and_they_count_in_the_time() -> None:
     asked = question("slope_cornering=3 %", loads=LOADS[2:3], measured=NEAR)
     free = least_plan(asked, tread(measured=NEAR))

@@ -123,7 +123,7 @@ def plates(folder, noise, *, exchange):
 
 
 @pytest.mark.campaign(
-    "two laws of two states, the longest search of all: unseen runs choose the law in every run (test_unseen_runs)"
+    "two laws of two states, the longest search: unseen runs choose a law in every run (test_unseen_runs)"
 )
 def test_a_law_that_foretells_unseen_runs_is_learned_before_nothing_is_said(tmp_path):
     case = plates(tmp_path, lambda rng, T: rng.normal(0, 0.08, len(T)), exchange=0.06)

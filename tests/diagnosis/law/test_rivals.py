@@ -105,7 +105,8 @@ def outdone_name(tmp_path_factory: pytest.TempPathFactory) -> tuple[Search, Laws
         if trial.acts == "multiplies"
         and "[R]" in trial.signals[0].written
         and trial.shape.text == "a*exp({x}/d)"
-        and trial.applied.values["d"] < 0  # fading: one minimum, no ridge that each processor climbs its way
+        and dict(trial.applied.values)["d"]
+        < 0  # fading: one minimum, no ridge that each processor climbs its way
     )
     whole = joint_fit(problem, made, (trial.applied,))
     assert whole is not None

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
