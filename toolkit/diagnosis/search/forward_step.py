@@ -158,16 +158,17 @@ def best_step(
             standing[0][0].fit.log_posterior - base.log_posterior
         ):
             continue
-        if drifts_faster(problem, base, made):
+        # What its own fit tells comes first: unseen rows take a fit for each fold.
+        if trial.score - base.log_posterior < STEP.least_gain or drifts_faster(problem, base, made):
+            continue
+        if only_bends(problem, made):
             continue
         try:
             scores = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
         gain = scores.total - held_base.total
-        if gain < STEP.least_gain or trial.score - base.log_posterior < STEP.least_gain:
-            continue
-        if only_bends(problem, made) or not matters(problem, held_base, scores, least):
+        if gain < STEP.least_gain or not matters(problem, held_base, scores, least):
             continue
         if not beyond_form(problem, refitted, held_base, scores, form):
             continue

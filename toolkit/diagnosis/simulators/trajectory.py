@@ -35,6 +35,7 @@ _STALLED = 3  # corrections that are no smaller than the last: no way leads on
 _FAR = 0.5  # of a state's spread, by which one correction moves it: beyond, the derivatives are others
 _STEP = 1e-6  # of a state's size, for differences
 _REFINED = 8
+_MISSED = 3  # times in turn: terms that are not smooth enough
 _MARCHED = 8  # columns: fewer are integrated in less time one by one, by plain numbers
 
 
@@ -45,6 +46,30 @@ class Path:
     x: Array
     steps: Places
     slopes: Array | None
+
+
+class Guesses:
+    """Of which terms in an equation a guess leads to a simulation, so that others are seldom tried.
+
+    One term with a corner says nothing of another, nor parameters far off of those near by: after three
+    misses in turn of the same terms a guess waits, for twice as many simulations after every further one.
+    """
+
+    def __init__(self) -> None:
+        self._missed: dict[object, int] = {}
+        self._waiting: dict[object, int] = {}
+
+    def are_tried(self, terms: tuple[object, ...]) -> bool:
+        """Tell whether the next simulation with such terms is to begin from a guess."""
+        waiting = self._waiting.get(terms, 0)
+        self._waiting[terms] = max(waiting - 1, 0)
+        return not waiting
+
+    def led(self, terms: tuple[object, ...], *, on: bool) -> None:
+        """Learn whether a guess has led to a simulation; what the bare equation missed, all terms have."""
+        missed = 0 if on else self._missed.get(terms, self._missed.get((), 0)) + 1
+        self._missed[terms] = missed
+        self._waiting[terms] = 2**missed if missed >= _MISSED else 0
 
 
 def trajectories(
