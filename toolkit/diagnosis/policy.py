@@ -149,14 +149,10 @@ class _Averages:
         "more rows in a mean would only blur what is looked for",
     )
     beside_recorded: float = _set(
-        0.25,
-        "of the recorded power",
-        "of the quickest octave kept: more noise is worth a low-pass of its own",
+        0.25, "of the recorded power", "of the quickest octave kept: more noise is worth its own low-pass"
     )
     beside_shared: float = _set(
-        0.5,
-        "of the power in common",
-        "or as little: a recording that a lag has made weak is followed even so",
+        0.5, "of the power in common", "or as little: what a lag has made weak is followed even so"
     )
     fewest: int = _set(32, "means of all runs", "as many must be left to judge by")
     window: int = _set(256, "rows", "of a window of the spectra: five octaves and more")
@@ -207,6 +203,11 @@ class _Scatter:
     fewest: int = _set(2, "runs held out", "one alone has no scatter that could be told from a mismatch")
     least: float = _set(0.3, "sd of what a run shows of its own zero", "a smaller scatter changes no score")
     intervals: int = _set(3, "runs", "whose zeros and gains enter values and intervals; two tell no scatter")
+    loudness: tuple[float, ...] = _set(
+        tuple(2.0**k for k in range(12)),
+        "degrees of freedom",
+        "of how loud runs are: from twice to 2 % apart",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
