@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.characteristics.characterise import rows_of
 from toolkit.characteristics.characteristic import Characteristic
@@ -33,14 +34,13 @@ from toolkit.simulation.tire import TireTruth, revolution_time_s
 from toolkit.tires.evaluate import estimate_at, slope_estimate_at, value_at
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.pipeline import TestResult
     from toolkit.tires.model import CurveFit
 
-    Array = NDArray[np.float64]
 
 _NEAR_ZERO_RAD = float(np.radians(2.5))
 

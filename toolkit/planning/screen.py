@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS
 from toolkit.characteristics.catalogue import by_name
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction, DirectionFit
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from toolkit.planning.reach import Reach
     from toolkit.tires.model import CurveFit
 
-    Array = NDArray[np.float64]
 
 _OWN = ("repeatability", "fit", "slip angle scatter")  # of the budget, what follows the design
 _STEP = 1e-4  # of a parameter's size

@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from toolkit.errors import RenderError, ToolkitError
 from toolkit.files import sha256_bytes, sha256_file
@@ -24,6 +24,8 @@ from toolkit.inputs import PDF_FILE, read_input
 from toolkit.publication import publication
 from toolkit.recording.marks import GENERATOR, refuse_original
 from toolkit.report.content import Plot, ReportContent
+from toolkit.report.drawer import Drawer
+from toolkit.report.figures import Picture
 from toolkit.report.word.chart import with_alternatives
 from toolkit.report.word.fill import Survey, fill, survey
 from toolkit.report.word.filled import Filled
@@ -31,10 +33,6 @@ from toolkit.report.word.office import Office
 from toolkit.report.word.package import Template
 from toolkit.report.word.toc_pages import Printed, print_copies
 from toolkit.report.word.verify import Check, verify_docx, verify_pdf
-
-if TYPE_CHECKING:
-    from toolkit.report.drawer import Drawer
-    from toolkit.report.figures import Picture
 
 Step = Callable[[str], None]
 Writer = Callable[[Path], object]
