@@ -142,6 +142,7 @@ def test_no_number_of_a_search_that_did_not_run_is_made_up(run, tmp_path):
     assert made["fit"]["held_out"][0]["noise_floor"] is None
 
 
+@pytest.mark.campaign("a second effect: the answer of one is held key by key in every run")
 def test_an_effect_of_some_runs_names_them(run, tmp_path):
     dated = TWO.replace('"r0.csv"\n', '"r0.csv"\ndate = "2026-03-01"\n') + 'date = "2026-03-02"\n'
     files = {f"r{i}__csv": carriage(seed=i, coulomb=0.0) for i in range(2)}

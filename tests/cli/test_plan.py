@@ -157,6 +157,7 @@ def test_the_sheet_of_the_next_run_draws_what_each_member_predicts(run, diagnose
     assert (tmp_path / "n" / "plan.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.campaign("the text beside the answer, whose numbers and files are held in every run")
 def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
     shown = run("plan", "next", diagnosed)
     assert shown.return_value == 0, shown
@@ -224,6 +225,9 @@ def test_a_rate_that_is_stated_is_kept(run, diagnosed, tmp_path):
     assert max(abs(b - a) for a, b in itertools.pairwise(u)) <= 1.5 * (t[1] - t[0]) * (1 + 1e-6)
 
 
+@pytest.mark.campaign(
+    "a second search to the nearest limit: a test that cannot be had names the nearest in every run"
+)
 def test_limits_that_no_run_keeps_name_the_nearest_that_one_does(run, diagnosed, tmp_path):
     failed = run("plan", "next", diagnosed, "--limit", "u=5..6", "--out", "n")
     error = failed.exception

@@ -67,6 +67,7 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
         assert screened == pytest.approx(found.worst, rel=0.05)
 
 
+@pytest.mark.campaign("four searches of one size each: the whole search is held in every run")
 def test_more_slip_angles_are_never_worse() -> None:
     asked = question("conicity", loads=LOADS[2:3], measured=NEAR)
     search = ProtocolSearch(asked, tread(measured=NEAR), LOADS[2:3])
@@ -79,6 +80,7 @@ def test_a_demand_of_one_direction_needs_no_reversed_run() -> None:
     assert found.design.rotations == ("forward",)
 
 
+@pytest.mark.campaign("one more plan: what a curve asks of its slip angles is held in every run")
 def test_every_plan_measures_a_curve_to_its_peak_on_both_sides() -> None:
     asked = question("conicity", loads=LOADS[2:3], measured=NEAR)
     degrees = np.degrees(least_plan(asked, tread(measured=NEAR)).design.slip_angles_rad)

@@ -117,6 +117,7 @@ def test_a_case_is_drawn_the_same_again_and_tells_nothing(
 LONG = pytest.mark.campaign("families of stiffer or longer runs: one stands for them in every run")
 
 
+@pytest.mark.campaign("long runs of stirred families: nulls of the others are drawn in every run")
 @pytest.mark.parametrize(
     "family",
     [name if name == "tank" else pytest.param(name, marks=LONG) for name in draw.STIRRED],

@@ -55,7 +55,9 @@ LONG = pytest.mark.campaign("families of stiff or long runs: the others stand fo
     ("family", "seed"),
     [
         pytest.param(
-            family, seed, marks=[AGAIN] * (seed > 0) + [LONG] * (family in ("pendulum", "drive", "thermal"))
+            family,
+            seed,
+            marks=[AGAIN] * (seed > 0) + [LONG] * (family in ("pendulum", "drive", "thermal", "tire-python")),
         )
         for family, seed in DRAWS
     ],

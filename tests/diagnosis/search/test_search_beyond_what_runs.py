@@ -71,6 +71,7 @@ def names(folder, **files):
     return [one.name for one in diagnose(case, None).diagnosis.effects]
 
 
+@pytest.mark.campaign("a second whole search: an effect without which nothing runs is kept in every run")
 def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, monkeypatch):
     # Dry friction is there; without it the next best is a friction of another kind, or nothing.
     whole, asked = search.hold_out, []

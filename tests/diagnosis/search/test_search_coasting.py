@@ -73,6 +73,7 @@ def coasting(folder: Path, wave: float = 0.0) -> tuple[Problem, float]:
     return problem_of(case, model_of(case, None, None)), max(ways)
 
 
+@pytest.mark.campaign("proposals to wheels that coast: proposals to a driven body are held in every run")
 def test_what_rolls_out_is_periodic_by_the_way_that_it_rolled_and_not_by_the_simulations(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

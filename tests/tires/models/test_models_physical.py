@@ -181,7 +181,7 @@ def test_every_parameter_acts(name):
         assert change > 1e-6 * F0, one.name
 
 
-@ALL
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[LONG] * (name == "lugre")) for name in NAMES])
 def test_a_model_finds_its_own_curves_again_without_start_values(name):
     fitted = fit_global(find(name), table(name, OFFSETS), predict=False)
     for channel in ("FY", "MZ"):
