@@ -42,6 +42,10 @@ def driven(t, x, u, p):
     return u["u"][None] * p["k"]
 
 
+def shaken(t, x, u, p):
+    return (p["k"] * np.cos(p["k"] * t))[None]
+
+
 def explosive(t, x, u, p):
     return p["k"] * x * x
 
@@ -101,6 +105,14 @@ def test_a_set_that_runs_off_is_said_and_the_others_are_as_alone():
         path, reached = solved(flow, np.ones((1, 2, 1)))
     assert reached.tolist() == [True, False]
     np.testing.assert_allclose(path.x[0, 0], 1 / (1 - 0.05 * T), rtol=1e-5)
+
+
+def test_a_set_that_asks_for_too_short_steps_is_not_waited_for():
+    # x' = k cos(k t) from 0: sin(k t), eighty turns of it from row to row
+    flow = flow_of(shaken, [run_of(T)], {"k": np.array([1.0, 1e4])}, states=1)
+    path, reached = solved(flow, np.zeros((1, 2, 1)))
+    assert reached.tolist() == [True, False]
+    np.testing.assert_allclose(path.x[0, 0], np.sin(T), atol=1e-6)
 
 
 def test_marching_and_a_guess_lead_to_the_same_motion():

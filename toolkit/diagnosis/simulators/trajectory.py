@@ -90,13 +90,12 @@ def trajectories(
     rest = np.flatnonzero(smooth)
     for _ in range(_REFINED if len(rest) else 0):
         errors, slopes, solved = _converged(flow, x, rest, steps, slopes, sizes)
-        rest = rest[solved]
-        if not len(rest) or (errors <= 1).all():
+        wanted = finer(steps, errors)
+        able = solved & (wanted.max(axis=1) <= MOST_STEPS)  # the others are not waited for
+        rest = rest[able]
+        if not len(rest) or (errors[able] <= 1).all():
             break
-        steps = finer(steps, errors)
-        if steps.max() > MOST_STEPS:
-            rest = rest[:0]
-            break
+        steps = wanted[able].max(axis=0)
     reached = np.zeros(x.shape[1], dtype=bool)
     reached[rest] = True
     others = np.flatnonzero(~reached)
@@ -113,9 +112,9 @@ def _converged(
 
     Returns
     -------
-    errors of the intervals, derivatives of the flow, and which sets came to rest
+    errors of each set's intervals, (sets, rows - 1), derivatives of the flow, and which sets came to rest
     """
-    errors = np.zeros(len(steps))
+    errors = np.zeros((len(sets), len(steps)))
     active, slopes, kept = np.arange(len(sets)), near, near
     before, missed = np.full(len(sets), np.inf), np.full(len(sets), np.inf)
     stalled = np.zeros(len(sets), dtype=np.intp)
@@ -137,8 +136,7 @@ def _converged(
         share = _FAR / np.maximum((np.abs(moved) / sizes[:, None, None]).max(axis=(0, 2)), _FAR)
         x[:, at[usable], 1:] += (share[:, None] * moved)[:, usable]
         done = usable & (off < _CLOSE)
-        if done.any():
-            np.maximum(errors, shares[done].max(axis=0), out=errors)
+        errors[active[done]] = shares[done]
         solved[active[done]] = True
         fresh = slopes.shape[1] > 1 or len(active) == 1
         miss = np.sqrt(np.mean((off_rows / size) ** 2, axis=(0, 2)))
