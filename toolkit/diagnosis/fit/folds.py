@@ -276,8 +276,8 @@ def _scores(
     """Return the score of every run under a scatter, the noise as large as it then is most likely.
 
     The scatter is in units of that noise: then its likeliest size has a closed form. Where runs are not
-    equally loud, the square of each run's noise is drawn from a scaled inverse chi-squared distribution of some
-    degrees of ``freedom``, beside which a run's values are of Student's multivariate distribution.
+    equally loud, the square of each run's noise is drawn from a scaled inverse chi-squared distribution of
+    some degrees of ``freedom``, beside which a run's values are of Student's multivariate distribution.
     """
     scale = np.array([zero, gain])
     n, squares, halves = np.array([run.n for run in runs], dtype=float), [], []

@@ -285,7 +285,7 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
 
 
 def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | None:
-    """Return the finding that a residual is larger than the sensor noise that is stated, or that repeats show.
+    """Return the finding that a residual is larger than the noise that is stated, or that repeats show.
 
     Repeats show it and its colour, but for their zeros: beside them every run counts about its own.
     """
