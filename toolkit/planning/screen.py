@@ -162,7 +162,7 @@ def _gradients(
     declared = by_name()[characteristic]
     runs = declared.runs if declared.scope == "load" else (rotation,)
     design = Design(slip_angles_rad=slip_angles_rad, loads_N=(load_N,), rotations=ROTATIONS)
-    directions = {direction.group.rotation: direction for direction in earlier.directions(design)}
+    directions: dict[str, Direction] = {each.group.rotation: each for each in earlier.directions(design)}
     at = () if SA_rad is None else (SA_rad,)
     # Of the value alone: what the rows share is not asked for.
     shared = dataclasses.replace(earlier.shared, record=None)
