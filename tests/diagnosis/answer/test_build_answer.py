@@ -146,7 +146,9 @@ def test_a_size_of_either_sign_has_its_interval_on_both_sides(problem, value):
     """Only what the rows do not resolve reaches to none; a zero that moved down is no such size."""
     active = AppliedEffect(effect=effects()["zero_offset"], channel="F", values={"offset": value})
     search = SimpleNamespace(
-        problem=problem, augmented=SimpleNamespace(active=(active,), covariance=np.eye(3)), variance=lambda _: 0.01
+        problem=problem,
+        augmented=SimpleNamespace(active=(active,), covariance=np.eye(3)),
+        variance=lambda _: 0.01,
     )
     (estimate,) = _parameters(search, active, None)
     # Of 160 rows and three parameters: Student's 97.5 % quantile of 157 degrees is 1.975, and sd is 0.1.

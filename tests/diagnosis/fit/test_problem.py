@@ -42,7 +42,14 @@ def test_what_answers_a_sharp_move_is_no_outlier(noise):
 def readings_of(residuals, loads):
     """Loadings of a table without an order: each run has the same loads, (runs, loads)."""
     runs = tuple(
-        Run(name=f"r{k}", t=np.arange(len(loads)), columns={"p": loads}, conditions={}, declared={}, simulated={})
+        Run(
+            name=f"r{k}",
+            t=np.arange(len(loads)),
+            columns={"p": loads},
+            conditions={},
+            declared={},
+            simulated={},
+        )
         for k in range(len(residuals))
     )
     observed = np.concatenate(residuals)

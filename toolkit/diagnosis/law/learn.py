@@ -76,22 +76,18 @@ class Laws:
     complete: bool = True
 
 
-def learned(
-    search: Search, *, withdrawn: bool, budget: TimeBudget, shown: Sequence[str] = ()
-) -> Laws:
+def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
     """Return the laws of what a search left without a name.
 
     Parameters
     ----------
     withdrawn : the effects that were found are not told: laws begin beside the refitted simulation
-    shown : outputs that ask for a law whatever structure a test of the residual finds
     """
     base, held_out = (
         (search.refitted, search.held_refitted) if withdrawn else (search.augmented, search.held_augmented)
     )
     structure = search.structure_before if withdrawn and search.steps else search.structure
-    asking = {*shown, *_outputs(search.problem, base, structure)}
-    outputs = tuple(name for name in search.problem.names if name in asking)
+    outputs = _outputs(search.problem, base, structure)
     listed: list[Law] = []
     complete = not search.skipped
     try:

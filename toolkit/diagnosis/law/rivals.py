@@ -50,8 +50,7 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
         bare = before_nothing(_bare(search), seed=seed, budget=budget)
     except BudgetSpentError:
         return search, replace(laws, complete=False)
-    # What an effect took is there to be explained, though a smooth and short residual passes for noise.
-    alone = learned(bare, withdrawn=False, budget=budget, shown=_eased(search))
+    alone = learned(bare, withdrawn=False, budget=budget)
     if not any(law.predicts for law in alone.listed):
         return search, laws if alone.complete else replace(laws, complete=False)
     if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
@@ -169,16 +168,6 @@ def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> 
         for name in outputs
     ]
     return all(by_effects >= VERDICT.nearly * by_laws for by_effects, by_laws in taken)
-
-
-def _eased(search: Search) -> tuple[str, ...]:
-    """Return the outputs whose error on unseen rows the effects that were found make smaller."""
-    without, named = search.held_refitted, search.held_augmented
-    return tuple(
-        name
-        for name, kept in search.problem.kept.items()
-        if kept.any() and _error(search.problem, named, name) < _error(search.problem, without, name)
-    )
 
 
 def _parameters(fit: Fit) -> int:
