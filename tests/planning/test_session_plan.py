@@ -89,6 +89,9 @@ def test_the_same_seed_gives_the_same_plan(
     assert again.outlook == fewest.outlook
 
 
+@pytest.mark.campaign(
+    "one more search: an uncertainty that cannot be had names the nearest plan in every run"
+)
 @pytest.mark.usefixtures("few_runs")
 def test_less_uncertainty_takes_more_loads(
     knowledge: Knowledge, feasible: FeasibleLoads, fewest: SessionPlan
