@@ -77,6 +77,7 @@ def test_a_drift_that_takes_half_of_the_range_is_a_force(tmp_path):
     assert (effect.name, effect.equivalent_to) == ("constant_force", ("zero_drift",))
 
 
+@pytest.mark.campaign("a whole diagnosis of nothing: coloured noise of a tank is nothing in every run")
 def test_noise_that_wanders_gets_no_name(tmp_path):
     assert not diagnose(coasts(tmp_path, force=0.0), None).diagnosis.effects
 
