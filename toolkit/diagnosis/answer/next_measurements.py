@@ -13,6 +13,7 @@ from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.search.unexplained import LINE
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
 from toolkit.units import unit
@@ -137,7 +138,9 @@ def to_find_it(search: Search) -> list[str]:
     What can be varied, held or applied follows from the case: how many inputs it has, and of what kind.
     """
     case = search.problem.case
-    variables = dict.fromkeys(name for structure in search.structure for name in structure.variables)
+    variables = dict.fromkeys(
+        name for structure in search.structure if not structure.reason for name in structure.variables
+    )
     inputs = [channel.name for channel in case.drivers if channel.role == "input"]
     channels = {channel.name for channel in case.drivers}
     rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
@@ -156,9 +159,8 @@ def to_find_it(search: Search) -> list[str]:
         )
         if names:
             sentences.append(f"The mismatch depends on the size of {names}: {known}.")
-    lines = [
-        name.removeprefix("time (a line at ").removesuffix(")") for name in variables if "a line at" in name
-    ]
+    reasons = dict.fromkeys(structure.reason for structure in search.structure)
+    lines = [reason.removeprefix(LINE) for reason in reasons if reason.startswith(LINE)]
     if lines:
         sentences += _swinging(search.problem, lines)
     if "run" in variables:

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
 
 
-TOO_LARGE = ("more than its stated noise",)
-BEYOND_REPEATS = ("more than repeats of a run differ by",)
+TOO_LARGE = "more than its stated noise"
+BEYOND_REPEATS = "more than repeats of a run differ by"
+LINE = "a line at "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,9 +205,11 @@ def _event(problem: Problem, screen: LinearisedFit, base: Fit, name: str) -> Str
             continue
         gain, _, trust = screen.gain({each: column if each == name else none for each in problem.names})
         log_p = float(chi2.logsf(max(gain * trust, 0.0), 1)) + math.log(event.looked * len(events))
-        text = f"time (an event in {event.run} from {event.start:.4g} to {event.end:.4g} s)"
+        text = f"an event in {event.run} from {event.start:.4g} to {event.end:.4g} s"
         p = math.exp(min(max(log_p, -690.0), 0.0))
-        listed.append(StructureFound(output=name, variables=(text,), gain=gain, p_value=p, rest=True))
+        listed.append(
+            StructureFound(output=name, variables=("time",), reason=text, gain=gain, p_value=p, rest=True)
+        )
     best = min(listed, key=lambda found: found.p_value, default=None)
     return best if best is not None and best.p_value < STRUCTURE.alpha else None
 
@@ -218,7 +221,8 @@ class StructureFound:
     A ``rest`` is only larger than noise may be, or differs from run to run: it follows nothing that an effect
     could imitate, and no effect beside it is withdrawn because of it. ``columns`` are the parameters of a
     smooth dependence; a line and a rest have none. ``noise_sd`` is what the output's noise is known to be
-    where the structure shows that it is not the residual; None where it shows nothing of it.
+    where the structure shows that it is not the residual; None where it shows nothing of it. ``reason`` says
+    which line or event of its variable it is, or why it counts where no variable foretells it; else empty.
     """
 
     output: str
@@ -228,16 +232,17 @@ class StructureFound:
     rest: bool = False
     columns: int = 0
     noise_sd: float | None = None
+    reason: str = ""
 
     @property
     def is_lawful(self) -> bool:
         """Tell whether a law may answer it: an event has one, what only differs from run to run has none."""
-        return not self.rest or self.variables[0].startswith("time (")
+        return not self.rest or "time" in self.variables
 
     @property
     def is_too_large(self) -> bool:
         """Tell whether it is all that is known that the residual is larger than a noise that is known."""
-        return self.variables in (TOO_LARGE, BEYOND_REPEATS)
+        return self.reason in (TOO_LARGE, BEYOND_REPEATS)
 
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -272,9 +277,9 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
         line = strongest_line(problem, name, base.residual[name])
         if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            line_text = f"time (a line at {line.frequency:.4g} Hz)"
+            text = f"{LINE}{line.frequency:.4g} Hz"
             findings.append(
-                StructureFound(output=name, variables=(line_text,), gain=gain, p_value=line.p_value)
+                StructureFound(output=name, variables=("time",), reason=text, gain=gain, p_value=line.p_value)
             )
         event = _event(problem, screen, base, name)
         findings += [] if event is None else [event]
@@ -314,7 +319,7 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
     reason = BEYOND_REPEATS if stated is None else TOO_LARGE
-    return StructureFound(output=name, variables=reason, gain=gain, p_value=p, rest=True)
+    return StructureFound(output=name, variables=(), reason=reason, gain=gain, p_value=p, rest=True)
 
 
 def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:
