@@ -29,6 +29,7 @@ from toolkit.diagnosis.search.time_budget import TimeBudget
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 
+@pytest.mark.campaign("a whole diagnosis: which name stands beside a law is asked of a divider in every run")
 def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(tmp_path: Path) -> None:
     """A pull in proportion to the load stands beside a late force: crosstalk is thought of before the lag.
 
@@ -105,7 +106,8 @@ def outdone_name(tmp_path_factory: pytest.TempPathFactory) -> tuple[Search, Laws
         if trial.acts == "multiplies"
         and "[R]" in trial.signals[0].written
         and trial.shape.text == "a*exp({x}/d)"
-        and trial.applied.values["d"] < 0  # fading: one minimum, no ridge that each processor climbs its way
+        and dict(trial.applied.values)["d"]
+        < 0  # fading: one minimum, no ridge that each processor climbs its way
     )
     whole = joint_fit(problem, made, (trial.applied,))
     assert whole is not None

@@ -86,6 +86,11 @@ def test_a_rest_above_a_tenth_of_the_spread_is_never_nothing(tmp_path):
     case = case_of(tmp_path, lambda _, rng: coloured(0.98, 2.5, rng))
     (found,) = hidden(case)
     assert (found.variables, found.reason, found.rest) == ((), LARGE, True)
+
+
+@pytest.mark.campaign("a whole diagnosis: that such a rest is told is held in every run")
+def test_the_noise_of_a_large_rest_has_its_size(tmp_path):
+    case = case_of(tmp_path, lambda _, rng: coloured(0.98, 2.5, rng))
     answer = diagnose(case, None).diagnosis
     assert (answer.verdict, answer.remaining, answer.effects) == ("unknown", "unknown", ())
     noise = answer.fit.held_out[0].noise
