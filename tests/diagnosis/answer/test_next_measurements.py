@@ -100,6 +100,11 @@ def test_a_line_in_step_with_a_recorded_angle_is_told_by_its_number_per_turn(spe
     assert told in said
 
 
+def test_a_line_of_an_angle_is_told_by_its_number_per_turn():
+    (said,) = to_find_it(found("angle", inputs=("angle", "load"), reason="a line at 24 per turn"))
+    assert said.startswith("The mismatch swings 24 times per turn of angle: repeat the run at another speed")
+
+
 def test_the_variable_that_a_mismatch_depends_on_stands_before_a_narrower_range():
     # What happens once, while the motion is fastest: a range of v holds it as narrowly as one of time does.
     t = np.linspace(0, 10, 400)

@@ -159,8 +159,17 @@ def to_find_it(search: Search) -> list[str]:
         )
         if names:
             sentences.append(f"The mismatch depends on the size of {names}: {known}.")
-    reasons = dict.fromkeys(structure.reason for structure in search.structure)
-    lines = [reason.removeprefix(LINE) for reason in reasons if reason.startswith(LINE)]
+    found = dict.fromkeys(
+        (structure.variables[0], structure.reason.removeprefix(LINE))
+        for structure in search.structure
+        if structure.reason.startswith(LINE)
+    )
+    sentences += [
+        f"The mismatch swings {line.replace(' per', ' times per')} of {name}: {_AT_ANOTHER_SPEED}"
+        for name, line in found
+        if name != "time"
+    ]
+    lines = [line for name, line in found if name == "time"]
     if lines:
         sentences += _swinging(search.problem, lines)
     if "run" in variables:
@@ -192,6 +201,12 @@ def _is_load(text: str) -> bool:
     return unit(text).dimension in _OF_LOADS
 
 
+_AT_ANOTHER_SPEED = (
+    "repeat the run at another speed; what is of the shaft keeps its number per turn, what is of time its "
+    "frequency."
+)
+
+
 def _swinging(problem: Problem, lines: Sequence[str]) -> list[str]:
     """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
     sentences, unturned = [], []
@@ -202,8 +217,7 @@ def _swinging(problem: Problem, lines: Sequence[str]) -> list[str]:
             continue
         name, cycles = order
         sentences.append(
-            f"The mismatch swings at {line}, {cycles:.3g} times per turn of {name}: repeat the run at "
-            "another speed; what is of the shaft keeps its number per turn, what is of time its frequency."
+            f"The mismatch swings at {line}, {cycles:.3g} times per turn of {name}: {_AT_ANOTHER_SPEED}"
         )
     if unturned:
         listed = " and ".join(unturned)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,9 +17,12 @@ from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.screen_step import search_p_values
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import CaseChannel
 
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
 
@@ -32,35 +36,87 @@ LINE = "a line at "
 class Line:
     """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance.
 
-    ``width`` is what the shortest run leaves open of its frequency [1/s].
+    ``width`` is what the shortest run leaves open of its frequency [1/s]. One over the ``angle`` of that
+    channel has both per turn.
     """
 
     frequency: float
     p_value: float
     share: float
     width: float
+    angle: str = ""
+
+    @property
+    def told(self) -> str:
+        """Return the frequency with its unit."""
+        return f"{self.frequency:.4g} {'per turn' if self.angle else 'Hz'}"
 
 
-def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
-    """Return the strongest line of an output's residual, None where no run is long and even enough."""
+def narrowest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
+    """Return the strongest line of an output's residual, over a recorded angle unless time's is narrower.
+
+    What is of a shaft keeps its number per turn while the speed changes, and smears over time. As much in
+    the three frequencies of a line is as narrow; at one steady speed both are, and the angle comes first.
+    """
+    best = strongest_line(problem, name, residual)
+    for channel in problem.case.drivers:
+        turns = turns_of(problem, channel)
+        over = None if turns is None else strongest_line(problem, name, residual, over=turns)
+        if over is not None and (best is None or over.share > (1 - STRUCTURE.line_share) * best.share):
+            best = replace(over, angle=channel.name)
+    return best
+
+
+def turns_of(problem: Problem, channel: CaseChannel) -> list[NDArray[np.float64]] | None:
+    """Return the turns of a recorded angle in every run, (n_run,); None where it does not turn in one way."""
+    if unit(channel.unit).dimension != "angle":
+        return None
+    turns = []
+    for run in problem.runs:
+        course = np.unwrap(run.columns[channel.name] * unit(channel.unit).factor) / (2 * np.pi)
+        course = course if course[-1] > course[0] else -course
+        if not (course[-1] - course[0] >= 1 and (np.diff(course) > 0).all()):
+            return None
+        turns.append(course)
+    return turns
+
+
+def strongest_line(
+    problem: Problem,
+    name: str,
+    residual: NDArray[np.float64],
+    *,
+    over: Sequence[NDArray[np.float64]] | None = None,
+) -> Line | None:
+    """Return the strongest line of an output's residual, None where no run is long and even enough.
+
+    Parameters
+    ----------
+    over : what rises along every run, (n_run,) each; time by default
+    """
     if not problem.case.has_time:
         return None
     runs = []
-    for run, place in zip(problem.runs, problem.slices, strict=True):
-        steps = np.diff(run.t)
+    courses = [run.t for run in problem.runs] if over is None else over
+    # Runs of several speeds have angles of several steps, and the widest of them is common to all.
+    common = None if over is None else max(float(np.ptp(course)) / (len(course) - 1) for course in over)
+    for run, course, place in zip(problem.runs, courses, problem.slices, strict=True):
+        steps = np.diff(course)
         if run.rows < STRUCTURE.line_rows or np.ptp(steps) > STRUCTURE.line_jitter * np.median(steps):
             continue
         good = problem.kept[name][place]
         if good.mean() < STRUCTURE.line_kept:
             continue
         values = residual[place]
-        even = np.linspace(run.t[0], run.t[-1], run.rows)
-        runs.append((float(even[1] - even[0]), np.interp(even, run.t[good], values[good])))
+        count = run.rows if common is None else int(np.ptp(course) / common * (1 + 1e-9)) + 1
+        last = course[-1] if common is None else course[0] + (count - 1) * common
+        even = np.linspace(course[0], last, count)
+        runs.append((float(even[1] - even[0]), np.interp(even, course[good], values[good])))
     if not runs:
         return None
     n = min(len(values) for _, values in runs)
     step = runs[0][0]
-    if any(abs(run_step - step) > STRUCTURE.line_even * step for run_step, _ in runs):
+    if n < STRUCTURE.line_rows or any(abs(each - step) > STRUCTURE.line_even * step for each, _ in runs):
         return None
     window = np.hanning(n + 2)[1:-1]
     power = np.zeros(n // 2 + 1)
@@ -274,12 +330,12 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
         if p < STRUCTURE.alpha and _share(problem, base, dependence) > STEP.first
     ]
     for name in problem.names:
-        line = strongest_line(problem, name, base.residual[name])
+        line = narrowest_line(problem, name, base.residual[name])
         if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            text = f"{LINE}{line.frequency:.4g} Hz"
+            over, text = line.angle or "time", f"{LINE}{line.told}"
             findings.append(
-                StructureFound(output=name, variables=("time",), reason=text, gain=gain, p_value=line.p_value)
+                StructureFound(output=name, variables=(over,), reason=text, gain=gain, p_value=line.p_value)
             )
         event = _event(problem, screen, base, name)
         findings += [] if event is None else [event]
