@@ -101,5 +101,6 @@ def test_why_an_effect_or_a_rest_is_told_as_it_is_has_a_translation(language: st
         over("FY", ["time"], reason)
         for reason in (f"{LINE}24 Hz", "an event in r0.csv from 1 to 2 s", "louder in r0.csv")
     ]
+    left.append(over("FY", ["angle"], f"{LINE}24 per turn"))
     assert len(why) >= 12
     assert [text for text in (*why, *left) if not book.knows(text)] == []

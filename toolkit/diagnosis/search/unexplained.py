@@ -46,6 +46,11 @@ class Line:
     width: float
     angle: str = ""
 
+    def courses(self, problem: Problem) -> list[NDArray[np.float64]]:
+        """Return what it is a line over in every run, (n_run,): time [s], or turns."""
+        over = (turns_of(problem, each) for each in problem.case.drivers if each.name == self.angle)
+        return next(over, None) or [run.t for run in problem.runs]
+
     @property
     def told(self) -> str:
         """Return the frequency with its unit."""
@@ -151,13 +156,13 @@ def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], 
     where = problem.layout(name)
     values = residual[where.index]
     noise = fit_noise(values, where, floor=problem.floor[name])
-    columns = 2 * len(problem.runs)
+    courses, columns = line.courses(problem), 2 * len(problem.runs)
 
     def likelihood(frequency: float) -> float:
         """Return the log-likelihood beside waves by ordinary or by generalised least squares."""
         waves = np.zeros((problem.rows, columns))
-        for k, (run, place) in enumerate(zip(problem.runs, problem.slices, strict=True)):
-            angle = 2 * np.pi * frequency * (run.t - run.t[0])
+        for k, (course, place) in enumerate(zip(courses, problem.slices, strict=True)):
+            angle = 2 * np.pi * frequency * (course - course[0])
             waves[place, 2 * k], waves[place, 2 * k + 1] = np.cos(angle), np.sin(angle)
         reached = -math.inf
         for weights in (Autoregression(reflection=(), sd=1.0), noise):
@@ -173,7 +178,7 @@ def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], 
         best, frequency = max((best, frequency), *near)
     gain = 2 * (best - log_likelihood(values, where, noise))
     # As many frequencies were looked at as half the rows of a run.
-    looked = 0.5 / (line.width * float(np.median(np.diff(problem.runs[0].t))))
+    looked = 0.5 / (line.width * float(np.median(np.diff(courses[0]))))
     return min(1.0, looked * float(chi2.sf(max(gain, 0.0), columns + 1)))
 
 
