@@ -10,6 +10,10 @@ from itertools import product
 import pytest
 
 from tests.report.template_factory import FOLDER
+from toolkit.diagnosis.answer import power
+from toolkit.diagnosis.search.noise_floor import LARGE, LONG
+from toolkit.diagnosis.search.unexplained import BEYOND_REPEATS, LINE, TOO_LARGE
+from toolkit.report.diagnosis.numbers import over
 from toolkit.words.phrasebook import SOURCE, languages, phrasebook
 
 PACKAGE = FOLDER.parent / "toolkit"
@@ -86,3 +90,17 @@ def test_every_sentence_of_a_finding_has_a_translation(language: str) -> None:
     book = phrasebook(language)
     parts = [(place, text) for place, text in spelt() if set(text) - set(f"{HOLE}: ;,.")]
     assert [(place, text) for place, text in parts if not book.knows(text)] == []
+
+
+@pytest.mark.parametrize("language", [name for name in languages() if name != SOURCE])
+def test_why_an_effect_or_a_rest_is_told_as_it_is_has_a_translation(language: str) -> None:
+    book = phrasebook(language)
+    why = [text for name, text in vars(power).items() if name.isupper() and isinstance(text, str)]
+    left = [over("FY", [], reason) for reason in (LARGE, LONG, TOO_LARGE, BEYOND_REPEATS)]
+    left += [
+        over("FY", ["time"], reason)
+        for reason in (f"{LINE}24 Hz", "an event in r0.csv from 1 to 2 s", "louder in r0.csv")
+    ]
+    left.append(over("FY", ["angle"], f"{LINE}24 per turn"))
+    assert len(why) >= 12
+    assert [text for text in (*why, *left) if not book.knows(text)] == []

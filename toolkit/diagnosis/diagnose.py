@@ -27,7 +27,7 @@ from toolkit.diagnosis.fit.averages import (
 )
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
-from toolkit.diagnosis.fit.row_order import by_inputs
+from toolkit.diagnosis.fit.row_order import by_inputs, seed_of
 from toolkit.diagnosis.law.foretelling import before_nothing
 from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.law.resembling import with_resemblances
@@ -138,7 +138,7 @@ def _diagnosed(
                 next_measurements=("Vary the inputs: an output that stands still tells nothing.",),
             )  # fmt: skip
         else:
-            seed = int(case.sha256[:12], 16)
+            seed = seed_of(posed.case)
             with budget.limited():
                 outcome = search(posed.problem, seed=seed, budget=budget)
                 outcome = before_nothing(outcome, seed=seed, budget=budget)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.cases import HEAD, TWO, write_case
-from toolkit.diagnosis.answer.build_answer import _dependence, _mismatches, _outliers, _parameters
+from toolkit.diagnosis.answer.build_answer import _mismatches, _outliers, _parameters
 from toolkit.diagnosis.answer.naming import _is_smooth
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG
-from toolkit.diagnosis.search.unexplained import TOO_LARGE, StructureFound
+from toolkit.diagnosis.search.unexplained import StructureFound
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
@@ -53,21 +53,6 @@ def test_a_rest_and_a_line_are_no_smooth_discrepancy():
     assert not _is_smooth(searched(20.0, 500.0, columns=0))
 
 
-def structure(*variables):
-    return StructureFound(output="F", variables=variables, gain=9.0, p_value=1.0, rest=True)
-
-
-@pytest.mark.parametrize("reason", [LARGE, LONG, *TOO_LARGE])
-def test_a_sentence_is_a_reason_and_no_variable(reason):
-    depends = _dependence(structure(reason))
-    assert (depends.variables, depends.reason) == ((), reason)
-
-
-def test_variables_have_no_reason():
-    depends = _dependence(structure("v", "F"))
-    assert (depends.variables, depends.reason) == (("v", "F"), "")
-
-
 @pytest.fixture
 def problem(tmp_path):
     case = read_case(write_case(tmp_path, HEAD + TWO))
@@ -97,9 +82,11 @@ def test_of_many_values_left_out_some_are_told_and_the_others_counted(problem):
     assert finding.message.endswith(" and 12 more")
 
 
-def left_over(problem, residual, *variables, p_value=1.0):
+def left_over(problem, residual, *variables, reason="", p_value=1.0):
     fit = SimpleNamespace(residual={"F": residual}, simulated={"F": problem.observed["F"]})
-    found = StructureFound(output="F", variables=variables, gain=9.0, p_value=p_value, rest=True)
+    found = StructureFound(
+        output="F", variables=variables, reason=reason, gain=9.0, p_value=p_value, rest=True
+    )
     search = SimpleNamespace(
         problem=problem, refitted=fit, augmented=fit, steps=(), structure_before=(found,), structure=(found,)
     )
@@ -110,7 +97,7 @@ def left_over(problem, residual, *variables, p_value=1.0):
 def test_a_rest_that_is_only_large_has_no_chance(problem):
     noise = np.random.default_rng(2).normal(size=problem.rows)
     for reason in (LARGE, LONG):
-        assert left_over(problem, noise, reason).untested
+        assert left_over(problem, noise, reason=reason).untested
     assert left_over(problem, noise, "run", p_value=0.01).p_value == 0.01
 
 
@@ -118,7 +105,7 @@ def test_a_line_has_the_share_of_its_square(problem):
     # Amplitude 2 beside noise of 1: 2 of 3 of the mean square.
     t = np.concatenate([run.t for run in problem.runs])
     rest = 2 * np.sin(2 * np.pi * 2.5 * t) + np.random.default_rng(2).normal(size=problem.rows)
-    mismatch = left_over(problem, rest, "time (a line at 2.5 Hz)")
+    mismatch = left_over(problem, rest, "time", reason="a line at 2.5 Hz")
     assert mismatch.share_of_variance == pytest.approx(2 / 3, abs=0.08)
 
 

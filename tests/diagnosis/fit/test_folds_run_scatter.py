@@ -131,6 +131,6 @@ def test_an_effect_that_halves_the_errors_of_quiet_runs_is_not_lost_to_a_loud_on
             for size, r, sd in zip(sizes, residuals, trained, strict=True)
         ]
         scores.append(sum(scattered_scores(listed, by_run=True)))
-    # By the noise of each run it gains log 3 of every value of the quiet ones. Its training rows do not tell how
-    # quiet they are, which may cost it a part, and not all.
+    # By the noise of each run it gains log 3 of every value of the quiet ones. Its training rows do not tell
+    # how quiet they are, which may cost it a part, and not all.
     assert scores[1] - scores[0] > 0.5 * ROWS * 2 * math.log(3)

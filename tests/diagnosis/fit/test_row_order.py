@@ -16,7 +16,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.noise import fit_noise
 from toolkit.diagnosis.fit.problem import problem_of
-from toolkit.diagnosis.fit.row_order import by_inputs, dealt
+from toolkit.diagnosis.fit.row_order import by_inputs, dealt, seed_of
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
@@ -59,6 +59,19 @@ def ways(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
         "reversed": rows[::-1],
         "shuffled": rows.sample(frac=1, random_state=1),
     }
+
+
+def test_the_draws_are_those_of_the_readings(tmp_path: Path) -> None:
+    seeds = []
+    for name, rows in ways(table(LOADS)).items():
+        ordered = by_inputs(case := opened(tmp_path / name, rows))
+        assert ordered is not None
+        seeds.append(seed_of(ordered[0]))
+        assert seed_of(case) == int(case.sha256[:12], 16)  # of rows that have an order
+    assert len(set(seeds)) == 1
+    changed = by_inputs(opened(tmp_path / "changed", table(LOADS, bent)))
+    assert changed is not None
+    assert seed_of(changed[0]) not in seeds
 
 
 @pytest.mark.parametrize("force", [bent, lambda L: 1.01 * L])

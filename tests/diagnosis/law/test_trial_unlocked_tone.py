@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pandas as pd
+import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
@@ -50,3 +51,32 @@ def test_intervals_of_a_tone_hold_it(tmp_path):
     for departures in off.values():
         assert sum(abs(each) < 1.96 for each in departures) >= fewest
         assert np.sqrt(np.mean(np.square(departures))) > 0.5  # nor are they far wider than they need be
+
+
+@pytest.mark.parametrize(("measure", "turn"), [("deg", 360.0), ("rad", 2 * math.pi)])
+def test_a_ripple_of_a_shaft_is_told_over_its_angle(tmp_path, measure, turn):
+    """Twelve to a turn, each run from another angle; the amplitude is the mean of the runs'."""
+    head = case_text(
+        "python", parameters={"gain": (1.0, "1", 0.005)}, inputs={"L": "N", "angle": measure},
+        outputs={"F": "N"}, runs=3,
+    )  # fmt: skip
+    rng, t, runs = np.random.default_rng(2), np.arange(200) * 0.1, {}
+    for k, amplitude in enumerate((0.1, 0.2, 0.3)):
+        turns = (0.1 + 0.02 * k) * (t + 0.3 * np.sin(0.4 * t))
+        ripple = amplitude * np.sin(2 * math.pi * 12 * turns + k)
+        frame = {
+            "t": t,
+            "L": 10.0 + t,
+            "angle": turn * turns,
+            "F": 10.0 + t + ripple + rng.normal(0, 0.05, 200),
+        }
+        runs[f"r{k}__csv"] = pd.DataFrame(frame)
+    case = read_case(write_case(tmp_path, head, simulator=CELL, **runs))
+    problem = problem_of(case, model_of(case, None))
+    tone = unlocked_tone(problem, fit(problem, plain=True), "F")
+    assert tone is not None
+    assert [signal.name for signal in tone.signals] == ["angle"]
+    fitted = dict(tone.applied.values)
+    assert fitted["period"] == pytest.approx(turn / 12, abs=4 * tone.sds["period"])
+    assert fitted["a"] == pytest.approx(0.2, abs=4 * tone.sds["a"])
+    assert tone.applied.units["period"] == measure

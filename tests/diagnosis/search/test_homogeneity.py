@@ -50,7 +50,7 @@ def test_a_run_that_leaves_much_more_than_the_others_is_told(tmp_path):
         return rng.normal(0, 0.1, N) + (k == 1) * 3 * wave(5, 35)
 
     part = found(tmp_path, rest)
-    assert part.variables == ("time (louder in r1.csv)",)
+    assert (part.variables, part.reason) == (("time",), "louder in r1.csv")
     assert part.rest
     assert part.is_lawful
     assert part.noise_sd == pytest.approx(0.1, rel=0.08)
@@ -63,13 +63,13 @@ def test_what_only_one_run_leaves_is_not_told_as_noise(tmp_path):
 
     answer = diagnose(case_of(tmp_path, rest), None).diagnosis
     assert (answer.verdict, answer.effects) == ("unknown", ())
-    assert [by.variables for by in answer.depends_on] == [("time (louder in r1.csv)",)]
+    assert [(by.variables, by.reason) for by in answer.depends_on] == [(("time",), "louder in r1.csv")]
 
 
 def test_a_stretch_of_a_single_run_is_told_with_its_time(tmp_path):
     part = found(tmp_path, lambda _k, _, rng: rng.normal(0, 0.1, N) + 3 * wave(20, 25), runs=1)
-    (text,) = part.variables
-    assert text.startswith("time (louder in r0.csv from 20 to 24.9 s")
+    assert part.variables == ("time",)
+    assert part.reason.startswith("louder in r0.csv from 20 to 24.9 s")
 
 
 NULLS = {

@@ -60,7 +60,7 @@ def test_what_repeats_have_in_common_is_no_noise(tmp_path):
         tmp_path, lambda L, k: 0.03 * (L - 50) ** 2 + np.random.default_rng(k).normal(0, 1.0, N)
     )
     assert found is not None
-    assert (found.variables, found.rest, found.is_too_large) == (BEYOND_REPEATS, True, True)
+    assert (found.variables, found.reason, found.is_too_large) == ((), BEYOND_REPEATS, True)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.95])
@@ -85,7 +85,7 @@ def test_noise_of_any_colour_that_is_small_hides_nothing(tmp_path, phi):
 def test_a_rest_above_a_tenth_of_the_spread_is_never_nothing(tmp_path):
     case = case_of(tmp_path, lambda _, rng: coloured(0.98, 2.5, rng))
     (found,) = hidden(case)
-    assert (found.variables, found.rest) == ((LARGE,), True)
+    assert (found.variables, found.reason, found.rest) == ((), LARGE, True)
 
 
 @pytest.mark.campaign("a whole diagnosis: that such a rest is told is held in every run")
@@ -101,7 +101,7 @@ def test_the_noise_of_a_large_rest_has_its_size(tmp_path):
 def test_white_noise_of_a_weak_signal_is_no_structure_beside_what_was_found(tmp_path):
     case = case_of(tmp_path, lambda _, rng: rng.normal(4.0, 2.5, N))
     assert hidden(case, beside=("zero_offset",)) == ()
-    assert (LARGE,) in {found.variables for found in hidden(case)}
+    assert LARGE in {found.reason for found in hidden(case)}
 
 
 def test_of_rows_in_no_order_no_difference_shows_the_sensor(tmp_path):
@@ -110,7 +110,7 @@ def test_of_rows_in_no_order_no_difference_shows_the_sensor(tmp_path):
     load = rng.uniform(30, 70, N)
     table = pd.DataFrame({"t": np.arange(N) * 0.1, "L": load, "F": load + 4 * np.sign(np.sin(5 * load))})
     case = read_case(write_case(tmp_path, text, simulator=CELL, r0__csv=table, r1__csv=None))
-    assert (LARGE,) in {found.variables for found in hidden(case)}
+    assert LARGE in {found.reason for found in hidden(case)}
 
 
 def test_a_noise_of_that_size_that_a_certificate_states_hides_nothing(tmp_path):
@@ -150,6 +150,6 @@ def test_a_rest_that_wanders_as_long_as_the_recording_is_not_known_to_be_noise(t
     y = 2.0 + 0.0005 * (wander - wander.mean()) / wander.std()
     frame = pd.DataFrame({"t": 0.1 * np.arange(50), "y": y})
     case = read_case(write_case(tmp_path, CONSTANT, simulator=STILL, r0__csv=frame, r1__csv=None))
-    assert ((LONG,) in {each.variables for each in hidden(case)}) is (verdict == "unknown")
+    assert (LONG in {each.reason for each in hidden(case)}) is (verdict == "unknown")
     answer = diagnose(case, None).diagnosis
     assert (answer.verdict, answer.effects) == (verdict, ())

@@ -17,7 +17,7 @@ RATE, ROWS, RUNS = 20.0, 240, 3  # 1/s, rows of a run, runs
 def line(residual):
     t = np.arange(ROWS) / RATE
     problem = SimpleNamespace(
-        case=SimpleNamespace(has_time=True),
+        case=SimpleNamespace(has_time=True, drivers=()),
         runs=[SimpleNamespace(t=t, rows=ROWS)] * RUNS,
         slices=[slice(k * ROWS, (k + 1) * ROWS) for k in range(RUNS)],
         kept={"y": np.ones(ROWS * RUNS, dtype=bool)},

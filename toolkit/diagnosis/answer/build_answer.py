@@ -37,7 +37,7 @@ from toolkit.diagnosis.search.channel_factors import factor_of, is_ratio
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG
 from toolkit.diagnosis.search.search import Search
-from toolkit.diagnosis.search.unexplained import StructureFound, strongest_line
+from toolkit.diagnosis.search.unexplained import LINE, narrowest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.effects.unit_ratios import near_ratio
@@ -87,7 +87,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         ),
         depends_on=tuple(
             dict.fromkeys(
-                _dependence(structure)
+                Dependence(channel=structure.output, variables=structure.variables, reason=structure.reason)
                 for structure in search.structure or (search.structure_before if unknown else ())
             )
         ),
@@ -110,15 +110,8 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
     )
 
 
-_UNTESTED = ((LARGE,), (LONG,))
+_UNTESTED = (LARGE, LONG)
 """What is said of a rest that no test tells from noise: it has a reason, and no chance."""
-
-
-def _dependence(structure: StructureFound) -> Dependence:
-    """Return on what structure depends; a sentence that stands in place of variables is its reason."""
-    if structure.variables in _UNTESTED or structure.is_too_large:
-        return Dependence(channel=structure.output, variables=(), reason=structure.variables[0])
-    return Dependence(channel=structure.output, variables=structure.variables)
 
 
 def _verdict(
@@ -320,7 +313,7 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[ChannelMismatch, ...]
             continue
         before, after = search.refitted.residual[name], search.augmented.residual[name]
         mine = [structure for structure in search.structure_before if structure.output == name]
-        p_values = [structure.p_value for structure in mine if structure.variables not in _UNTESTED]
+        p_values = [structure.p_value for structure in mine if structure.reason not in _UNTESTED]
         if search.steps:
             share = max(
                 0.0, 1 - float(np.sum(after[counted] ** 2)) / max(float(np.sum(before[counted] ** 2)), 1e-300)
@@ -337,8 +330,8 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[ChannelMismatch, ...]
             continue
         if unknown:
             share, signal = max((share, signal), structured(search, name), key=lambda pair: pair[0])
-        if any(variable.startswith("time (a line at") for each in mine for variable in each.variables):
-            line = strongest_line(problem, name, before)
+        if any(each.reason.startswith(LINE) for each in mine):
+            line = narrowest_line(problem, name, before)
             share = max(share, 0.0 if line is None else line.share)
         mismatches.append(
             ChannelMismatch(
@@ -360,7 +353,7 @@ def _depends_on(search: Search, name: str) -> tuple[str, ...]:
         key=lambda structure: structure.gain,
         default=None,
     )
-    return () if most is None else most.variables
+    return () if most is None or most.reason.startswith(LINE) else most.variables
 
 
 def _outliers(case: Case, search: Search) -> tuple[Finding, ...]:

@@ -113,7 +113,12 @@ def structured(search: Search, name: str) -> tuple[float, NDArray[np.float64]]:
     problem, counted = search.problem, search.problem.kept[name]
     residual = search.refitted.residual[name]
     best, signal = 0.0, np.zeros(problem.rows)
-    dependences = {structure.variables for structure in search.structure_before if structure.output == name}
+    # A line, an event or a rest is none of a variable's smooth dependences.
+    dependences = {
+        () if structure.reason else structure.variables
+        for structure in search.structure_before
+        if structure.output == name
+    }
     for group in groups(problem, search.refitted):
         if group.output != name or (dependences and group.variables not in dependences):
             continue

@@ -13,6 +13,7 @@ from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.search.unexplained import LINE
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
 from toolkit.units import unit
@@ -137,7 +138,9 @@ def to_find_it(search: Search) -> list[str]:
     What can be varied, held or applied follows from the case: how many inputs it has, and of what kind.
     """
     case = search.problem.case
-    variables = dict.fromkeys(name for structure in search.structure for name in structure.variables)
+    variables = dict.fromkeys(
+        name for structure in search.structure if not structure.reason for name in structure.variables
+    )
     inputs = [channel.name for channel in case.drivers if channel.role == "input"]
     channels = {channel.name for channel in case.drivers}
     rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
@@ -156,9 +159,17 @@ def to_find_it(search: Search) -> list[str]:
         )
         if names:
             sentences.append(f"The mismatch depends on the size of {names}: {known}.")
-    lines = [
-        name.removeprefix("time (a line at ").removesuffix(")") for name in variables if "a line at" in name
+    found = dict.fromkeys(
+        (structure.variables[0], structure.reason.removeprefix(LINE))
+        for structure in search.structure
+        if structure.reason.startswith(LINE)
+    )
+    sentences += [
+        f"The mismatch swings {line.replace(' per', ' times per')} of {name}: {_AT_ANOTHER_SPEED}"
+        for name, line in found
+        if name != "time"
     ]
+    lines = [line for name, line in found if name == "time"]
     if lines:
         sentences += _swinging(search.problem, lines)
     if "run" in variables:
@@ -190,6 +201,12 @@ def _is_load(text: str) -> bool:
     return unit(text).dimension in _OF_LOADS
 
 
+_AT_ANOTHER_SPEED = (
+    "repeat the run at another speed; what is of the shaft keeps its number per turn, what is of time its "
+    "frequency."
+)
+
+
 def _swinging(problem: Problem, lines: Sequence[str]) -> list[str]:
     """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
     sentences, unturned = [], []
@@ -200,8 +217,7 @@ def _swinging(problem: Problem, lines: Sequence[str]) -> list[str]:
             continue
         name, cycles = order
         sentences.append(
-            f"The mismatch swings at {line}, {cycles:.3g} times per turn of {name}: repeat the run at "
-            "another speed; what is of the shaft keeps its number per turn, what is of time its frequency."
+            f"The mismatch swings at {line}, {cycles:.3g} times per turn of {name}: {_AT_ANOTHER_SPEED}"
         )
     if unturned:
         listed = " and ".join(unturned)

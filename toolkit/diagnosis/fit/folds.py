@@ -11,8 +11,8 @@ runs together most likely (empirical Bayes). Each hypothesis has its own scatter
 zero in every run pays for it. Runs may be louder than others too: by the noise of quiet ones a loud run is
 all but impossible, the more so the better the simulation of the quiet ones.
 
-Sources: Laird and Ware, Biometrics 38 (1982) 963, random effects with a variance of their own; Lange, Little and
-Taylor, J. Am. Stat. Assoc. 84 (1989) 881, Student's distribution for rows of unequal variance.
+Sources: Laird and Ware, Biometrics 38 (1982) 963, random effects with a variance of their own; Lange, Little
+and Taylor, J. Am. Stat. Assoc. 84 (1989) 881, Student's distribution for rows of unequal variance.
 """
 
 from __future__ import annotations

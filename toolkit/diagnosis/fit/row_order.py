@@ -45,6 +45,20 @@ def by_inputs(case: Case) -> tuple[Case, tuple[NDArray[np.intp], ...]] | None:
     return replace(case, runs=runs, has_order=False), orders
 
 
+def seed_of(case: Case) -> int:
+    """Return the seed of a case's draws: of its hash; where rows have no order, of the readings themselves.
+
+    A file that was sorted in another way has another hash.
+    """
+    if case.has_order:
+        return int(case.sha256[:12], 16)
+    mark = hashlib.blake2b(digest_size=6)
+    for run in case.runs:
+        for name, column in (*run.columns.items(), *run.simulated.items()):
+            mark.update(name.encode() + column.tobytes())
+    return int.from_bytes(mark.digest())
+
+
 def drivers_of(case: Case, run: Run) -> Mapping[str, Array]:
     """Return what drives a run; of another program's output, beside which no input stands, that output."""
     columns = {driver.name: run.columns[driver.name] for driver in case.drivers if driver.name in run.columns}

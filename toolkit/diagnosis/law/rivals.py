@@ -38,8 +38,8 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
     stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
     there rings, coloured noise takes it up, and no structure shows. What takes nearly all that the laws take
-    keeps its name, whatever they make of the rest. Any other loses it where all that is named has another size
-    beside the laws, or where it leaves more than the sensor's noise and they do not.
+    keeps its name, whatever they make of the rest. Any other loses it where all that is named has another
+    size beside the laws, or where it leaves more than the sensor's noise and they do not.
     """
     predicting = any(law.predicts for law in laws.listed)
     is_asked = predicting or _leaves_process_noise(search)

@@ -163,8 +163,12 @@ def pulse(start: float, end: float, row: float) -> Shape:
     return Shape(form="event", text=text, units={"a": "{y}"})
 
 
-UNLOCKED = Shape(
-    form="tone", units={"a": "{y}", "frequency": "Hz", "phase": "rad"},
+UNLOCKED_TURN = Shape(
+    form="tone", units={"a": "{y}", "period": "{x}", "phase": "rad"}, about_zero=False,
+    text=f"a*sin({_TURN}*{{x}}/period + phase)",
+)  # fmt: skip
+"""A tone over an angle in place of time."""
+UNLOCKED = Shape(    form="tone", units={"a": "{y}", "frequency": "Hz", "phase": "rad"},
     text=f"a*sin({_TURN}*frequency*[time] + phase)",
 )  # fmt: skip
 

@@ -20,10 +20,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.structure import filled
-from toolkit.diagnosis.law.shapes import MODE, ONE, REMEMBERING, TONE, TWO, UNLOCKED, Form, Shape, curve, rung
+from toolkit.diagnosis.law.shapes import (
+    MODE,
+    ONE,
+    REMEMBERING,
+    TONE,
+    TWO,
+    UNLOCKED,
+    UNLOCKED_TURN,
+    Form,
+    Shape,
+    curve,
+    rung,
+)
 from toolkit.diagnosis.policy import LAWS, STRUCTURE
 from toolkit.diagnosis.search.case_view import CaseView
-from toolkit.diagnosis.search.unexplained import beyond_its_past, strongest_events, strongest_line
+from toolkit.diagnosis.search.unexplained import (
+    beyond_its_past,
+    narrowest_line,
+    strongest_events,
+    strongest_line,
+)
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.setting import is_speed
 from toolkit.effects.applied import AppliedEffect
@@ -239,20 +256,21 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
 def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
     """Return a tone whose phase differs from run to run, with its mean amplitude; None without a clear one.
 
-    It explains and does not predict: of another run nobody knows the phase. Its frequency and amplitude are
-    as certain as the noise at the frequencies beside it lets them be.
+    It is one of a recorded angle, unless that of time is narrower. It explains and does not predict: of
+    another run nobody knows the phase. Its frequency and amplitude are as certain as the noise at the
+    frequencies beside it lets them be.
 
     Source: Rife and Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, the bounds of a tone's variances.
     """
-    line = strongest_line(problem, output, base.residual[output])
+    line = narrowest_line(problem, output, base.residual[output])
     if line is None or line.p_value >= STRUCTURE.line or line.share <= STRUCTURE.line_share:
         return None
     if beyond_its_past(problem, output, base.residual[output], line) >= STRUCTURE.line:
         return None
     good = [problem.kept[output][rows] for rows in problem.slices]
     runs = [
-        (run.t[kept], base.residual[output][rows][kept])
-        for run, rows, kept in zip(problem.runs, problem.slices, good, strict=True)
+        (course[kept], base.residual[output][rows][kept])
+        for course, rows, kept in zip(line.courses(problem), problem.slices, good, strict=True)
         if kept.any()
     ]
     longest = max(float(np.ptp(t)) for t, _ in runs)
@@ -273,9 +291,13 @@ def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
     sds = {
         "a": math.sqrt(float(np.sum(2 * noise / rows_of))) / len(runs), "frequency": 1 / math.sqrt(told)
     }  # fmt: skip
-    time = signals_of(problem, base, output)[-1:]
     start = {"a": float(np.mean(amplitudes_of)), "frequency": frequency, "phase": math.nan}
-    return replace(trial_at(problem, UNLOCKED, time, "adds", output, start), gain=line.share, sds=sds)
+    shape, signals = UNLOCKED, signals_of(problem, base, output)
+    of = next((signal for signal in signals if signal.name == line.angle), signals[-1])
+    if of.name == line.angle:
+        shape, period = UNLOCKED_TURN, 2 * math.pi / unit(problem.case.unit(of.name)).factor / frequency
+        start["period"], sds["period"] = period, period * sds["frequency"] / frequency
+    return replace(trial_at(problem, shape, (of,), "adds", output, start), gain=line.share, sds=sds)
 
 
 def _strongest(runs: Sequence[tuple[Array, Array]], frequencies: Array) -> float:

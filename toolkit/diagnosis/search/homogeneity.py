@@ -89,9 +89,9 @@ def _louder(
     if best is None:
         return None
     log_p, gain, sd, there_rows = best
-    text = f"time (louder in {_told(problem, there_rows)})"
+    text = f"louder in {_told(problem, there_rows)}"
     return StructureFound(
-        output=name, variables=(text,), gain=gain, rest=True, noise_sd=sd,
+        output=name, variables=("time",), reason=text, gain=gain, rest=True, noise_sd=sd,
         p_value=math.exp(max(log_p, -690.0)),
     )  # fmt: skip
 

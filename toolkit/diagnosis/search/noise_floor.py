@@ -43,7 +43,7 @@ def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tup
         if _is_large(problem, base, name, parts):
             ratio = parts.total_sd / (NOISE.largest * spread(problem, name))
             gain = 2 * problem.layout(name).n * math.log(ratio) / base.noise[name].correlation_rows
-            found.append(StructureFound(output=name, variables=(LARGE,), gain=gain, p_value=1.0, rest=True))
+            found.append(_untested(name, LARGE, gain))
         if parts.process_sd > parts.sensor_sd:
             own = [group for group in listed if group.output == name and group.variables != RUNS]
             follows = _followed(problem, folds, base, name, own, seed + at)
@@ -51,8 +51,12 @@ def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tup
             # Of so few independent values nothing can be told apart from anything, noise least of all.
             few = problem.layout(name).n <= ROWS.fewest * base.noise[name].correlation_rows
             if few and parts.total_sd > NOISE.largest * spread(problem, name):
-                found.append(StructureFound(output=name, variables=(LONG,), gain=0.0, p_value=1.0, rest=True))
+                found.append(_untested(name, LONG, 0.0))
     return tuple(found)
+
+
+def _untested(name: str, reason: str, gain: float) -> StructureFound:
+    return StructureFound(output=name, variables=(), reason=reason, gain=gain, p_value=1.0, rest=True)
 
 
 def is_beyond_noise(problem: Problem, base: Fit) -> bool:

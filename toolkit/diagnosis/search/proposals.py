@@ -72,10 +72,15 @@ class Proposals:
         if not self.scored:
             return ()
         best = self.scored[0]
-        place = (f"{best.candidate.active.channel} (from row to row)",)
+        place = (str(best.candidate.active.channel),)
         return tuple(
             StructureFound(
-                output=name, variables=place, gain=best.gain, p_value=self.p_of[id(best)], rest=True
+                output=name,
+                variables=place,
+                reason="from row to row",
+                gain=best.gain,
+                p_value=self.p_of[id(best)],
+                rest=True,
             )
             for name in problem.names
             if problem.kept[name].any()

@@ -254,8 +254,10 @@ class LinearisedFit:
         """Return the share of a gain that short coloured series leave: their noise is known from few rows.
 
         In the manner of Bartlett's correction, with rows counted by what they are worth; found on clean
-        series of AR(1) noise.
+        series of AR(1) noise. Of rows without an order no colour is known or asked for: nothing is lost.
         """
+        if not self.problem.case.has_order:
+            return 1.0
         worth = sum(where.n / noise[name].correlation_rows for name, where in self.layouts.items())
         return max(SCREENING.least_trust, 1 - SCREENING.short / max(worth, 1.0))
 

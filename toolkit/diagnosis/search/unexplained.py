@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,50 +17,111 @@ from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.screen_step import search_p_values
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.diagnosis.case.case import CaseChannel
+
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
 
 
-TOO_LARGE = ("more than its stated noise",)
-BEYOND_REPEATS = ("more than repeats of a run differ by",)
+TOO_LARGE = "more than its stated noise"
+BEYOND_REPEATS = "more than repeats of a run differ by"
+LINE = "a line at "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
     """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance.
 
-    ``width`` is what the shortest run leaves open of its frequency [1/s].
+    ``width`` is what the shortest run leaves open of its frequency [1/s]. One over the ``angle`` of that
+    channel has both per turn.
     """
 
     frequency: float
     p_value: float
     share: float
     width: float
+    angle: str = ""
+
+    def courses(self, problem: Problem) -> list[NDArray[np.float64]]:
+        """Return what it is a line over in every run, (n_run,): time [s], or turns."""
+        over = (turns_of(problem, each) for each in problem.case.drivers if each.name == self.angle)
+        return next(over, None) or [run.t for run in problem.runs]
+
+    @property
+    def told(self) -> str:
+        """Return the frequency with its unit."""
+        return f"{self.frequency:.4g} {'per turn' if self.angle else 'Hz'}"
 
 
-def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
-    """Return the strongest line of an output's residual, None where no run is long and even enough."""
+def narrowest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
+    """Return the strongest line of an output's residual, over a recorded angle unless time's is narrower.
+
+    What is of a shaft keeps its number per turn while the speed changes, and smears over time. As much in
+    the three frequencies of a line is as narrow; at one steady speed both are, and the angle comes first.
+    """
+    best = strongest_line(problem, name, residual)
+    for channel in problem.case.drivers:
+        turns = turns_of(problem, channel)
+        over = None if turns is None else strongest_line(problem, name, residual, over=turns)
+        if over is not None and (best is None or over.share > (1 - STRUCTURE.line_share) * best.share):
+            best = replace(over, angle=channel.name)
+    return best
+
+
+def turns_of(problem: Problem, channel: CaseChannel) -> list[NDArray[np.float64]] | None:
+    """Return the turns of a recorded angle in every run, (n_run,); None where it does not turn in one way."""
+    if unit(channel.unit).dimension != "angle":
+        return None
+    turns = []
+    for run in problem.runs:
+        course = np.unwrap(run.columns[channel.name] * unit(channel.unit).factor) / (2 * np.pi)
+        course = course if course[-1] > course[0] else -course
+        if not (course[-1] - course[0] >= 1 and (np.diff(course) > 0).all()):
+            return None
+        turns.append(course)
+    return turns
+
+
+def strongest_line(
+    problem: Problem,
+    name: str,
+    residual: NDArray[np.float64],
+    *,
+    over: Sequence[NDArray[np.float64]] | None = None,
+) -> Line | None:
+    """Return the strongest line of an output's residual, None where no run is long and even enough.
+
+    Parameters
+    ----------
+    over : what rises along every run, (n_run,) each; time by default
+    """
     if not problem.case.has_time:
         return None
     runs = []
-    for run, place in zip(problem.runs, problem.slices, strict=True):
-        steps = np.diff(run.t)
+    courses = [run.t for run in problem.runs] if over is None else over
+    # Runs of several speeds have angles of several steps, and the widest of them is common to all.
+    common = None if over is None else max(float(np.ptp(course)) / (len(course) - 1) for course in over)
+    for run, course, place in zip(problem.runs, courses, problem.slices, strict=True):
+        steps = np.diff(course)
         if run.rows < STRUCTURE.line_rows or np.ptp(steps) > STRUCTURE.line_jitter * np.median(steps):
             continue
         good = problem.kept[name][place]
         if good.mean() < STRUCTURE.line_kept:
             continue
         values = residual[place]
-        even = np.linspace(run.t[0], run.t[-1], run.rows)
-        runs.append((float(even[1] - even[0]), np.interp(even, run.t[good], values[good])))
+        count = run.rows if common is None else int(np.ptp(course) / common * (1 + 1e-9)) + 1
+        last = course[-1] if common is None else course[0] + (count - 1) * common
+        even = np.linspace(course[0], last, count)
+        runs.append((float(even[1] - even[0]), np.interp(even, course[good], values[good])))
     if not runs:
         return None
     n = min(len(values) for _, values in runs)
     step = runs[0][0]
-    if any(abs(run_step - step) > STRUCTURE.line_even * step for run_step, _ in runs):
+    if n < STRUCTURE.line_rows or any(abs(each - step) > STRUCTURE.line_even * step for each, _ in runs):
         return None
     window = np.hanning(n + 2)[1:-1]
     power = np.zeros(n // 2 + 1)
@@ -94,13 +156,13 @@ def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], 
     where = problem.layout(name)
     values = residual[where.index]
     noise = fit_noise(values, where, floor=problem.floor[name])
-    columns = 2 * len(problem.runs)
+    courses, columns = line.courses(problem), 2 * len(problem.runs)
 
     def likelihood(frequency: float) -> float:
         """Return the log-likelihood beside waves by ordinary or by generalised least squares."""
         waves = np.zeros((problem.rows, columns))
-        for k, (run, place) in enumerate(zip(problem.runs, problem.slices, strict=True)):
-            angle = 2 * np.pi * frequency * (run.t - run.t[0])
+        for k, (course, place) in enumerate(zip(courses, problem.slices, strict=True)):
+            angle = 2 * np.pi * frequency * (course - course[0])
             waves[place, 2 * k], waves[place, 2 * k + 1] = np.cos(angle), np.sin(angle)
         reached = -math.inf
         for weights in (Autoregression(reflection=(), sd=1.0), noise):
@@ -116,7 +178,7 @@ def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], 
         best, frequency = max((best, frequency), *near)
     gain = 2 * (best - log_likelihood(values, where, noise))
     # As many frequencies were looked at as half the rows of a run.
-    looked = 0.5 / (line.width * float(np.median(np.diff(problem.runs[0].t))))
+    looked = 0.5 / (line.width * float(np.median(np.diff(courses[0]))))
     return min(1.0, looked * float(chi2.sf(max(gain, 0.0), columns + 1)))
 
 
@@ -204,9 +266,11 @@ def _event(problem: Problem, screen: LinearisedFit, base: Fit, name: str) -> Str
             continue
         gain, _, trust = screen.gain({each: column if each == name else none for each in problem.names})
         log_p = float(chi2.logsf(max(gain * trust, 0.0), 1)) + math.log(event.looked * len(events))
-        text = f"time (an event in {event.run} from {event.start:.4g} to {event.end:.4g} s)"
+        text = f"an event in {event.run} from {event.start:.4g} to {event.end:.4g} s"
         p = math.exp(min(max(log_p, -690.0), 0.0))
-        listed.append(StructureFound(output=name, variables=(text,), gain=gain, p_value=p, rest=True))
+        listed.append(
+            StructureFound(output=name, variables=("time",), reason=text, gain=gain, p_value=p, rest=True)
+        )
     best = min(listed, key=lambda found: found.p_value, default=None)
     return best if best is not None and best.p_value < STRUCTURE.alpha else None
 
@@ -218,7 +282,8 @@ class StructureFound:
     A ``rest`` is only larger than noise may be, or differs from run to run: it follows nothing that an effect
     could imitate, and no effect beside it is withdrawn because of it. ``columns`` are the parameters of a
     smooth dependence; a line and a rest have none. ``noise_sd`` is what the output's noise is known to be
-    where the structure shows that it is not the residual; None where it shows nothing of it.
+    where the structure shows that it is not the residual; None where it shows nothing of it. ``reason`` says
+    which line or event of its variable it is, or why it counts where no variable foretells it; else empty.
     """
 
     output: str
@@ -228,16 +293,17 @@ class StructureFound:
     rest: bool = False
     columns: int = 0
     noise_sd: float | None = None
+    reason: str = ""
 
     @property
     def is_lawful(self) -> bool:
         """Tell whether a law may answer it: an event has one, what only differs from run to run has none."""
-        return not self.rest or self.variables[0].startswith("time (")
+        return not self.rest or "time" in self.variables
 
     @property
     def is_too_large(self) -> bool:
         """Tell whether it is all that is known that the residual is larger than a noise that is known."""
-        return self.variables in (TOO_LARGE, BEYOND_REPEATS)
+        return self.reason in (TOO_LARGE, BEYOND_REPEATS)
 
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -269,12 +335,12 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
         if p < STRUCTURE.alpha and _share(problem, base, dependence) > STEP.first
     ]
     for name in problem.names:
-        line = strongest_line(problem, name, base.residual[name])
+        line = narrowest_line(problem, name, base.residual[name])
         if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            line_text = f"time (a line at {line.frequency:.4g} Hz)"
+            over, text = line.angle or "time", f"{LINE}{line.told}"
             findings.append(
-                StructureFound(output=name, variables=(line_text,), gain=gain, p_value=line.p_value)
+                StructureFound(output=name, variables=(over,), reason=text, gain=gain, p_value=line.p_value)
             )
         event = _event(problem, screen, base, name)
         findings += [] if event is None else [event]
@@ -314,7 +380,7 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
     reason = BEYOND_REPEATS if stated is None else TOO_LARGE
-    return StructureFound(output=name, variables=reason, gain=gain, p_value=p, rest=True)
+    return StructureFound(output=name, variables=(), reason=reason, gain=gain, p_value=p, rest=True)
 
 
 def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:

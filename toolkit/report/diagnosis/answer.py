@@ -134,7 +134,7 @@ def _not_observable(source: Told, _style: Style) -> str | None:
     why: dict[str, list[str]] = {}
     for effect in source.answer.not_found:
         if not effect.observable:
-            why.setdefault(effect.why or "not source by these recordings", []).append(effect.name)
+            why.setdefault(effect.why or "not told by these recordings", []).append(effect.name)
     return " ".join(f"{reason.capitalize()}: {', '.join(names)}." for reason, names in why.items()) or None
 
 

@@ -62,17 +62,21 @@ _REASONS = {"more than": "is off by", "a ": "leaves"}
 
 
 def over(channel: str, variables: Sequence[str], reason: str = "") -> str:
-    """Return what an output's mismatch depends on; where no variable foretells it, the reason.
+    """Return what an output's mismatch depends on, and which line or event it is; or the reason alone.
 
     >>> over("FY", ["SA", "FZ"]), over("FY", [], "more than its stated noise"), over("FY", [], "a slow rest")
     ('FY over SA and FZ', 'FY is off by more than its stated noise', 'FY leaves a slow rest')
+    >>> over("FY", ["time"], "a line at 24 Hz")
+    'FY over time (a line at 24 Hz)'
     >>> over("FY", ["FY"]), over("FY", ["FY", "SA"]), over("FY", ["a", "v"])
     ('FY over its own size', 'FY over its own size and SA', 'FY over a and v')
     """
     names = " and ".join("its own size" if name == channel else name for name in variables)
     # Answers of earlier versions have the reason among the variables.
     if len(variables) == 1 and names.startswith(tuple(_REASONS)):
-        reason = names
+        reason, names = names, ""
+    if names:
+        return f"{channel} over {names} ({reason})" if reason else f"{channel} over {names}"
     verb = next((verb for start, verb in _REASONS.items() if reason.startswith(start)), "over")
     return f"{channel} {verb} {reason or names}"
 
