@@ -22,10 +22,9 @@ from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import by_name
 from toolkit.errors import ConfigError
-from toolkit.planning.demands import Demand
+from toolkit.planning.demands import Demand, Reach, is_of, worst
 from toolkit.planning.design import Design, Pace, steps_of
 from toolkit.planning.exchange import Points, PointSearch
-from toolkit.planning.reach import Reach, is_of, worst
 from toolkit.planning.screen import Screen, criterion, openness, screen_of
 from toolkit.planning.tread import Exposure, Tread
 from toolkit.tires.fit import MIN_POINTS

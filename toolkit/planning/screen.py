@@ -30,9 +30,9 @@ from toolkit.tires.models import model
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.planning.demands import Reach
     from toolkit.planning.design import Design
     from toolkit.planning.expectation import EarlierTest
-    from toolkit.planning.reach import Reach
     from toolkit.tires.model import CurveFit
 
 

@@ -23,7 +23,7 @@ from toolkit.characteristics.sweep_fit import Lag, SweepFit, forms_of
 from toolkit.characteristics.sweep_length import relaxation_length
 from toolkit.effects.filters import lag
 from toolkit.errors import ConfigError
-from toolkit.planning.reach import Reach
+from toolkit.planning.demands import Reach
 from toolkit.reduction.sweep import Sweep
 
 if TYPE_CHECKING:

@@ -18,11 +18,12 @@ from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, loadin
 from toolkit.calibration.fit.printed_digits import copies, own_scatter
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import contradicting, deviating
-from toolkit.calibration.fit.run_scale import RunScale, run_scales
 from toolkit.calibration.fit.scatter_findings import (
+    RunScale,
     difference_findings,
     method_findings,
     run_findings,
+    run_scales,
     scatter_findings,
     stated_findings,
 )

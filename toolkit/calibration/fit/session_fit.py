@@ -15,7 +15,6 @@ from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.printed_digits import rounding_alone
-from toolkit.calibration.fit.reading_steps import with_steps
 from toolkit.calibration.fit.regression import (
     Factor,
     TermFit,
@@ -24,7 +23,7 @@ from toolkit.calibration.fit.regression import (
     fit_terms,
     raw_coefficients,
 )
-from toolkit.calibration.fit.rounding import Rounding
+from toolkit.calibration.fit.rounding import Rounding, with_steps
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.fit.session_scatter import FittedRows, scatter_of_rows

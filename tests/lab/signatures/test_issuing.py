@@ -25,10 +25,10 @@ from toolkit.calibration.control.calibrate import rehearse
 from toolkit.calibration.registry import store
 from toolkit.calibration.registry.approval import withdraw
 from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.issuing import issue, issuers
 from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError, RegistryError, TrustError
+from toolkit.lab.signatures.issuing import issue, issuers
 from toolkit.trust.people import Demand, Policy
 from toolkit.trust.requested import Requested
 from toolkit.trust.requests import Request, read_request
