@@ -1,7 +1,4 @@
-"""The tables of a test's report, each declared with what builds it: plain numbers, SAE J670.
-
-The hub's calibrated loads beside FY and MZ have tables of their own.
-"""
+"""The tables of a test's report, each declared with what builds it: plain numbers, SAE J670."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.uncertainty.common_errors import standard_errors
-from toolkit.report.content import Cell
 from toolkit.report.document import Rows
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -19,7 +15,7 @@ from toolkit.units import from_si, printed
 
 if TYPE_CHECKING:
     from toolkit.machine import TypeB
-
+    from toolkit.report.content import Cell
 
 _DEG = math.pi / 180
 _STATED = {
@@ -227,48 +223,3 @@ def files(report: ReportedTest, _style: Style) -> Rows:
     """Return the recordings, each once."""
     recordings = {c.file: c for c in report.result.reduced.conditions}
     return ((c.file, c.rotation, c.file_sha256) for c in recordings.values())
-
-
-@REPORT.table(
-    "hub_forces",
-    "the hub's calibrated forces beside FY, one row a condition, SAE J670",
-    """
-    rotation|direction of rotation
-    SA|measured slip angle|deg|.2f
-    load|measured load|force|.0f
-    FX ±|longitudinal force|force|.1f
-    FZ ±|normal force by the hub's cells|force|.1f
-    file|recording
-    """,
-)
-def hub_forces(report: ReportedTest, _style: Style) -> Rows:
-    """Return the conditions that were used, where the hub measures a force beside FY."""
-    return _rows(report, ("FX", "FZ"))
-
-
-@REPORT.table(
-    "hub_moments",
-    "the hub's calibrated moments beside MZ, one row a condition, SAE J670",
-    """
-    rotation|direction of rotation
-    SA|measured slip angle|deg|.2f
-    load|measured load|force|.0f
-    MX ±|overturning moment|moment|.2f
-    MY ±|rolling resistance moment|moment|.2f
-    file|recording
-    """,
-)
-def hub_moments(report: ReportedTest, _style: Style) -> Rows:
-    """Return the conditions that were used, where the hub measures a moment beside MZ."""
-    return _rows(report, ("MX", "MY"))
-
-
-def _rows(report: ReportedTest, loads: tuple[str, ...]) -> Rows:
-    for c in report.used:
-        cells: dict[str, Cell] = {}
-        for entry in c.hub:
-            if entry.load in loads:
-                cells |= {entry.load: entry.value, f"U_{entry.load}": 2 * entry.u}
-        if cells:
-            angle = math.degrees(c.SA)
-            yield {"rotation": c.rotation, "SA": angle, "load": c.FZ, "file": c.file, **cells}
