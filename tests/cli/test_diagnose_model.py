@@ -27,6 +27,9 @@ def answered(run, tmp_path_factory):
     return folder
 
 
+@pytest.mark.campaign(
+    "a diagnosis by the command: that a model misses nothing is held in every run (test_model_text)"
+)
 def test_the_model_as_the_simulation_misses_nothing_and_ends_with_0(run, answered, tmp_path):
     model = answered / "out" / "model.toml"
     found = run("diagnose", answered / "CASE.toml", "--model", model, "--out", tmp_path / "again", "--json")

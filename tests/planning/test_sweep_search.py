@@ -114,6 +114,9 @@ def test_both_ends_of_the_prior_are_served_and_a_measured_length_takes_its_place
     assert reach.value == pytest.approx(0.43)
 
 
+@pytest.mark.campaign(
+    "sixteen sweeps are fitted: one plan of sweeps is simulated and processed in every run (cli/test_plan.py)"
+)
 def test_what_is_promised_is_what_sweeps_on_the_same_tire_say() -> None:
     choice = least_of_40_mm()
     design, rng = choice.design, np.random.default_rng(3)

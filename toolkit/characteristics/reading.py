@@ -30,13 +30,14 @@ on a passenger tire) because the curve bends.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.characteristics.characteristic import Characteristic, Need
-from toolkit.characteristics.groups import CHANNELS, Channel, Direction
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction, DirectionFit
 from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain, merged, weighted
@@ -90,6 +91,13 @@ class Reader:
         # Several characteristics are made of the values at SA = 0 and of MZ where FY is zero.
         self._at_zero: dict[Channel, Uncertain | None] = {}
         self._residual: list[Uncertain | None] = []
+
+    def on_curves(self, fit: DirectionFit) -> Reader:
+        """Return a reader of the same conditions off other curves."""
+        other = copy.copy(self)
+        other.direction = replace(self.direction, fit=fit)
+        other._pseudo, other._at_zero, other._residual = {}, {}, []
+        return other
 
     def covers_zero(self) -> bool:
         """Tell whether slip angles lie on both sides of zero."""

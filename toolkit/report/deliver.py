@@ -27,7 +27,7 @@ from toolkit.report.content import Plot, ReportContent
 from toolkit.report.drawer import Drawer
 from toolkit.report.figures import Picture
 from toolkit.report.word.chart import with_alternatives
-from toolkit.report.word.fill import fill, needed_figures
+from toolkit.report.word.fill import Survey, fill, survey
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
 from toolkit.report.word.package import Template
@@ -209,8 +209,9 @@ def _pictures(runs: Sequence[_Run], drawer: Drawer | None) -> Mapping[str, Pictu
     plots: dict[str, Plot] = {}
     for index, run in enumerate(runs):
         if run.error is None:
-            run.attempt(run.choose)
-            plots |= {f"{index}/{name}": run.job.content.plots[name] for name in run.figures}
+            run.attempt(run.survey)
+            figures = () if run.surveyed is None else run.surveyed.figures
+            plots |= {f"{index}/{name}": run.job.content.plots[name] for name in figures}
     return drawer.pictures(plots) if drawer else {name: draw(plot) for name, plot in plots.items()}
 
 
@@ -221,7 +222,7 @@ class _Run:
         self.job, self.keep = job, keep
         self.publication = contextlib.ExitStack()
         self.stage: Path | None = None
-        self.figures: tuple[str, ...] = ()
+        self.surveyed: Survey | None = None
         self.filled: Filled | None = None
         self.checks: list[Check] = []
         self.error: ToolkitError | None = None
@@ -254,12 +255,15 @@ class _Run:
         stop = RenderError("the report was not finished")
         self.publication.__exit__(type(stop), stop, None)
 
-    def choose(self) -> None:
-        self.figures = needed_figures(self.job.template, self.job.content)
+    def survey(self) -> None:
+        # A template that cannot be used is refused before a figure is drawn.
+        self.surveyed = survey(self.job.template, self.job.content, fonts=True)
 
     def fill(self, pictures: Mapping[str, Picture], allow_missing: bool) -> None:
         job = self.job
-        filled = fill(job.template, job.content, pictures, allow_missing=allow_missing, fonts=True)
+        filled = fill(
+            job.template, job.content, pictures, allow_missing=allow_missing, surveyed=self.surveyed
+        )
         self._file(".docx").write_bytes(filled.docx)
         self.checks += verify_docx(filled)
         self.filled = filled

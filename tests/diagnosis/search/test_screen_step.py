@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
@@ -72,6 +73,7 @@ def test_a_refit_that_stays_near_its_priors_is_looked_at_from_there_alone(tmp_pa
     assert seen is view
 
 
+@pytest.mark.campaign("a whole diagnosis: a lost sign is seen from the declared values in every run")
 def test_an_unsigned_sensor_is_named(tmp_path):
     answer = diagnose(speeds(tmp_path, unsigned=True), None).diagnosis
     assert [effect.name for effect in answer.effects] == ["rectification"]
