@@ -1,5 +1,6 @@
-"""A recording's own evidence about both sides of a disagreement: what its Fy and Mz, its own or corrected ones,
-claim of the tire, judged by physics alone, and what its rows show of continuity.
+"""A recording's own evidence about both sides of a disagreement, and what its rows show of continuity.
+
+Its Fy and Mz, its own or corrected ones, are judged by what they claim of the tire: by physics alone.
 """
 
 from __future__ import annotations

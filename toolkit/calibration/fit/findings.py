@@ -6,7 +6,7 @@ None of them changes the fit. Recommendations of another model are notes.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -31,16 +31,12 @@ from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, fit_sess
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.fit.statement_findings import statement_findings
 from toolkit.calibration.session.known_errors import undeclared_standard
+from toolkit.calibration.session.read import Session
 from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
+from toolkit.calibration.session.table import Table
 from toolkit.errors import SessionError
 from toolkit.findings import Finding
 from toolkit.recording.hidden import hidden_findings
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from toolkit.calibration.session.read import Session
-    from toolkit.calibration.session.table import Table
 
 FEW_POINTS = 30
 REPEATED = 0.1

@@ -28,20 +28,17 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.calibration.fit.printed_digits import own_scatter
+from toolkit.calibration.fit.regression import TermFit
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+from toolkit.calibration.session.read import Session
 from toolkit.calibration.session.statements import Statements, statements_of
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_slopes
-
-if TYPE_CHECKING:
-    from toolkit.calibration.fit.regression import TermFit
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.session.read import Session
-    from toolkit.calibration.session.table import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

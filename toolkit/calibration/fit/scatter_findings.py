@@ -9,9 +9,10 @@ whatever the session's is: what bends is small beside the ratio of two units.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.arrays import Array
 from toolkit.calibration.fit.run_differences import CellGains, cell_gains, copied_runs, odd_run
@@ -19,15 +20,10 @@ from toolkit.calibration.fit.run_scatter import FEWEST_DOF
 from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, session_statements
 from toolkit.calibration.fit.session_rows import are_untold, groups_of
 from toolkit.calibration.records.scatter import chi2_limit
+from toolkit.calibration.session.read import Session
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.findings import Finding
 from toolkit.units import ratio_of_units
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.session.read import Session
-
 
 _RISK = 0.01
 _GROSS = 1e-3  # chance of a chi-square that asks for a look before approval

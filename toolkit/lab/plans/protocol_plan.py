@@ -18,12 +18,11 @@ from toolkit.files import real_path
 from toolkit.findings import FindingEntry
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
-from toolkit.planning.demands import load_of, nominal_loads
+from toolkit.planning.demands import Demand, PrintedUnits, load_of, nominal_loads
 from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
-    from toolkit.planning.demands import Demand, PrintedUnits
     from toolkit.planning.expectation import EarlierTest
     from toolkit.report.word.package import Template
     from toolkit.simulation.plan import Plan

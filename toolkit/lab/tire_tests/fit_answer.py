@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+from typing import Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import UsedRecord
 from toolkit.declared.answers import entry_of
 from toolkit.estimate import Estimate, plus_minus
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import Timing, draft_keys, findings_text, mark_words, signature_words, table
+from toolkit.lab.tire_tests.fit_models import Fitted
+from toolkit.tires.comparison import Comparison
+from toolkit.tires.global_model import GlobalFit
+from toolkit.tires.model import CurveFit
+from toolkit.tires.sweeps import Sweeps
 from toolkit.tires.table_fit import slope_sign
 from toolkit.units import printed
-
-if TYPE_CHECKING:
-    from toolkit.lab.tire_tests.fit_models import Fitted
-    from toolkit.tires.comparison import Comparison
-    from toolkit.tires.global_model import GlobalFit
-    from toolkit.tires.model import CurveFit
-    from toolkit.tires.sweeps import Sweeps
 
 
 class Slope(TypedDict):
