@@ -15,8 +15,8 @@ from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError
 from toolkit.recording.read import read_recording
-from toolkit.simulation.acquisition import program_from
 from toolkit.simulation.plan import read_plan
+from toolkit.simulation.program import program_from
 from toolkit.simulation.run import simulate
 from toolkit.simulation.session import simulate_session
 from toolkit.simulation.write import write_session, write_test

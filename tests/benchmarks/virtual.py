@@ -11,8 +11,8 @@ def virtual_test(folder: Path) -> Path:
     """Return the folder of the packaged virtual test, simulated there on the first call."""
     from toolkit import examples
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.simulation.acquisition import program_from
     from toolkit.simulation.plan import read_plan
+    from toolkit.simulation.program import program_from
     from toolkit.simulation.run import simulate
     from toolkit.simulation.write import write_test
 

@@ -33,10 +33,10 @@ from toolkit.recording.model import Recording, Series, TestInfo
 from toolkit.reduction.model import ReducedTest, Tare
 from toolkit.reduction.physics import RULES
 from toolkit.reduction.reduce import reduce_test
-from toolkit.simulation.acquisition import program_from
 from toolkit.simulation.file_tire import read_file_tire
 from toolkit.simulation.places import channels_of, is_paired, sources_of
 from toolkit.simulation.plan import Plan, read_plan, with_effects
+from toolkit.simulation.program import program_from
 from toolkit.simulation.run import VirtualFile, VirtualTest, simulate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "toolkit" / "examples" / "virtual"

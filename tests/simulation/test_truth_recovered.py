@@ -10,8 +10,8 @@ from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
-from toolkit.simulation.acquisition import program_from
 from toolkit.simulation.plan import read_plan
+from toolkit.simulation.program import program_from
 from toolkit.simulation.run import simulate
 from toolkit.simulation.session import simulate_session
 from toolkit.simulation.write import write_session, write_test

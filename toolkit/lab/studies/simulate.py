@@ -256,7 +256,7 @@ def _program(plan: Plan, registry: Registry | None) -> OwnProgram | None:
     from datetime import date
 
     from toolkit.errors import RegistryError
-    from toolkit.simulation.acquisition import program_from
+    from toolkit.simulation.program import program_from
 
     if registry is None:
         return None
