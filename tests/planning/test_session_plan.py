@@ -11,9 +11,9 @@ import pytest
 from tests.planning.test_fixtures import made
 from toolkit.errors import ConfigError
 from toolkit.planning import session_search
-from toolkit.planning.criteria import Criterion
 from toolkit.planning.fixtures import FeasibleLoads
 from toolkit.planning.knowledge import Knowledge
+from toolkit.planning.row_exchange import Criterion
 from toolkit.planning.session_plan import SessionPlan, plan_session
 from toolkit.planning.session_search import Demand
 

@@ -13,7 +13,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from toolkit.errors import OutputError
+from toolkit.errors import OutputError, UnreadableError
 from toolkit.inputs import RECORDING_FILE, read_regular
 from toolkit.recording.archive import read_members
 from toolkit.recording.sniff import sniff
@@ -191,8 +191,6 @@ def _core_keywords(data: bytes) -> tuple[str, ...]:
 
 
 def _core(data: bytes) -> bytes:
-    from toolkit.errors import UnreadableError
-
     if sniff(data).id != "zip":
         return b""
     try:
