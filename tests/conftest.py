@@ -16,9 +16,11 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from tests.built_once import built_once
 from tests.declared_answers import hold_to_declarations
 from tests.kept_office import kept_office
 from tests.remembered_fits import remember_fits
+from tests.remembered_work import remembered_work
 from toolkit.audit import workers
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
@@ -68,7 +70,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 @pytest.fixture(scope="session", autouse=True)
 def _office() -> Iterator[None]:
-    with kept_office():
+    with kept_office(), remembered_work():
         yield
 
 
@@ -141,9 +143,12 @@ def virtual_test(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan) -
     from toolkit.simulation.run import simulate
     from toolkit.simulation.write import write_test
 
-    folder = tmp_path_factory.mktemp("virtual") / "test"
-    write_test(simulate(virtual_plan), folder)
-    return folder
+    return (
+        built_once(
+            tmp_path_factory, "virtual", lambda folder: write_test(simulate(virtual_plan), folder / "test")
+        )
+        / "test"
+    )
 
 
 @pytest.fixture(scope="session")

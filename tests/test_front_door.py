@@ -288,7 +288,7 @@ def test_an_archive_is_audited(
 
 def test_a_case_is_diagnosed(simulation: toolkit.Simulation, tmp_path: Path) -> None:
     case = simulation.folder.with_name("case") / "CASE.toml"
-    diagnosis = toolkit.diagnose(case, home=toolkit.example("home"), budget_s=2.0)
+    diagnosis = toolkit.diagnose(case, home=toolkit.example("home"), budget_s=0.5)
     assert diagnosis.verdict in {"named", "equivalent", "unknown", "nothing", "untestable"}
     assert diagnosis.verdict in repr(diagnosis)
     assert "effect" in diagnosis.to_dataframe().columns

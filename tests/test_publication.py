@@ -74,7 +74,14 @@ def test_results_replace_the_old_ones_and_nothing_else(tmp_path: Path, kind: str
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+ALIKE = pytest.mark.campaign(
+    "a fresh folder, and one with other files: one that is exchanged is killed at any call in every run"
+)
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[ALIKE] * (kind != "exchanged")) for kind in KINDS]
+)
 def test_killed_at_any_call_the_set_is_never_mixed_and_the_next_command_completes_it(
     tmp_path: Path, kind: str
 ) -> None:

@@ -21,8 +21,8 @@ def test_there_is_a_recipe_for_each_kind_of_addition() -> None:
     assert tuple(title.partition(" ")[2].partition(" ")[2] for title in recipes()) == PROMISED
 
 
-WALKED = ("Add an effect", "Add a command")
-"""A file that is found by being there, and one that another names: the two ways that an addition goes."""
+WALKED = ("Add a command",)
+"""A file that is found by being there, and another one that names it: the ways that an addition goes."""
 OTHER = pytest.mark.campaign("the way of a recipe that every run goes; its files are held in every run")
 
 

@@ -76,10 +76,27 @@ def test_the_index_tells_what_a_tutorial_takes(page: Path) -> None:
     assert EFFORT[page.stem][:3] == (len(commands), len(options), len(files))
 
 
-def test_tutorials_do_what_they_promise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+WALKED = ("first_report", "calibration_session", "three_axis_rig", "own_machine", "own_template")
+"""Of every run: the first page of a new user, and the short ones."""
+ALL = pytest.mark.campaign(
+    "the longer pages as well, which say of audits and diagnoses what other tests hold"
+)
+
+
+@pytest.mark.parametrize(
+    "pages",
+    [
+        pytest.param([page for page in PAGES if page.stem in WALKED], id="walked"),
+        pytest.param(PAGES, id="all", marks=ALL),
+    ],
+)
+def test_tutorials_do_what_they_promise(
+    pages: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.delenv("TOOLKIT_HOME", raising=False)
-    for page in PAGES:
+    assert len(pages) >= len(WALKED)
+    for page in pages:
         text, begun = page.read_text(encoding="utf-8"), processor_s()
         # A page begins in an empty folder, or where the page is that it continues.
         continued = re.search(r"continues in `lab/` of\s+\[[^]]+\]\((\w+)\.md\)", text)
@@ -112,7 +129,13 @@ def same(expected: str, printed: str) -> bool:
     )
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+LONGEST = pytest.mark.campaign("the longest of the notebooks: the others are run cell by cell in every run")
+
+
+@pytest.mark.parametrize(
+    "notebook",
+    [pytest.param(path, id=path.stem, marks=[LONGEST] * (path.stem == "diagnosis")) for path in NOTEBOOKS],
+)
 def test_a_notebook_runs_from_its_first_cell_to_its_last(
     notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,23 +28,35 @@ def files_below(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in files}
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def build(folder: Path) -> None:
     from hatchling.builders.sdist import SdistBuilder
     from hatchling.builders.wheel import WheelBuilder
 
-    def build(folder: Path) -> None:
-        for builder in (WheelBuilder, SdistBuilder):
-            list(builder(str(ROOT)).build(directory=str(folder), versions=["standard"]))
+    for builder in (WheelBuilder, SdistBuilder):
+        list(builder(str(ROOT)).build(directory=str(folder), versions=["standard"]))
 
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The distributions without the site, whose making takes longer than all else."""
+
+    def bare(folder: Path) -> None:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("HATCH_BUILD_NO_HOOKS", "true")
+            build(folder)
+
+    return built_once(tmp_path_factory, "bare", bare)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The distributions as they are released."""
     # Once for all workers: the site in it is made in one place of the checkout.
     return built_once(tmp_path_factory, "dist", build)
 
 
-@pytest.fixture(scope="module")
-def environment(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A new environment with nothing of the toolkit but the wheel; its libraries are those of this one."""
-    folder = tmp_path_factory.mktemp("environment")
+def installed(folder: Path, built: Path) -> Path:
+    """Return a new environment with nothing of the toolkit but a wheel; it shares the libraries."""
     venv.create(folder, with_pip=False)
     site = next(folder.glob("lib/python*/site-packages"))
     libraries = Path(np.__file__).parents[1]
@@ -89,8 +101,16 @@ def test_the_version_is_stated_everywhere() -> None:
         assert f"tire_lab_toolkit-{__version__}-py3-none-any.whl" in (ROOT / page).read_text()
 
 
-def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) -> None:
-    (wheel,) = built.glob("*.whl")
+SITE = pytest.mark.campaign(
+    "the wheel with its site, which Sphinx makes: every run builds and installs it without"
+)
+
+
+@pytest.mark.parametrize("kind", ["built", pytest.param("whole", marks=SITE)])
+def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(
+    request: pytest.FixtureRequest, kind: str
+) -> None:
+    (wheel,) = request.getfixturevalue(kind).glob("*.whl")
     assert wheel.name == f"{DISTRIBUTION.replace('-', '_')}-{__version__}-py3-none-any.whl"
     with zipfile.ZipFile(wheel) as archive:
         inside = {name for name in archive.namelist() if ".dist-info/" not in name}
@@ -98,7 +118,8 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) 
     expected = {f"toolkit/{name}" for name in files_below(ROOT / "toolkit")}
     for home in ("calibrations", "report_templates"):
         expected |= {f"toolkit/_home/{home}/{name}" for name in files_below(ROOT / home)}
-    expected |= {f"toolkit/_site/{name}" for name in files_below(ROOT / "build" / "docs")}
+    if kind == "whole":
+        expected |= {f"toolkit/_site/{name}" for name in files_below(ROOT / "build" / "docs")}
     assert inside == expected
     assert f"Name: {DISTRIBUTION}\n" in metadata
     assert {f"Provides-Extra: {extra}" for extra in ("tdms", "mdf", "parquet", "cluster")} <= set(
@@ -106,8 +127,9 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_the_home(built: Path) 
     )
 
 
-def test_the_site_asks_no_other_host(built: Path) -> None:
-    (wheel,) = built.glob("*.whl")
+@SITE
+def test_the_site_asks_no_other_host(whole: Path) -> None:
+    (wheel,) = whole.glob("*.whl")
     asked = re.compile(
         r"""(?:<(?:script|link|img|iframe)[^>]*(?:src|href)=["']|url\(["']?|@import ["'])https?:"""
     )
@@ -130,15 +152,16 @@ def test_the_source_distribution_holds_what_builds_and_tests_it(built: Path) -> 
     assert "tests/test_wheel.py" in inside
 
 
-EACH = pytest.mark.campaign("the steps that the demonstration goes as well, each by a command of its own")
+@pytest.mark.parametrize("kind", ["built", pytest.param("whole", marks=SITE)])
+def test_the_whole_path_from_another_folder(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, tmp_path: Path, kind: str
+) -> None:
+    """A home by the installed command, from the package's own records and templates.
 
-
-@pytest.mark.parametrize("each", [False, pytest.param(True, marks=EACH)])
-def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path, each: bool) -> None:
-    """A home and the demonstration by the installed command: a session, its record, a test and its report.
-
-    ``each`` goes the steps of the demonstration one by one as well, in the new home.
+    The ``whole`` wheel goes on: its pages, a session, its record, a test and its report, and the
+    demonstration, which goes these steps by itself.
     """
+    environment = installed(tmp_path_factory.mktemp("environment"), request.getfixturevalue(kind))
     program = environment / "bin" / "toolkit"
 
     def run(*words: object, codes: tuple[int, ...] = (0,)) -> str:
@@ -156,12 +179,16 @@ def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path, e
     assert Path(place.stdout.strip()).is_relative_to(environment)
     assert run("--version").strip() == f"toolkit {__version__}"
     assert "--no-browser" in run("open", "--help")
-    page = Path(run("docs", "--no-browser").strip())
-    assert page.is_relative_to(environment)
-    assert "Tutorials" in page.read_text()
-    examples = Path(place.stdout.strip()).parent / "examples" / "virtual"
+    package = Path(place.stdout.strip()).parent
+    examples = package / "examples" / "virtual"
     run("init", "lab")
-    if each:
+    assert (tmp_path / "lab" / "report_templates" / "org.docx").is_file()
+    records = run("calibration", "list", "--calibrations", package / "_home" / "calibrations")
+    assert "m15-virtual-r1" in records
+    if kind == "whole":
+        page = Path(run("docs", "--no-browser").strip())
+        assert page.is_relative_to(environment)
+        assert "Tutorials" in page.read_text()
         run("simulate", examples / "session_plan.toml", "--out", "session", "--home", "lab")
         run("calibrate", "session/SESSION.toml", "--home", "lab")
         run("calibration", "approve", "m15-virtual-r1", "--in-force-from", "2026-03-03", "--checked-by",
@@ -171,7 +198,7 @@ def test_the_whole_path_from_another_folder(environment: Path, tmp_path: Path, e
         run("report", "test.xlsx", "--template", "lab/report_templates/org.docx", "--out", "out",
             "--home", "lab", codes=(1,))  # fmt: skip
         assert {path.suffix for path in (tmp_path / "out").iterdir()} >= {".docx", ".pdf"}
-    assert "verified: True" in run("demo", "--out", "demo")
+        assert "verified: True" in run("demo", "--out", "demo")
 
 
 def test_help_needs_no_library_of_numbers_or_documents() -> None:

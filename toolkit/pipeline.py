@@ -5,27 +5,24 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from toolkit.calibration.records.record import CalibrationRecord
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.model import Characteristics
 from toolkit.errors import ConfigError, RecordingError
 from toolkit.findings import Finding
-from toolkit.machine import load_machine, own_text
+from toolkit.machine import Machine, Protocol, load_machine, own_text
+from toolkit.recording.folder import TestFolder
 from toolkit.recording.hidden import hidden_findings
+from toolkit.recording.model import Recording
 from toolkit.recording.read import read_recording
 from toolkit.reduction.corrections import tare_of_file
 from toolkit.reduction.health import health_findings
 from toolkit.reduction.model import ReducedTest, Tare
 from toolkit.reduction.reduce import reduce_test
 from toolkit.reduction.sweep import sweeps_of
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.machine import Machine, Protocol
-    from toolkit.recording.folder import TestFolder
-    from toolkit.recording.model import Recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

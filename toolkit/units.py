@@ -24,10 +24,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import UnitError
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
     from pint import UnitRegistry
 
 # What files, certificates and people write -> an expression of the registry. Everything else that pint
@@ -304,7 +305,7 @@ def _in_words(text: str, meanings: Mapping[str, str]) -> str:
     return _WORD.sub(lambda match: meanings.get(match[0], match[0]), text)
 
 
-def to_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
+def to_si(values: ArrayLike, text: str) -> Array:
     """Return values in SI; the shape is kept.
 
     >>> to_si([1.0, 2.0], "lbf").round(3).tolist()
@@ -316,7 +317,7 @@ def to_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
     return np.asarray(values, dtype=np.float64) * stated.factor + stated.offset
 
 
-def from_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
+def from_si(values: ArrayLike, text: str) -> Array:
     """Return SI values in a unit for people; the inverse of `to_si`."""
     stated = unit(text)
     return (np.asarray(values, dtype=np.float64) - stated.offset) / stated.factor

@@ -328,6 +328,9 @@ def test_a_certificate_that_is_not_there_is_named(tmp_path):
     assert error.got.startswith("certificates that cannot be used")
 
 
+@pytest.mark.campaign(
+    "two more processes of a cluster: one without certificates answers, dies and loses files in every run"
+)
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates of this test")
 def test_a_cluster_behind_certificates(tmp_path):
     ours, other = certificate(tmp_path, "ours"), certificate(tmp_path, "other")

@@ -74,6 +74,7 @@ WHITE = pytest.mark.campaign("white noise, which asks less than the coloured one
 MORE = pytest.mark.campaign("twice as many draws")
 
 
+@pytest.mark.campaign("dozens of drawn sweeps: lengths of known tires lie within their U in every run")
 @pytest.mark.parametrize(
     ("rho", "draws"),
     [pytest.param(0.0, 40, marks=WHITE), (0.9, 20), pytest.param(0.9, 40, marks=MORE)],

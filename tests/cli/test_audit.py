@@ -129,6 +129,7 @@ def test_progress_stays_off_what_is_no_terminal(archive):
     assert result.stderr == ""
 
 
+@pytest.mark.campaign("an amended report as a document: which reports are to be amended is told in every run")
 def test_a_report_by_a_withdrawn_record_is_amended_and_names_what_it_replaces(tmp_path):
     from tests.audit.test_archive_findings import WRONG, whole_test
 

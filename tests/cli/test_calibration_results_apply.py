@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -234,8 +232,12 @@ def test_a_row_beyond_the_calibrated_range_is_a_finding(rig: Path, tmp_path: Pat
     assert math.isclose(told["loads"]["FX"]["largest"], 18e3, rel_tol=1e-3)
 
 
-def test_the_commands_from_an_empty_folder_as_a_person_types_them(rig: Path, tmp_path: Path) -> None:
-    """Init, calibrate and apply by processes of their own, with relative names."""
+def test_the_commands_from_an_empty_folder_as_a_person_types_them(
+    rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Init, calibrate and apply with relative names, from the folder itself."""
+    monkeypatch.delenv("TOOLKIT_HOME", raising=False)
+    monkeypatch.chdir(tmp_path)
     for name in ("SESSION.toml", "loads.csv", "check.csv"):
         (tmp_path / name).write_bytes((rig / name).read_bytes())
     indications(tmp_path / "data.csv")
@@ -245,9 +247,6 @@ def test_the_commands_from_an_empty_folder_as_a_person_types_them(rig: Path, tmp
         "calibration apply press-7-r1 data.csv --out loads.xlsx --on 2026-02-05",
     ]  # fmt: skip
     for line in typed:
-        done = subprocess.run(
-            [sys.executable, "-m", "toolkit", *line.split()], cwd=tmp_path, capture_output=True, text=True,
-            check=False,
-        )  # fmt: skip
-        assert done.returncode in (0, 1), done.stdout + done.stderr
+        done = commands.said(*line.split())
+        assert done.code in (0, 1), done.out + done.err
     assert (tmp_path / "loads.xlsx").is_file()

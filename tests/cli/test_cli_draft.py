@@ -16,6 +16,7 @@ import pytest
 
 from tests import commands
 from tests.cli.test_compare import maker
+from tests.report.template_factory import make, p
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry, today
@@ -144,7 +145,10 @@ def test_every_page_of_a_draft_is_marked(
     home: Path, draft_file: Path, virtual_test: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    code, answer = toolkit(home, "report", draft_file, "--draft", "--hand-over", "--out", out)
+    turn = '<w:p><w:r><w:br w:type="page"/></w:r></w:p>'
+    body = p("{{tk:report.id}} {{tk:calibration.status}}") + 5 * (turn + p("{{tk:test.name}}"))
+    words = ("--template", make(tmp_path, body), "--out", out)
+    code, answer = toolkit(home, "report", draft_file, "--draft", "--hand-over", *words)
     assert (code, answer["draft"], answer["verified"]) == (1, True, True)
     pages = text_of(Path(answer["pdf"]))
     assert len(pages) == answer["pages"] > 5
@@ -163,6 +167,7 @@ def test_every_page_of_a_draft_is_marked(
     assert "draft" not in {one["rule"] for one in answer["findings"]}
 
 
+@pytest.mark.campaign("two further documents of a draft: every page of its report is marked in every run")
 @office_needed
 def test_a_draft_of_a_certificate_and_of_a_comparison(home: Path, draft_file: Path, tmp_path: Path) -> None:
     words = ("calibration", "certificate", REFUSED, "--draft", "--out", tmp_path / "certificate")

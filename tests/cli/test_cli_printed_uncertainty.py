@@ -83,6 +83,7 @@ def tire(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.campaign("models of a table: tests and comparisons are printed with their digits in every run")
 def test_fitted_models(tire: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = printed(capsys, "fit", tire, "--model", "magic_formula", "--model", "mf52")
     assert len(PAIR.findall(text)) >= 10

@@ -208,15 +208,19 @@ def test_people_read_it_in_their_units(virtual_test: Path, other_test: Path) -> 
     assert first(si) / first(lbf) == pytest.approx(4.448, rel=0.02)
 
 
+AGAIN = pytest.mark.campaign("a second document: the hash of a report is the same twice in every run")
+
+
 @pytest.mark.usefixtures("read_once")
 @pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")), reason="LibreOffice and poppler make the PDF"
 )
+@pytest.mark.parametrize("runs", [("one",), pytest.param(("one", "two"), marks=AGAIN)])
 def test_the_document_is_verified_and_two_runs_agree(
-    virtual_test: Path, other_test: Path, tmp_path: Path
+    virtual_test: Path, other_test: Path, tmp_path: Path, runs: tuple[str, ...]
 ) -> None:
     made = []
-    for name in ("one", "two"):
+    for name in runs:
         _, answer = toolkit(
             "compare", virtual_test, other_test, "--out", tmp_path / name, "--known-at", "2026-04-01"
         )
@@ -227,7 +231,7 @@ def test_the_document_is_verified_and_two_runs_agree(
     assert made[0]["verified"]
     assert made[0]["warnings"] == []
     assert len(made[0]["figures"]) == 7
-    assert made[0]["content_sha256"] == made[1]["content_sha256"]
+    assert made[0]["content_sha256"] == made[-1]["content_sha256"]
 
 
 @pytest.mark.usefixtures("read_once")

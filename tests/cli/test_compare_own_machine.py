@@ -42,7 +42,7 @@ def home(tmp_path_factory: pytest.TempPathFactory, virtual_test: Path) -> Path:
     return folder
 
 
-def test_a_reduced_test_is_compared_and_planned_by_without_its_machines_file(
+def test_a_reduced_test_is_compared_without_its_machines_file(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     moved = tmp_path / "elsewhere"
@@ -51,11 +51,21 @@ def test_a_reduced_test_is_compared_and_planned_by_without_its_machines_file(
     monkeypatch.chdir(moved)
     table = maker(moved / "maker.csv")
     assert toolkit("compare", "a.xlsx", table)[0] in (0, 1)
+
+
+@pytest.mark.campaign(
+    "a plan of another laboratory's machine: a plan by the virtual one is made in every run"
+)
+def test_a_reduced_test_is_planned_by_without_its_machines_file(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(home / "reduced.xlsx", tmp_path / "a.xlsx")
     code, planned = toolkit("plan", "test", "--like", "a.xlsx", "--u", "conicity", "--load", "833 lbf")
     assert (code, planned["machine"]) == (0, "m15-virtual")
 
 
-@pytest.mark.campaign("a plan by the folder of the test: that by its reduced test is made in every run")
+@pytest.mark.campaign("a plan by the folder of the test: a plan by the virtual machine is made in every run")
 def test_a_test_by_a_path_is_planned_by(home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     asked = ("--u", "conicity", "--load", "833 lbf", "--out", "p")

@@ -78,6 +78,7 @@ def test_what_was_left_out_is_named_shown_and_predicted(run, tmp_path):
     assert away["augmented"] < 3 < away["refitted"]
 
 
+@pytest.mark.campaign("two whole diagnoses: frozen answers come again bit by bit in every run (tests/golden)")
 def test_an_answer_repeats_but_for_its_timing(run, tmp_path):
     case = write_case(tmp_path, HEAD + TWO + PREDICT, more__csv=carriage(seed=7, rows=20))
     texts = []
@@ -141,6 +142,7 @@ def test_no_number_of_a_search_that_did_not_run_is_made_up(run, tmp_path):
     assert made["fit"]["held_out"][0]["noise_floor"] is None
 
 
+@pytest.mark.campaign("a second effect: the answer of one is held key by key in every run")
 def test_an_effect_of_some_runs_names_them(run, tmp_path):
     dated = TWO.replace('"r0.csv"\n', '"r0.csv"\ndate = "2026-03-01"\n') + 'date = "2026-03-02"\n'
     files = {f"r{i}__csv": carriage(seed=i, coulomb=0.0) for i in range(2)}

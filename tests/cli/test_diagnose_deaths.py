@@ -120,6 +120,9 @@ def test_the_last_words_are_in_the_error_without_what_a_terminal_would_obey(tmp_
     assert "\x1b" not in error["got"]
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis: what a simulator prints is kept from the answer in every run (test_user_code)"
+)
 def test_a_simulator_that_prints_without_end_does_not_end_the_tool(tmp_path, answered):
     says = "os.write(2, b'n' * 300_000)\n    print('n' * 300_000)\n    os.system('echo more')\n    "
     case = write_case(tmp_path, simulator=START + says + GOOD)
@@ -129,6 +132,9 @@ def test_a_simulator_that_prints_without_end_does_not_end_the_tool(tmp_path, ans
     assert ended.stderr == ""
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis in which most runs die: refused parameters are told in every run (test_user_code)"
+)
 def test_one_set_of_parameters_that_kills_is_a_failed_run_and_told(tmp_path, answered):
     dies = "if p['mass'] != 94.0: print('only 94', flush=True); os._exit(5)\n    "
     case = write_case(tmp_path, simulator=START + dies + GOOD)
@@ -181,10 +187,17 @@ def test_a_fork_bomb_is_ended(tmp_path):
     assert alive(mark) == []
 
 
-BETWEEN = pytest.mark.campaign("a signal that is told neither as the interrupt is nor cannot be caught")
+BETWEEN = pytest.mark.campaign("a signal that can be caught: one that cannot ends the worker in every run")
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=BETWEEN), signal.SIGKILL])
+@pytest.mark.parametrize(
+    "sent",
+    [
+        pytest.param(signal.SIGINT, marks=BETWEEN),
+        pytest.param(signal.SIGTERM, marks=BETWEEN),
+        signal.SIGKILL,
+    ],
+)
 def test_the_worker_ends_with_the_tool(tmp_path, sent):
     mark = f"MARK_{os.getpid()}_{tmp_path.name}"
     waits = f"open({str(tmp_path / 'begun')!r}, 'w').close(); time.sleep(600)\n    "
@@ -218,6 +231,9 @@ def test_a_call_in_compiled_code_ends_with_the_budget(tmp_path, answered):
     assert json.loads(ended.stdout)["complete"] is False
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis first: the same worker runs a case's code, whose deaths are told in every run"
+)
 def test_a_model_file_runs_its_code_apart_as_well(tmp_path, answered):
     case = write_case(tmp_path, simulator=SIMULATOR)
     assert answered("diagnose", case, "--out", tmp_path / "answer").returncode == 1

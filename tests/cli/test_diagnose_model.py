@@ -27,6 +27,9 @@ def answered(run, tmp_path_factory):
     return folder
 
 
+@pytest.mark.campaign(
+    "a diagnosis by the command: that a model misses nothing is held in every run (test_model_text)"
+)
 def test_the_model_as_the_simulation_misses_nothing_and_ends_with_0(run, answered, tmp_path):
     model = answered / "out" / "model.toml"
     found = run("diagnose", answered / "CASE.toml", "--model", model, "--out", tmp_path / "again", "--json")
@@ -103,6 +106,9 @@ def test_inputs_belong_to_a_model_file(run, tmp_path):
     assert found.exception.rule == "model-file"
 
 
+@pytest.mark.campaign(
+    "the document by the command: an answer's document is made and told in every run (tests/report/diagnosis)"
+)
 @pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")), reason="LibreOffice and poppler make the PDF"
 )

@@ -157,6 +157,11 @@ def test_swapped_axes_are_a_finding_and_nothing_is_flipped(tmp_path):
     found = [one for one in told["findings"] if one["rule"] == "axes-contradiction"]
     assert {one["where"].rsplit(" ", 1)[-1] for one in found} == {"FY", "MZ"}
     assert next(one for one in told["fits"] if one["channel"] == "FY")["error_percent"] > 20
+
+
+@pytest.mark.campaign("the same table in its own axes: other tables are fitted in theirs in every run")
+def test_a_table_in_the_axes_that_are_stated_has_no_finding(tmp_path):
+    path = write(tmp_path / "swapped.csv")
     code, out = run(path, *models("mf52"), "--axes", "adapted-SAE", "--json")
     assert code == 0
     assert json.loads(out)["fits"][0]["error_percent"] < 2

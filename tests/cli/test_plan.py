@@ -157,6 +157,7 @@ def test_the_sheet_of_the_next_run_draws_what_each_member_predicts(run, diagnose
     assert (tmp_path / "n" / "plan.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.campaign("the text beside the answer, whose numbers and files are held in every run")
 def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
     shown = run("plan", "next", diagnosed)
     assert shown.return_value == 0, shown
@@ -213,6 +214,9 @@ def test_a_limit_below_what_was_recorded_is_kept_and_the_repeat_is_still_that_of
     assert json.loads(planned.stdout)["power_of_repeat"] == pytest.approx(free["power_of_repeat"], abs=0.2)
 
 
+@pytest.mark.campaign(
+    "a second limit: a range that is stated is kept in every run, and rates in tests/planning/test_drives.py"
+)
 def test_a_rate_that_is_stated_is_kept(run, diagnosed, tmp_path):
     planned = run("plan", "next", diagnosed, "--rate", "u=1.5", "--limit", "u=-4..4", "--out", "n", "--json")
     assert planned.return_value == 0, planned
@@ -221,6 +225,9 @@ def test_a_rate_that_is_stated_is_kept(run, diagnosed, tmp_path):
     assert max(abs(b - a) for a, b in itertools.pairwise(u)) <= 1.5 * (t[1] - t[0]) * (1 + 1e-6)
 
 
+@pytest.mark.campaign(
+    "a second search to the nearest limit: a test that cannot be had names the nearest in every run"
+)
 def test_limits_that_no_run_keeps_name_the_nearest_that_one_does(run, diagnosed, tmp_path):
     failed = run("plan", "next", diagnosed, "--limit", "u=5..6", "--out", "n")
     error = failed.exception
@@ -291,7 +298,7 @@ def in_time(monkeypatch, sought):
 
 
 def test_sweeps_of_a_relaxation_length_are_simulated_and_processed(run, in_time, tmp_path):
-    planned = run("plan", "test", *SWEPT, "--u", "slope_cornering=4 %", "--out", "p", "--json")
+    planned = run("plan", "test", *SWEPT, "--out", "p", "--json")
     assert planned.return_value == 0, planned
     answer = json.loads(planned.stdout)
     sweeps = answer["sweeps"]

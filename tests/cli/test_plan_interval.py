@@ -33,6 +33,9 @@ def run(home: Path, *arguments: object) -> tuple[int, dict[str, Any]]:
     return code, json.loads(said)
 
 
+@pytest.mark.campaign(
+    "two more intervals: the interval of a drift is held in every run (tests/planning/test_interval.py)"
+)
 def test_a_faster_drift_is_due_sooner(tmp_path: Path) -> None:
     """The span grows by 0.2 and by 0.9 permille a year; the tolerance is one permille at full scale."""
     answers = []
@@ -52,6 +55,7 @@ def test_a_faster_drift_is_due_sooner(tmp_path: Path) -> None:
     assert slow["in_use"] == "12 months"
 
 
+@pytest.mark.campaign("the sheet of another plan: that of a test is drawn in every run")
 @pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
 def test_the_sheet_draws_the_risk_over_the_days(tmp_path: Path) -> None:
     home = home_of(tmp_path / "home", [1 + 0.0005 * i for i in range(7)])

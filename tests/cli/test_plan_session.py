@@ -127,6 +127,7 @@ def test_a_plan_never_overwrites_readings(planned: tuple[Path, dict[str, Any]], 
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+@pytest.mark.campaign("the sheet of another plan: that of a test is drawn in every run")
 @pytest.mark.skipif(not shutil.which("soffice"), reason="LibreOffice is not installed")
 def test_a_template_makes_the_sheet_of_the_same_steps(home: Path, tmp_path: Path) -> None:
     out = tmp_path / "next"
@@ -258,6 +259,9 @@ def candidate(folder: Path) -> Path:
     return folder / "lab"
 
 
+@pytest.mark.campaign(
+    "two plans by a machine's own fixtures: fixtures are read and planned by in every run (tests/planning)"
+)
 def test_a_machine_definition_states_what_can_be_loaded(tmp_path: Path) -> None:
     home, machine = candidate(tmp_path), tmp_path / "cell.toml"
     machine.write_text(LOADING)

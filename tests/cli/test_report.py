@@ -21,9 +21,8 @@ from toolkit.cli.template import check, new, tags
 from toolkit.errors import ConfigError, OutputError, TemplateError
 from toolkit.findings import Finding
 from toolkit.lab.home import home_template
-from toolkit.lab.tire_tests import resolve
+from toolkit.lab.tire_tests import resolve, tire_files
 from toolkit.lab.tire_tests.handover import details_of
-from toolkit.lab.tire_tests.tire_files import fit_test_tire
 from toolkit.recording.marks import is_own_output
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tydex import read_tydex
@@ -218,7 +217,7 @@ def test_the_hand_over_has_one_manifest_and_the_content_hash_is_the_same_twice(
     assert said in (out / "test.tdx").read_text()
     assert read_tir(out / "tire.tir").version is not None
     # Who is given the tire file is told what its fit leaves open.
-    of_fit = [finding.as_dict() for finding in fit_test_tire(made.result.reduced).findings()]
+    of_fit = [finding.as_dict() for finding in tire_files.fit_test_tire(made.result.reduced).findings()]
     assert of_fit
     assert [one for one in told[0]["findings"] if one["where"].startswith("tire file, mf61")] == of_fit
 

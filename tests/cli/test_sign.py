@@ -137,6 +137,7 @@ def test_a_certificate_is_issued_by_a_key_elsewhere(run: Run, tmp_path: Path) ->
     assert (code, out.startswith("continues")) == (0, True)
 
 
+@pytest.mark.campaign("a second certificate, by an RSA key: one is issued by a key elsewhere in every run")
 @pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")),
     reason="LibreOffice or poppler is not installed",

@@ -417,6 +417,7 @@ def watch(*words: object) -> list[str]:
             "--interval", "0.1"]  # fmt: skip
 
 
+@pytest.mark.campaign("a process that watches, with a whole report: each of its steps is held in every run")
 @office_needed
 def test_a_test_that_arrives_bit_by_bit_is_reported_when_it_is_whole(
     virtual_test: Path, tmp_path: Path

@@ -57,6 +57,7 @@ def test_even_numbers_agree_with_a_mixed_model() -> None:
     assert precision.s_L**2 == pytest.approx(float(np.asarray(mixed.cov_re)[0, 0]), rel=1e-3)
 
 
+@pytest.mark.campaign("many drawn comparisons: published ones are recomputed in every run")
 def test_uneven_numbers_estimate_without_bias() -> None:
     """Over 2000 drawn comparisons of uneven numbers the variances are the true ones."""
     rng = np.random.default_rng(9)

@@ -24,7 +24,18 @@ def bench(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     return Bench(quick_folder, tmp_path_factory.mktemp("crash"), runner)
 
 
-@pytest.mark.parametrize("command", QUICK, ids=lambda command: command.name)
+PLAIN = pytest.mark.campaign(
+    "a single file into a folder: commands that write several are killed in every run"
+)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(command, id=command.name, marks=[PLAIN] * (command.name == "template new"))
+        for command in QUICK
+    ],
+)
 def test_nothing_is_lost_or_mixed_and_the_next_run_gives_the_same(bench: Bench, command) -> None:
     # An error of the disk is answered as a full one is: the commands that sign have it.
     count = bench.judge(command, most=3, faults=("kill", "no space"))
@@ -40,7 +51,9 @@ def signed(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Bench:
 ALIKE = pytest.mark.campaign(
     "an entry in the list of persons, or in the ledger, is cut off by another command"
 )
-FURTHER = ("person enrol", "person revoke", "calibration withdraw (answered)")
+FURTHER = (
+    "person enrol", "person revoke", "calibration withdraw (answered)", "calibration withdraw (requested)",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(

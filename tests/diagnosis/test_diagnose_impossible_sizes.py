@@ -37,6 +37,7 @@ DAMPER = case_text(
 )  # fmt: skip
 
 
+@pytest.mark.campaign("an impossible size of an equation: that of a function is held in every run")
 def test_a_mug_that_takes_up_heat_does_not_creep(tmp_path):
     """Water and mug are two thermal masses: two decays, in closed form, where Newton's law has one."""
     t = np.arange(220) * 30.0

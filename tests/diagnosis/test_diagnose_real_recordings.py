@@ -58,6 +58,9 @@ def test_the_programs_sign_of_E5(tmp_path):
     assert made.fit.held_out[0].augmented_rmse < 1e-3
 
 
+@pytest.mark.campaign(
+    "the longest of the recordings: a heavier ball falls in every run, and a drag is named by unseen runs"
+)
 def test_a_light_ball_is_held_back_by_the_air(tmp_path):
     made = diagnosed("whiffle-1", tmp_path)
     assert len(made.effects) == 1

@@ -113,6 +113,7 @@ def test_a_makers_flat_table_against_a_drum_is_its_curvature(tmp_path):
         assert one.augmented_rmse < 1.1 * one.noise_floor < 0.5 * one.nominal_rmse
 
 
+@pytest.mark.campaign("a second carcass: a maker's flat table against the drum is diagnosed in every run")
 def test_a_soft_carcass_loses_more_of_its_moment_to_the_drum_and_no_other_of_its_force(tmp_path):
     # Slopes of the force by 0.86, of the moment by 0.86^1.9: a carcass that bends takes from the trail too.
     frame, left = steps(), 0.86

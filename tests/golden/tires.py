@@ -13,7 +13,7 @@ from tests.golden.surface import PLANS
 from tests.golden.workplace import Workplace, csv_columns
 
 GLOBAL = ("pacejka94", "mf52", "mf61", "mf62", "tmeasy", "treadsim", "lugre", "brush")
-QUICK = ("pacejka94", "mf52", "tmeasy", "brush")
+QUICK = ("mf52", "brush")
 TIRE_FILES = ("mf52", "mf61", "mf62")
 FITTED_AS = ("--rated-load", 3700, "--radius", 0.316, "--side", "LEFT")
 AXES = ("ISO-W", "SAE", "adapted-SAE", "machine")

@@ -65,6 +65,7 @@ def drawn(design: Design, seed: int) -> TestResult:
 WHOLE = pytest.mark.campaign("the machine's whole protocol: a plan of few steps asks more of the prediction")
 
 
+@pytest.mark.campaign("drawn tests of a design: its scatter stands against its formula in every run")
 @pytest.mark.parametrize("design", [pytest.param(PROTOCOL, marks=WHOLE), PLAN], ids=["protocol", "plan"])
 def test_the_uncertainty_that_is_predicted_is_that_of_tests_of_the_design(design: Design) -> None:
     known = dataclasses.replace(earlier(), load_spread=0.0)

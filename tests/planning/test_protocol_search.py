@@ -11,6 +11,7 @@ import pytest
 from tests.characteristics.tire_factory import C_FY, M15, at_load
 from tests.planning.planning_factory import LOADS, earlier
 from toolkit.errors import ConfigError
+from toolkit.planning import protocol_search
 from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import Design, Pace, standard
 from toolkit.planning.protocol_search import (
@@ -66,6 +67,7 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
         assert screened == pytest.approx(found.worst, rel=0.05)
 
 
+@pytest.mark.campaign("four searches of one size each: the whole search is held in every run")
 def test_more_slip_angles_are_never_worse() -> None:
     asked = question("conicity", loads=LOADS[2:3], measured=NEAR)
     search = ProtocolSearch(asked, tread(measured=NEAR), LOADS[2:3])
@@ -78,6 +80,7 @@ def test_a_demand_of_one_direction_needs_no_reversed_run() -> None:
     assert found.design.rotations == ("forward",)
 
 
+@pytest.mark.campaign("one more plan: what a curve asks of its slip angles is held in every run")
 def test_every_plan_measures_a_curve_to_its_peak_on_both_sides() -> None:
     asked = question("conicity", loads=LOADS[2:3], measured=NEAR)
     degrees = np.degrees(least_plan(asked, tread(measured=NEAR)).design.slip_angles_rad)
@@ -120,6 +123,7 @@ def test_a_demand_at_a_slip_angle_that_no_test_measures_is_refused() -> None:
     assert ", 5, " in str(error.value.expected)
 
 
+@pytest.mark.usefixtures("few_starts")
 def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
     asked = question("slope_cornering=4 %", loads=LOADS[2:3], measured=NEAR)
     free = least_plan(asked, tread(measured=NEAR))
@@ -133,6 +137,13 @@ def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
     assert impossible.excess > 0
 
 
+@pytest.fixture
+def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits are kept wherever the exchange starts: of more starts a plan is a little shorter at most."""
+    monkeypatch.setattr(protocol_search, "_STARTS", 2)
+
+
+@pytest.mark.usefixtures("few_starts")
 def test_a_limit_of_warmth_costs_pauses_and_they_count_in_the_time() -> None:
     asked = question("slope_cornering=3 %", loads=LOADS[2:3], measured=NEAR)
     free = least_plan(asked, tread(measured=NEAR))

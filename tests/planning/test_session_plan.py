@@ -89,6 +89,9 @@ def test_the_same_seed_gives_the_same_plan(
     assert again.outlook == fewest.outlook
 
 
+@pytest.mark.campaign(
+    "one more search: an uncertainty that cannot be had names the nearest plan in every run"
+)
 @pytest.mark.usefixtures("few_runs")
 def test_less_uncertainty_takes_more_loads(
     knowledge: Knowledge, feasible: FeasibleLoads, fewest: SessionPlan
@@ -147,6 +150,7 @@ def test_contradictory_demands_name_both_ways_out(knowledge: Knowledge, feasible
     assert "for this U; or 30 loads" in str(refused.value.expected)
 
 
+@pytest.mark.campaign("one more search: time, uncertainty and loads are each kept by a plan in every run")
 @pytest.mark.usefixtures("few_runs")
 def test_more_loads_than_serve_are_no_plan_of_their_own(
     knowledge: Knowledge, feasible: FeasibleLoads, monkeypatch: pytest.MonkeyPatch
@@ -198,7 +202,10 @@ def test_loads_of_two_levels_are_refused_unless_that_is_asked_for(
     assert any("can be seen" in text for text in plan.gives_up)
 
 
-@pytest.mark.parametrize("by", ["D", "I", "G"])
+OTHER = pytest.mark.campaign("another criterion: that of the whole covariance plans in every run")
+
+
+@pytest.mark.parametrize("by", ["D", *(pytest.param(name, marks=OTHER) for name in ("I", "G"))])
 def test_a_plan_has_three_levels_of_each_load_and_repeats(
     knowledge: Knowledge, fixtures: FeasibleLoads, by: Criterion
 ) -> None:

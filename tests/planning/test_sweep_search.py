@@ -78,6 +78,9 @@ def test_two_speeds_within_the_limits_of_the_machine_where_nobody_states_a_delay
         assert stated.steer_rates_rad_s[0] - 1e-9 <= rate <= stated.steer_rates_rad_s[1] + 1e-9
 
 
+@pytest.mark.campaign(
+    "two more searches: sweeps at two speeds, where no delay is stated, are planned in every run"
+)
 def test_a_stated_delay_takes_one_speed_and_its_uncertainty_is_in_the_budget() -> None:
     sure = machine(delay=Delay(value_s=0.0, u_s=0.001, source="test"))
     choice = least("relaxation_length=40 mm", sure)
@@ -114,6 +117,9 @@ def test_both_ends_of_the_prior_are_served_and_a_measured_length_takes_its_place
     assert reach.value == pytest.approx(0.43)
 
 
+@pytest.mark.campaign(
+    "sixteen sweeps are fitted: one plan of sweeps is simulated and processed in every run (cli/test_plan.py)"
+)
 def test_what_is_promised_is_what_sweeps_on_the_same_tire_say() -> None:
     choice = least_of_40_mm()
     design, rng = choice.design, np.random.default_rng(3)

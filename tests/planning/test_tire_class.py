@@ -84,6 +84,7 @@ def test_a_plan_for_a_class_serves_the_tires_between(names: tuple[str, ...]) -> 
         assert max(ratios) < 1.01, (stiffness, friction, ratios)
 
 
+@pytest.mark.campaign("two searches more: a class is planned for and served in every run")
 def test_a_class_costs_what_its_most_demanding_tire_costs() -> None:
     demands, measured = (parse_demand("conicity"),), LOADS[1:4]
     protocol = dataclasses.replace(PROTOCOL, loads_N=measured)

@@ -84,8 +84,14 @@ def test_names_are_the_contracts_and_what_is_outside_is_not() -> None:
         assert set(group.present) <= group.members <= CATALOGUE
 
 
+STIRRED = pytest.mark.campaign("the slowest of the buckets: each other one is drawn twice in every run")
+
+
 @pytest.mark.usefixtures("entered_here")
-@pytest.mark.parametrize(("bucket", "picked"), QUICK)
+@pytest.mark.parametrize(
+    ("bucket", "picked"),
+    [pytest.param(*each, marks=[STIRRED] * (each[0] == "stirred single")) for each in QUICK],
+)
 def test_a_case_is_drawn_the_same_again_and_tells_nothing(
     bucket: str, picked: tuple[str, tuple[str, ...]] | None, tmp_path: Path
 ) -> None:
@@ -111,6 +117,7 @@ def test_a_case_is_drawn_the_same_again_and_tells_nothing(
 LONG = pytest.mark.campaign("families of stiffer or longer runs: one stands for them in every run")
 
 
+@pytest.mark.campaign("long runs of stirred families: nulls of the others are drawn in every run")
 @pytest.mark.parametrize(
     "family",
     [name if name == "tank" else pytest.param(name, marks=LONG) for name in draw.STIRRED],

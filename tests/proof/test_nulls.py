@@ -54,7 +54,11 @@ LONG = pytest.mark.campaign("families of stiff or long runs: the others stand fo
 @pytest.mark.parametrize(
     ("family", "seed"),
     [
-        pytest.param(family, seed, marks=[AGAIN] * (seed > 0) + [LONG] * (family in ("pendulum", "drive")))
+        pytest.param(
+            family,
+            seed,
+            marks=[AGAIN] * (seed > 0) + [LONG] * (family in ("pendulum", "drive", "thermal", "tire-python")),
+        )
         for family, seed in DRAWS
     ],
 )

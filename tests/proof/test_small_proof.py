@@ -46,9 +46,11 @@ def _answered(case: Path, out: Path, *, apart: bool) -> None:
     assert ended.value.code in (0, 1, None)
 
 
-EVERY_RUN = (1, 4, 5, 7, 8)
-"""Of the cases, by their places, those of every run of the tests: each bucket has one, large effects two."""
-ALL = pytest.mark.campaign("every case of the small proof: the other nulls and the slowest of its effects")
+EVERY_RUN = (1, 5, 8)
+"""Of the cases, by their places, those of every run of the tests: a null, a large effect, a class."""
+ALL = pytest.mark.campaign(
+    "every case of the small proof: the other nulls, the slowest effect, and what no name is for"
+)
 
 
 def judged(base: Path, places: Sequence[int]) -> dict[str, list[Judgment]]:
@@ -72,13 +74,14 @@ def judged(base: Path, places: Sequence[int]) -> dict[str, list[Judgment]]:
 def test_the_small_proof_stays_above_its_floors(tmp_path: Path, places: Sequence[int]) -> None:
     """One test, so that a parallel run draws and answers the cases once."""
     rows_of = judged(tmp_path, places)
+    assert len(rows_of) >= 3
     every = [j for rows in rows_of.values() for j in rows]
     assert [j.case for j in every if j.verdict == "failed"] == []
     # Nothing is named where nothing is missing, nor from outside the catalogue; what one speed cannot tell
     # apart is not a wrong name.
     for bucket in ("null", "outside", "confounded"):
-        assert [(j.case, j.reported) for j in rows_of[bucket] if j.false_name] == []
-    # Of three large effects two are named at least, and both where there are two.
-    assert sum(j.right for j in rows_of["single"]) >= 2, [
+        assert [(j.case, j.reported) for j in rows_of.get(bucket, []) if j.false_name] == []
+    # Of three large effects two are named at least; where there is one, it is.
+    assert sum(j.right for j in rows_of["single"]) >= min(2, len(rows_of["single"])), [
         (j.case, j.truth, j.column) for j in rows_of["single"]
     ]

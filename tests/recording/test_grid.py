@@ -314,6 +314,7 @@ def test_any_small_change_of_the_sheet_has_one_answer(tmp_path, data):
     assert fast == whole
 
 
+@pytest.mark.campaign("drawn tables: tables of every kind have one answer in every run")
 @quick
 @given(
     table=st.lists(

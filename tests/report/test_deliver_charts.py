@@ -103,12 +103,12 @@ def test_alternative_texts_go_by_size_and_order_and_leave_the_rest_alone(deliver
 
 
 def test_the_word_file_is_the_same_on_another_day(tmp_path: Path, delivered: Delivered) -> None:
-    from toolkit.report.word.fill import fill, needed_figures
+    from toolkit.report.word.fill import fill, survey
 
     source = FOLDER / "summary.docx"
     template = read_template(with_charts(source, tmp_path / "t.docx"))
     made = build_content(make_result(), make_record(), style=Style(), issued=dt.date(2026, 11, 24))
-    assert needed_figures(template, made) == ()
+    assert survey(template, made).figures == ()
     one, two = (fill(template, made, {}, allow_missing=True) for _ in range(2))
     assert one.docx == two.docx
     assert one.pictures == two.pictures

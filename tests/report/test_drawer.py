@@ -35,6 +35,7 @@ def test_what_a_dying_worker_left_is_drawn_and_nobody_waits_for_it() -> None:
         assert all(drawn[name].png.startswith(b"\x89PNG") for name in rest)
 
 
+@pytest.mark.campaign("many large figures: a worker draws with two hands in every run")
 def test_figures_larger_than_a_pipe_come_from_both_hands() -> None:
     plots = build_content(make_result(), make_record()).plots
     with Drawer(hands=2) as drawer:

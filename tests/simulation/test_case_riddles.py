@@ -65,6 +65,9 @@ def test_the_same_tire_without_the_drum_misses_nothing(tmp_path):
     assert found.effects == ()
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis of the virtual machine: a tire of bristles asks a riddle in every run"
+)
 def test_sandpaper_against_steel(tmp_path):
     found = answer(tmp_path, read_plan(RIDDLES / "surfaces.toml"))
     effect, parameters = told(found)
@@ -73,6 +76,9 @@ def test_sandpaper_against_steel(tmp_path):
     assert parameters["mu_factor"].runs == ("runs/run03.csv", "runs/run04.csv")  # those on steel
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis of the virtual machine: a tire of bristles asks a riddle in every run"
+)
 def test_five_repeats_of_which_two_had_another_actuator_speed(tmp_path):
     found = answer(tmp_path, read_plan(RIDDLES / "repeats.toml"))
     effect, parameters = told(found)

@@ -88,14 +88,15 @@ def test_numbers_are_numbers_and_texts_are_never_formulas(tmp_path: Path, made: 
     info = dataclasses.replace(made[0].reduced.info, special="=1+1", operator="@SUM(A1)")
     result = dataclasses.replace(made[0], reduced=dataclasses.replace(made[0].reduced, info=info))
     path = tmp_path / "x.xlsx"
-    write_test_file(path, result, made[1])
+    name = next(iter(made[1]))  # one recording stands for all
+    write_test_file(path, result, {name: made[1][name]})
     book = openpyxl.load_workbook(path)
     kinds = {cell.data_type for sheet in book for row in sheet.iter_rows() for cell in row}
     assert "f" not in kinds
     reduced = book["reduced"]
     heads = [cell.value for cell in reduced[1]]
     assert reduced.cell(2, heads.index("FY [N]") + 1).value == made[0].reduced.conditions[0].FY
-    assert book["raw"].max_row == 1 + sum(one.rows for one in made[1].values())
+    assert book["raw"].max_row == 1 + made[1][name].rows
 
 
 def test_rows_beyond_a_worksheets_last_go_on_in_another(

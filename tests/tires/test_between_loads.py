@@ -111,7 +111,7 @@ OTHER = pytest.mark.campaign(
 @pytest.mark.parametrize(
     ("name", "design", "noise", "most"),
     [
-        ("mf61", FEW, 5e-3, 0.09),
+        pytest.param("mf61", FEW, 5e-3, 0.09, marks=OTHER),
         ("pacejka94", WIDE, 5e-4, 0.09),
         ("mf61", PAIR, 5e-3, 0.2),
         pytest.param("pacejka94", FEW, 5e-3, 0.09, marks=OTHER),

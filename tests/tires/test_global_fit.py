@@ -147,6 +147,7 @@ def test_a_left_out_load_is_predicted_worse_than_it_is_fitted_and_still_near():
     assert sum(load.n for load in one.loads) == one.n
 
 
+@pytest.mark.campaign("the whole model: fits of single loads and of tables lose gross outliers in every run")
 def test_gross_outliers_move_the_robust_fit_little():
     clean = table(0.002, channels="FY")
     rng = np.random.default_rng(7)

@@ -89,6 +89,7 @@ def test_data_without_noise_determine_all_with_errors_of_rounding():
             assert 0 < fit.slope_at_zero.u < 1e-6 * abs(fit.slope_at_zero.value)
 
 
+@pytest.mark.campaign("two more fits: what rows determine is held in every run")
 def test_less_noise_determines_more():
     # Over ten draws of the noise: a single curve may end in another minimum at another noise.
     levels = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-6, 1e-9, 0.0)

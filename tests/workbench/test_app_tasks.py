@@ -90,6 +90,7 @@ def typed_session(page: Page, source: Path) -> None:
     expect(page.locator("#rehearsal [data-record=cell-r1]")).to_be_visible(timeout=60_000)
 
 
+@pytest.mark.campaign("a look in the browser: an approval by two keys goes the same way in every run")
 def test_see_what_limits_U(browser: BrowserContext, empty: Served, tmp_path: Path) -> None:
     page = opened(browser, empty, [], [])
     typed_session(page, session(tmp_path / "s", 2025, 0.1))

@@ -19,21 +19,19 @@ import weakref
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
 from toolkit.audit.sides import disputed
 from toolkit.audit.structure import odd_counts
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import summary
+from toolkit.characteristics.characteristic import Characteristic, Scope
 from toolkit.characteristics.groups import CHANNELS
 from toolkit.characteristics.reading import half_at_zero, secant
 from toolkit.findings import Finding, Level
 from toolkit.machine import load_machine, machine_names
 from toolkit.reduction.physics import RULES
-
-if TYPE_CHECKING:
-    from toolkit.characteristics.characteristic import Characteristic, Scope
 
 _NEEDED = ("SA_deg", "FY_N", "MZ_Nm", "FY_change_N", "MZ_change_Nm", "step_SA_deg", "step_FZ_N")
 

@@ -11,19 +11,16 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
+from toolkit.audit.model import Columns
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.registry.plausible import RANGE
 from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
 from toolkit.units import si_scale, unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.audit.model import Columns
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 CONSTANT = "constant"
 ROUND_OFF = 8 * float(np.finfo(np.float64).eps)
@@ -43,10 +40,10 @@ class Family:
     """
 
     signs: NDArray[np.int8]
-    coefficients: NDArray[np.float64]
-    predicted: NDArray[np.float64]
-    bound: NDArray[np.float64]
-    slack: NDArray[np.float64]
+    coefficients: Array
+    predicted: Array
+    bound: Array
+    slack: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,9 +128,7 @@ def group_of(
     )
 
 
-def _design(
-    record: CalibrationRecord, fit: LoadFit, x: NDArray[np.float64], half: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _design(record: CalibrationRecord, fit: LoadFit, x: Array, half: Array) -> tuple[Array, Array]:
     # The terms, and how far each may be off when every indication is off by half its last place.
     names = record.indications
     if all(term == INTERCEPT or term in names for term in fit.terms):
@@ -154,9 +149,9 @@ def _design(
 class _Variants:
     # What a family has before any file is seen.
     signs: NDArray[np.int8]
-    coefficients: NDArray[np.float64]
-    size: NDArray[np.float64]
-    slack: NDArray[np.float64]
+    coefficients: Array
+    size: Array
+    slack: Array
 
 
 @lru_cache(maxsize=1024)
@@ -177,8 +172,8 @@ def _family(
     fit: LoadFit,
     columns: Columns,
     load: str,
-    x: NDArray[np.float64],
-    half: NDArray[np.float64],
+    x: Array,
+    half: Array,
     *,
     issued: bool,
 ) -> Family:
@@ -198,7 +193,7 @@ def _family(
     )
 
 
-def _turn(indications: tuple[str, ...], term: str, signs: NDArray[np.int8]) -> NDArray[np.float64]:
+def _turn(indications: tuple[str, ...], term: str, signs: NDArray[np.int8]) -> Array:
     # A channel with the wrong sign turns every term in which it stands to an odd power.
     if term == INTERCEPT:
         return signs[:, -1].astype(np.float64)
@@ -209,7 +204,7 @@ def _turn(indications: tuple[str, ...], term: str, signs: NDArray[np.int8]) -> N
     return factor
 
 
-def half_fifth_digit(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def half_fifth_digit(values: Array) -> Array:
     """Return half a unit of the fifth significant digit of each value, 0 for 0.
 
     >>> import numpy as np

@@ -17,14 +17,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import recompute
 from toolkit.audit.model import CLEAN, INDEX, DisagreeingSides, columns_of
 from toolkit.audit.other_files import off_the_curve, test_of
 from toolkit.audit.sides import disputed, statement
 from toolkit.audit.weigh import step_findings
-from toolkit.calibration.registry.registry import instrument_of
-from toolkit.calibration.registry.standing import standing
+from toolkit.calibration.registry.registry import Registry, instrument_of
+from toolkit.calibration.registry.standing import Standing, standing
 from toolkit.declared import Entry, json_value
 from toolkit.errors import OutputError, ToolkitError
 from toolkit.files import real_path, sha256_file
@@ -43,13 +44,9 @@ from toolkit.staging import PASSING
 from toolkit.units import from_si, si_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.standing import Standing
     from toolkit.recording.model import Recording
 
 _DISPUTED = "cells-disagree"
@@ -171,7 +168,7 @@ def _refusal(plain: Mapping[str, Any], strays: Mapping[str, str]) -> str | None:
 
 
 def _check_steps(
-    recording: Recording, new: Mapping[str, NDArray[np.float64]], context: Context, record: CalibrationRecord
+    recording: Recording, new: Mapping[str, Array], context: Context, record: CalibrationRecord
 ) -> str | None:
     """Return why corrected values contradict themselves: they step where the recorded ones go on."""
     loaded = with_load(recording, machine=context.machine, record=record)
@@ -226,11 +223,7 @@ def _copy(
 
 
 def _write(
-    place: Path,
-    recording: Recording,
-    data: bytes,
-    new: Mapping[str, NDArray[np.float64]],
-    use: CalibrationUse,
+    place: Path, recording: Recording, data: bytes, new: Mapping[str, Array], use: CalibrationUse
 ) -> None:
     place.parent.mkdir(parents=True, exist_ok=True)
     if recording.format == "csv":
@@ -244,7 +237,7 @@ def _write(
         return
     machine = recording.machine
     units = {column.symbol: column.unit for column in machine.columns}
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, Array] = {}
     for channel in recording.series:
         if channel.symbol in units:
             unit, name = units[channel.symbol], channel.symbol
@@ -255,11 +248,11 @@ def _write(
     write_labview(place, machine, columns, simulated=recording.simulated, title=title)
 
 
-def _replaced(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> list[Written]:
+def _replaced(recording: Recording, new: Mapping[str, Array]) -> list[Written]:
     return [column for column in _copied_columns(recording, new) if column.symbol in new]
 
 
-def _copied_columns(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> list[Written]:
+def _copied_columns(recording: Recording, new: Mapping[str, Array]) -> list[Written]:
     return [
         Written(
             symbol=channel.symbol,

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.declared import Entry, Keyed, OrNan
 from toolkit.units import si_scale
 
@@ -86,13 +87,7 @@ def coefficient_intervals(columns: Columns, load: str) -> tuple[Interval, ...]:
     )
 
 
-def interval_bounds(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    *,
-    half_x: NDArray[np.float64],
-    half_y: NDArray[np.float64],
-) -> NDArray[np.float64] | None:
+def interval_bounds(x: Array, y: Array, *, half_x: Array, half_y: Array) -> Array | None:
     """Return (channels + 1, 2) lowest and highest coefficients, the constant last; None where none fits.
 
     Parameters
@@ -121,7 +116,7 @@ def interval_bounds(
     return _bounds_of(x, y, half_x=half_x, half_y=half_y)[0]
 
 
-def _first_rows(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+def _first_rows(x: Array, y: Array) -> NDArray[np.int64]:
     # Spread over the file, and the ends of every column.
     columns = [*x.T, y]
     ends = [int(at) for column in columns for at in (np.argmin(column), np.argmax(column))]
@@ -129,13 +124,7 @@ def _first_rows(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.in
     return np.union1d(spread, np.array(ends, dtype=np.int64))
 
 
-def _broken(
-    points: Sequence[NDArray[np.float64]],
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    half_x: NDArray[np.float64],
-    half_y: NDArray[np.float64],
-) -> NDArray[np.int64]:
+def _broken(points: Sequence[Array], x: Array, y: Array, half_x: Array, half_y: Array) -> NDArray[np.int64]:
     """Return the rows that coefficients (channels + 1,) break worst, a part of the file at a time."""
     rows: set[int] = set()
     for start in range(0, len(y), _MANY):
@@ -149,13 +138,7 @@ def _broken(
     return np.array(sorted(rows), dtype=np.int64)
 
 
-def _bounds_of(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    *,
-    half_x: NDArray[np.float64],
-    half_y: NDArray[np.float64],
-) -> tuple[NDArray[np.float64] | None, list[NDArray[np.float64]]]:
+def _bounds_of(x: Array, y: Array, *, half_x: Array, half_y: Array) -> tuple[Array | None, list[Array]]:
     # `interval_bounds`, and the coefficients at which each end is reached.
     n = x.shape[1]
     rounding = np.maximum(half_y, 1e-12 * max(float(np.abs(y).max()), np.finfo(float).tiny))
@@ -169,7 +152,7 @@ def _bounds_of(
     target = y / rounding
     centre, residual = back @ (q.T @ target), target - q @ (q.T @ target)
     low, high = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
-    points: list[NDArray[np.float64]] = []
+    points: list[Array] = []
     with np.errstate(over="ignore"):
         size = np.linalg.norm(back, axis=1)
     if not np.isfinite(size).all():
@@ -192,12 +175,7 @@ def _bounds_of(
 
 
 def _possible_signs(
-    q: NDArray[np.float64],
-    back: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    half_x: NDArray[np.float64],
-    half_y: NDArray[np.float64],
-    rounding: NDArray[np.float64],
+    q: Array, back: Array, centre: Array, half_x: Array, half_y: Array, rounding: Array
 ) -> list[tuple[float, ...]]:
     # A solution c gives residuals e with |e| <= half_y + |c| half_x, and c - centre = back q^T e. So
     # |c - centre| <= d with d = |back q^T| (half_y + half_x (|centre| + d)): where that has a solution, a
@@ -218,7 +196,7 @@ def _possible_signs(
 class _Polytope:
     """The points with area x <= right: thousands of sides in a few dimensions."""
 
-    def __init__(self, area: NDArray[np.float64], right: NDArray[np.float64]) -> None:
+    def __init__(self, area: Array, right: Array) -> None:
         size = np.maximum(np.linalg.norm(area, axis=1), np.finfo(float).tiny)
         # A cube that is far outside gives every programme a first vertex; a lowest point on it means that
         # nothing else bounds the goal.
@@ -229,9 +207,9 @@ class _Polytope:
         self._right = np.concatenate([right / size, np.full(2 * len(corner), self._far)])
         self._given = (area, right)
         self.empty = False
-        self.points: list[NDArray[np.float64]] = []  # at which a goal was lowest
+        self.points: list[Array] = []  # at which a goal was lowest
 
-    def lowest(self, goal: NDArray[np.float64]) -> float | None:
+    def lowest(self, goal: Array) -> float | None:
         """Return the lowest value of ``goal`` x; None where there is no point at all, or no limit.
 
         The dual simplex: from a vertex that is optimal for the sides it knows, to the side that it violates
@@ -264,7 +242,7 @@ class _Polytope:
             basis[int(np.argmin(ratio))] = new
         return self._solved(goal)
 
-    def _solved(self, goal: NDArray[np.float64]) -> float | None:
+    def _solved(self, goal: Array) -> float | None:
         # By a general solver where the steps did not end; None where the programme has no lowest value.
         from scipy.optimize import linprog
 
@@ -385,5 +363,5 @@ def _nearest(part: Columns, screen: Screen) -> NearestRecord | None:
     return None if best is None else best[1]
 
 
-def _off(part: Columns, load: str, new: NDArray[np.float64]) -> float:
+def _off(part: Columns, load: str, new: Array) -> float:
     return float(np.max(np.abs(new - part.y[load] * si_scale(part.y_units[load]))))

@@ -10,21 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.audit.candidates import Group, cannot_correct, describe, group_of
 from toolkit.audit.model import Columns, Grade, Identification, Repair, Segment, SkippedRecord, worst
 from toolkit.audit.runs import Hit, Partition, Reach, Runs, products, reach_of, without_chance
 from toolkit.audit.screen import Key, Screen, probe_rows, screen_of
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.units import si_scale
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
 
 ROWS = 1 << 15
 """Rows on which candidates are evaluated at a time."""
@@ -51,7 +48,7 @@ def identify_columns(
     in_force: CalibrationRecord | None,
     void: Collection[str] = (),
     screen: Screen | None = None,
-    new: Mapping[str, NDArray[np.float64]] | None = None,
+    new: Mapping[str, Array] | None = None,
 ) -> Identification:
     """Identify which of the records computed a recording.
 
@@ -89,7 +86,7 @@ def identify_columns(
     )
 
 
-def recompute(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]]:
+def recompute(columns: Columns, record: CalibrationRecord) -> dict[str, Array]:
     """Return FY [N] and MZ [N·m] (rows,) by a record's full coefficients, columns as named by the header."""
     scale = {
         name: si_scale(columns.units[columns.names.index(name)]) / si_scale(text)
@@ -103,7 +100,7 @@ def recompute(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[
 
 
 def repair(
-    columns: Columns, record: CalibrationRecord, new: Mapping[str, NDArray[np.float64]] | None = None
+    columns: Columns, record: CalibrationRecord, new: Mapping[str, Array] | None = None
 ) -> Repair | None:
     """Return what a record would change at most; None where it cannot be applied to the file."""
     if new is None and cannot_correct(record, columns) is not None:
@@ -211,7 +208,7 @@ class _Judge:
         probe = self.columns.part(probe_rows(self.columns.rows))
         close = self.screen.close_to(self._on(accepted.group, probe), probe, signs)
         places = dict.fromkeys([accepted.group, *others, *(self._place(key) for key in close)])
-        mine: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+        mine: dict[str, tuple[Array, Array]] = {}
         seen: Columns | None = None
 
         def alike(place: int, part: Columns) -> dict[str, NDArray[np.bool_]]:
@@ -411,7 +408,7 @@ def _scale(group: Group, columns: Columns, term: str) -> float:
     return float(evaluate(parse_term(term), ratios, 1.0))
 
 
-def _constant(record: CalibrationRecord, load: str, coefficients: NDArray[np.float64]) -> float:
+def _constant(record: CalibrationRecord, load: str, coefficients: Array) -> float:
     terms = record.load(load).terms
     return float(coefficients[terms.index(INTERCEPT)]) if INTERCEPT in terms else 0.0
 

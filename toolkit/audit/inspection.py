@@ -35,9 +35,7 @@ from toolkit.units import si_scale
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.registry import RefusedRecord, Registry
     from toolkit.calibration.registry.status import RecordStatus
@@ -322,7 +320,7 @@ def _of_context(path: Path, context: Context, why: str | None) -> tuple[Finding,
     return tuple(findings)
 
 
-def _blocks(recording: Recording, corrected: dict[str, NDArray[np.float64]] | None) -> tuple[LoadBlock, ...]:
+def _blocks(recording: Recording, corrected: dict[str, Array] | None) -> tuple[LoadBlock, ...]:
     # The first row stands before the blocks, as one of its own.
     first = Block(start=0, stop=1, mean_FZ=float(recording["FZ"].si[0]))
     blocks = (first, *find_blocks(recording["FZ"].si))

@@ -5,18 +5,15 @@ MZ.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.declared import Entry
 from toolkit.recording.digits import roundings
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.recording.model import Recording
-
+from toolkit.recording.model import Recording
 
 LOADS = ("FY", "MZ")
 INDEX = "corrected.json"
@@ -68,10 +65,10 @@ class Columns:
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    x: NDArray[np.float64]
-    half_x: NDArray[np.float64]
-    y: dict[str, NDArray[np.float64]]
-    half_y: dict[str, NDArray[np.float64]]
+    x: Array
+    half_x: Array
+    y: dict[str, Array]
+    half_y: dict[str, Array]
     y_units: dict[str, str]
 
     @property

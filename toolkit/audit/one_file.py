@@ -6,19 +6,29 @@ import datetime as dt
 import functools
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.audit.candidates import cannot_correct
 from toolkit.audit.context import Context, MachineSource, context_of
 from toolkit.audit.estimate import EstimatedCalibration, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.inspection import Choices
-from toolkit.audit.model import INDEX, DisagreeingSides, Grade, Repair, Segment, SkippedRecord, columns_of
+from toolkit.audit.model import (
+    INDEX,
+    Columns,
+    DisagreeingSides,
+    Grade,
+    Repair,
+    Segment,
+    SkippedRecord,
+    columns_of,
+)
 from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.structure import structure_findings
 from toolkit.audit.weigh import steps, weighed
@@ -35,20 +45,13 @@ from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.marks import is_corrected_copy, machine_in, own_output
+from toolkit.recording.model import Recording
 from toolkit.recording.read import read_recording
+from toolkit.reduction.blocks import Block
 from toolkit.reduction.health import quality, tare_finding, tare_under_load
 from toolkit.reduction.hub import with_load
 from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.reduction.protocol import nearest_load, nearest_step
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from toolkit.audit.model import Columns
-    from toolkit.recording.model import Recording
-    from toolkit.reduction.blocks import Block
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,10 +74,7 @@ class ArchivedCondition:
 
 
 def changes(
-    recording: Recording,
-    columns: Columns,
-    blocks: Sequence[Block],
-    new: Mapping[str, NDArray[np.float64]] | None,
+    recording: Recording, columns: Columns, blocks: Sequence[Block], new: Mapping[str, Array] | None
 ) -> tuple[ArchivedCondition, ...]:
     """Return what the record in force would change in a recording's load blocks.
 
@@ -83,7 +83,7 @@ def changes(
     if not blocks:
         return ()
     protocol = recording.machine.protocol
-    rows: dict[str, NDArray[np.float64]] = {load: recording[load].si for load in columns.loads}
+    rows: dict[str, Array] = {load: recording[load].si for load in columns.loads}
     if new is not None:
         rows |= {f"d{load}": new[load] - rows[load] for load in columns.loads}
     step = None

@@ -11,19 +11,16 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.audit.candidates import ROUND_OFF, Group, group_of, half_fifth_digit, orders, unfit
+from toolkit.audit.model import Columns
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.terms import INTERCEPT
 from toolkit.units import si_scale
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.audit.model import Columns
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 _PROBE = 6  # rows that are looked at first
 _CELLS = 1 << 14  # rows and groups at a time: their sums stay in the processor's cache
@@ -40,12 +37,12 @@ Signature = tuple[tuple[str, ...], tuple[str, ...], tuple[tuple[str, str], ...]]
 class _Equations:
     # One load by every linear group: (groups, variants, channels + 1) in the file's columns and units, the
     # constant last; ``size`` and ``slack`` (groups, channels + 1) without signs.
-    coefficients: NDArray[np.float64]
-    size: NDArray[np.float64]
-    slack: NDArray[np.float64]
+    coefficients: Array
+    size: Array
+    slack: Array
 
     @property
-    def off(self) -> NDArray[np.float64]:
+    def off(self) -> Array:
         # What coefficients and sums may be off, in parts of each column: (groups, channels + 1).
         return self.slack + 2 * ROUND_OFF * self.size
 
@@ -140,7 +137,7 @@ class Screen:
 
     def _predicted(
         self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         coefficients = self.equations[load].coefficients
         if len(among) < len(coefficients):
             coefficients = coefficients[among]
@@ -150,24 +147,20 @@ class Screen:
         predicted += flat[:, -1]
         return predicted.reshape(len(rows), groups, variants)
 
-    def _limit(
-        self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def _limit(self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]) -> Array:
         equations, y = self.equations[load], np.abs(columns.y[load][rows])
         size, slack = equations.size, equations.slack
         if len(among) < len(size):
             size, slack = size[among], slack[among]
         magnitudes = np.column_stack([np.abs(columns.x[rows]), np.ones(len(rows))])
         bound = (columns.half_y[load][rows] + 1e-9 * y)[:, None]
-        limit: NDArray[np.float64] = (
+        limit: Array = (
             columns.half_x[rows] @ size[:, :-1].T + magnitudes @ (slack + 2 * ROUND_OFF * size).T + bound
         ) * _SPARE
         return limit
 
 
-def _misses(
-    values: NDArray[np.float64], sizes: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _misses(values: Array, sizes: Array, y: Array) -> Array:
     """Return how far |y| lies from the nearest |+-s0 v0 +- s1 v1 ...|; ``values`` and ``sizes`` (terms, ...).
 
     Some signs give y where some give |y|, so that half of the signs need no look.

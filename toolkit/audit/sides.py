@@ -18,19 +18,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from toolkit.audit.model import DisagreeingSides, Grade, Identification, Segment, Which
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.audit.model import Columns
-    from toolkit.reduction.blocks import Block
-
-    Array = NDArray[np.float64]
+from toolkit.arrays import Array
+from toolkit.audit.model import Columns, DisagreeingSides, Grade, Identification, Segment, Which
+from toolkit.reduction.blocks import Block
 
 _ODD: tuple[Grade, ...] = ("column_swap", "sign_variant", "unknown")
 _WINDOW = 10  # rows on either side of an edge

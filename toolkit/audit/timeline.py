@@ -20,9 +20,7 @@ from toolkit.recording.read import read_recording
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.calibration.registry.registry import Registry
 
@@ -108,8 +106,8 @@ class Trace:
     """
 
     plain: dict[str, Any]
-    old: dict[str, NDArray[np.float64]]
-    new: dict[str, NDArray[np.float64]]
+    old: dict[str, Array]
+    new: dict[str, Array]
     sha256: str
 
 

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.audit.candidates import by_columns, cannot_correct, turned_against
 from toolkit.audit.identify import recompute
+from toolkit.audit.model import Columns, Identification, Segment
 from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.sides import judge, sudden_step
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.findings import Finding
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from toolkit.audit.model import Columns, Identification, Segment
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.recording.model import Recording
-    from toolkit.reduction.blocks import Block
-
-    Array = NDArray[np.float64]
+from toolkit.recording.model import Recording
+from toolkit.reduction.blocks import Block
 
 
 def weighed(

@@ -7,25 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import RecordError
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 
 def apply_record(
     record: CalibrationRecord,
-    indications: Mapping[str, NDArray[np.float64]],
+    indications: Mapping[str, Array],
     *,
     units: Mapping[str, str],
     tare: Mapping[str, float] | None = None,
     issued: bool = False,
     only: Collection[str] | None = None,
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Array]:
     """Return the loads [N, N*m] of a record from indications in its own units.
 
     Parameters
@@ -61,9 +60,9 @@ def apply_record(
 def coefficient_jacobian(
     record: CalibrationRecord,
     load: str,
-    indications: Mapping[str, NDArray[np.float64]],
+    indications: Mapping[str, Array],
     tare: Mapping[str, float] | None = None,
-) -> NDArray[np.float64]:
+) -> Array:
     """Return d load / d coefficient (rows, terms), in the load's unit per unit of coefficient.
 
     With the record's covariance V, the variance of row i is J[i] V J[i]^T; a mean over rows has the mean
@@ -111,9 +110,9 @@ def _check_present(record: CalibrationRecord, indications: Mapping[str, object])
 def _terms(
     record: CalibrationRecord,
     load: LoadFit,
-    indications: Mapping[str, NDArray[np.float64]],
+    indications: Mapping[str, Array],
     tare: Mapping[str, float] | None,
-) -> NDArray[np.float64]:
+) -> Array:
     values = {name: np.asarray(indications[name], dtype=np.float64) for name in record.indications}
     if tare is None:
         return term_matrix(load.terms, values)
@@ -126,12 +125,12 @@ def _terms(
 def _evaluate(
     record: CalibrationRecord,
     load: LoadFit,
-    indications: Mapping[str, NDArray[np.float64]],
+    indications: Mapping[str, Array],
     tare: Mapping[str, float] | None,
     *,
     issued: bool,
-) -> NDArray[np.float64]:
-    loads: NDArray[np.float64] = _terms(record, load, indications, tare) @ np.asarray(
+) -> Array:
+    loads: Array = _terms(record, load, indications, tare) @ np.asarray(
         load.issued if issued else load.coefficients
     )
     return loads

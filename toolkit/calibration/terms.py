@@ -12,15 +12,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import SessionError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 INTERCEPT = "intercept"
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
@@ -88,7 +85,7 @@ def evaluate(term: Term, columns: Mapping[str, Any], one: Any) -> Any:
     return value
 
 
-def term_matrix(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def term_matrix(terms: Sequence[str], columns: Mapping[str, Array]) -> Array:
     """Return the terms' values (rows, terms), each in the raw indications."""
     rows = len(next(iter(columns.values())))
     # Column by column in memory, as it is filled and read.
@@ -184,9 +181,9 @@ def issued_value(coefficient: float, extent: float, largest: float) -> float:
     return coefficient
 
 
-def term_reach(terms: NDArray[np.float64], has_constant: bool) -> NDArray[np.float64]:
+def term_reach(terms: Array, has_constant: bool) -> Array:
     """Return the range of each term over the rows; 1 for the constant."""
-    reach: NDArray[np.float64] = np.ptp(terms, axis=0)
+    reach: Array = np.ptp(terms, axis=0)
     if has_constant:
         reach[-1] = 1.0
     return reach

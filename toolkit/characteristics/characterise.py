@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.characteristics.catalogue import of_scope
 from toolkit.characteristics.characteristic import BOTH, Characteristic
 from toolkit.characteristics.groups import (
@@ -30,20 +31,16 @@ from toolkit.characteristics.shared_errors import SharedErrors, shared_errors_of
 from toolkit.characteristics.sweep_findings import sweep_findings
 from toolkit.characteristics.sweep_fit import fit_sweep
 from toolkit.characteristics.uncertain import Part, Uncertain
+from toolkit.errors import FitError
 from toolkit.findings import Finding
+from toolkit.machine import Machine
 from toolkit.reduction.common_load import at_one_angle, slopes
+from toolkit.reduction.model import ReducedTest
+from toolkit.reduction.sweep import Sweep
 from toolkit.tires.evaluate import estimate_at
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
 from toolkit.units import in_both
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.errors import FitError
-    from toolkit.machine import Machine
-    from toolkit.reduction.model import ReducedTest
-    from toolkit.reduction.sweep import Sweep
-
 
 # Beyond the outermost measured slip angle by more than this, a curve is not read.
 _REACH_RAD = math.radians(0.5)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.sweep_fit import SweepFit
 from toolkit.reduction.model import Condition, ReducedTest
-
-if TYPE_CHECKING:
-    from toolkit.tires.model import CurveFit
+from toolkit.tires.model import CurveFit
 
 Channel = Literal["FY", "MZ"]
 CHANNELS: tuple[Channel, Channel] = ("FY", "MZ")
@@ -32,15 +30,15 @@ class Group:
     conditions: tuple[Condition, ...]
 
     @property
-    def SA(self) -> NDArray[np.float64]:
+    def SA(self) -> Array:
         """Measured slip angles [rad], ascending."""
         return np.array([c.SA for c in self.conditions])
 
-    def values(self, channel: str) -> NDArray[np.float64]:
+    def values(self, channel: str) -> Array:
         """FY [N] or MZ [N·m] at the common load."""
         return np.array([c.FY_common if channel == "FY" else c.MZ_common for c in self.conditions])
 
-    def own_u(self, channel: str) -> NDArray[np.float64]:
+    def own_u(self, channel: str) -> Array:
         """Standard uncertainty of each condition's own value: rows, and the way to the common load."""
         return np.array([c.u_FY_common if channel == "FY" else c.u_MZ_common for c in self.conditions])
 

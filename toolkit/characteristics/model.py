@@ -17,8 +17,6 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     import pandas as pd
 
-    from toolkit.estimate import Estimate
-
 
 _SAME_LOAD = 0.04  # loads within this part of a summary's load are its load
 

@@ -30,22 +30,20 @@ on a passenger tire) because the curve bends.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.characteristics.characteristic import Characteristic, Need
-from toolkit.characteristics.groups import CHANNELS, Channel, Direction
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction, DirectionFit
 from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain, merged, weighted
 from toolkit.estimate import Estimate
 from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
 from toolkit.tires.models import model
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 UNIT = {"FY": "N", "MZ": "N*m"}
 
@@ -56,7 +54,7 @@ class _Reading:
     # what the slip angle's zero and scale do to it.
     channel: Channel
     estimate: Estimate
-    weights: NDArray[np.float64]
+    weights: Array
     angle: tuple[Part, ...]
 
 
@@ -89,10 +87,17 @@ class Reader:
                 "FY": np.array([condition.u_FY_zero for condition in conditions]),
                 "MZ": np.array([condition.u_MZ_zero for condition in conditions]),
             }
-        self._pseudo: dict[Channel, NDArray[np.float64]] = {}
+        self._pseudo: dict[Channel, Array] = {}
         # Several characteristics are made of the values at SA = 0 and of MZ where FY is zero.
         self._at_zero: dict[Channel, Uncertain | None] = {}
         self._residual: list[Uncertain | None] = []
+
+    def on_curves(self, fit: DirectionFit) -> Reader:
+        """Return a reader of the same conditions off other curves."""
+        other = copy.copy(self)
+        other.direction = replace(self.direction, fit=fit)
+        other._pseudo, other._at_zero, other._residual = {}, {}, []
+        return other
 
     def covers_zero(self) -> bool:
         """Tell whether slip angles lie on both sides of zero."""
@@ -219,7 +224,7 @@ class Reader:
         ratio = float(slope_at(fit, crossing.value)) / stiffness
         return self._read(moment, "MZ without FY", (-ratio, force))
 
-    def _weights(self, channel: Channel, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _weights(self, channel: Channel, gradient: Array) -> Array:
         """Return d reading / d condition (conditions,)."""
         if channel not in self._pseudo:
             self._pseudo[channel] = weights_of(self.direction, channel)
@@ -258,7 +263,7 @@ class Reader:
         return Part(source=source, key=f"{source}/{where}", u=u, dof=dof)
 
 
-def _norm(values: NDArray[np.float64]) -> float:
+def _norm(values: Array) -> float:
     return float(np.linalg.norm(values))
 
 

@@ -19,19 +19,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.reduction.common_load import at_one_angle, slopes
 from toolkit.tires.evaluate import slope_at, value_at
 from toolkit.tires.models import model
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 _ENOUGH = 24  # residual freedoms from which on the variances of load and slip angle are told apart
 _STEPS, _SETTLED = 60, 1e-6

@@ -18,25 +18,19 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.apply import coefficient_jacobian
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.uncertainty.common_errors import record_covariance
-from toolkit.channels import seen_by_cells, signs
+from toolkit.channels import Axes, Reversal, seen_by_cells, signs
 from toolkit.characteristics.uncertain import Part
-from toolkit.machine import TypeB
+from toolkit.machine import Correction, Machine, TypeB
 from toolkit.reduction.corrections import u_SA, zero_shifts
+from toolkit.reduction.model import Condition, ReducedTest
 from toolkit.units import si_scale
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.channels import Axes, Reversal
-    from toolkit.machine import Correction, Machine
-    from toolkit.reduction.model import Condition, ReducedTest
 
 # A pivot of a correlation matrix below this is rounding.
 _NO_PIVOT = 1e-14
@@ -71,8 +65,8 @@ class SharedErrors:
     test: str = ""
     reversal: Reversal = "drum"
     corrections: tuple[Correction, ...] = ()
-    covariance: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
-    roots: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
+    covariance: Mapping[str, Array] = field(init=False, repr=False)
+    roots: Mapping[str, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         covariances = {} if self.record is None else record_covariance(self.record)
@@ -84,7 +78,7 @@ class SharedErrors:
         """Return who owns the variable of a statement: the machine, or this test alone."""
         return self.machine if stated.common == "machine" else f"{self.machine}/{self.test}"
 
-    def signed(self, channel: str, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+    def signed(self, channel: str, conditions: Sequence[Condition]) -> Array:
         """Return the sign of a channel from the cells' axes to SAE for each condition (conditions,)."""
         return np.array(
             [
@@ -94,7 +88,7 @@ class SharedErrors:
             dtype=float,
         )
 
-    def calibration_rows(self, channel: str, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+    def calibration_rows(self, channel: str, conditions: Sequence[Condition]) -> Array:
         """Return how each independent variable of the record moves each condition [SI]: (variables, rows).
 
         The variables are those of the triangular root of the coefficients' covariance; none without one.
@@ -113,7 +107,7 @@ class SharedErrors:
         moved = (jacobian @ self.roots[channel]).T * si_scale(self.record.load(channel).unit)
         return np.asarray(moved * self.signed(channel, conditions))
 
-    def zero_rows(self, channel: str, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+    def zero_rows(self, channel: str, conditions: Sequence[Condition]) -> Array:
         """Return how each cell's zero, then each correction of the machine, moves each condition [SI].
 
         Shape (cells + corrections, rows); no row for a cell where its zero is known.
@@ -125,9 +119,7 @@ class SharedErrors:
             rows = [*zero_shifts(self.record, cells, self.u_cell_zero)[channel], *rows]
         return np.reshape(np.asarray(rows, dtype=float), (len(rows), len(conditions))) * sign
 
-    def _correction_row(
-        self, correction: Correction, channel: str, conditions: Sequence[Condition]
-    ) -> NDArray[np.float64]:
+    def _correction_row(self, correction: Correction, channel: str, conditions: Sequence[Condition]) -> Array:
         """Return what the uncertainty of a correction moves in each condition [SI], machine axes."""
         if correction.channel != channel:
             return np.zeros(len(conditions))
@@ -136,7 +128,7 @@ class SharedErrors:
         values = np.array([getattr(condition, source) for condition in conditions], dtype=float)
         return np.asarray(correction.u * correction.factor * sign * values)
 
-    def calibration_parts(self, channel: str, moved: NDArray[np.float64]) -> list[Part]:
+    def calibration_parts(self, channel: str, moved: Array) -> list[Part]:
         """Return the record's parts of a weighted sum that its variables move by ``moved``."""
         sha = "" if self.record is None else self.record.sha256
         return [
@@ -144,7 +136,7 @@ class SharedErrors:
             for i, u in enumerate(moved)
         ]
 
-    def zero_parts(self, moved: NDArray[np.float64]) -> list[Part]:
+    def zero_parts(self, moved: Array) -> list[Part]:
         """Return the parts of a weighted sum that the cells' zeros and the corrections move by ``moved``.
 
         FY and MZ have the same keys: one cell moves both.
@@ -231,7 +223,7 @@ def identity_of(reduced: ReducedTest) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def root_of(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def root_of(covariance: Array) -> Array:
     """Return the lower triangular L with L L^T = V of a semi-definite V (terms, terms).
 
     By columns, without pivoting: the same V gives the same variables in the same order on every machine,

@@ -24,21 +24,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Rotation
 from toolkit.effects.filters import lag
-from toolkit.reduction.sweep import LEAST_RAD
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.machine import Sweeping
-    from toolkit.reduction.sweep import Sweep
-
-    Array = NDArray[np.float64]
+from toolkit.machine import Sweeping
+from toolkit.reduction.sweep import LEAST_RAD, Sweep
 
 STARTS_M = (0.0, 0.1, 0.3, 0.8)
 _LONGEST_M = 5.0

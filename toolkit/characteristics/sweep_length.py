@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.characteristics.characteristic import DELAY, FORM, LOAD, NOISE, SPEED
 from toolkit.characteristics.uncertain import Part, Uncertain, merged
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.characteristics.sweep_fit import SweepFit
 
 _SAME_SPEED = 0.05  # speeds within this part of each other do not part a delay
@@ -87,7 +86,7 @@ def relaxation_length(
     return Uncertain(value=value, unit="m", parts=merged(parts))
 
 
-def weights_of(sweeps: Sequence[SweepFit]) -> tuple[NDArray[np.float64], float]:
+def weights_of(sweeps: Sequence[SweepFit]) -> tuple[Array, float]:
     """Return d length / d apparent length of each sweep, and d length / d stated delay [m/s]."""
     stated = next((sweep.delay_u_s for sweep in sweeps if sweep.delay_u_s is not None), None)
     speeds = np.array([sweep.speed_m_s for sweep in sweeps])
@@ -100,7 +99,7 @@ def weights_of(sweeps: Sequence[SweepFit]) -> tuple[NDArray[np.float64], float]:
     return inverse[: len(u)] / u, of_delay
 
 
-def _delay(sweeps: Sequence[SweepFit], weights: NDArray[np.float64], of_delay: float, stated: float) -> float:
+def _delay(sweeps: Sequence[SweepFit], weights: Array, of_delay: float, stated: float) -> float:
     """Return the delay [s] that goes with the length: its mean over the sweeps."""
     lengths = np.array([sweep.length_m for sweep in sweeps])
     speeds = np.array([sweep.speed_m_s for sweep in sweeps])

@@ -7,22 +7,19 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.characteristics.characterise import characteristic_rows
+from toolkit.characteristics.model import Characteristics
 from toolkit.characteristics.shared_errors import identity_of
 from toolkit.comparison.differences import differences, pattern_effects
 from toolkit.comparison.model import MODES, Comparison, Entry, Mode, Repeats
 from toolkit.comparison.precision import repeats_of
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
+from toolkit.machine import Machine
+from toolkit.reduction.model import ReducedTest
 from toolkit.units import from_si, in_both
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.characteristics.model import Characteristics
-    from toolkit.machine import Machine
-    from toolkit.reduction.model import ReducedTest
 
 # Slip angles at which two tables are read, where no test says which [deg].
 DEFAULT_ANGLES = tuple(math.radians(s * a) for a in (0, 1, 2, 4, 6, 8, 10) for s in ((1, -1) if a else (1,)))

@@ -18,8 +18,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from toolkit.arrays import Array
 from toolkit.characteristics.catalogue import compared
 from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain, weighted
@@ -63,7 +64,7 @@ def two_sided_p(value: float, u: float, dof: float) -> float | None:
 ROUNDED = 16 * float(np.finfo(np.float64).eps)
 
 
-def deviations(values: ArrayLike) -> NDArray[np.float64]:
+def deviations(values: ArrayLike) -> Array:
     """Return how far values (n,) lie from their mean; zeros where they differ by no more than rounding.
 
     >>> deviations([5.4, 5.4, 5.4 + 1e-15]).tolist(), deviations([1.0, 3.0]).tolist()
@@ -76,7 +77,7 @@ def deviations(values: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(apart - apart.mean())
 
 
-def grubbs_p(values: NDArray[np.float64]) -> float | None:
+def grubbs_p(values: Array) -> float | None:
     """Return the two-sided p of the value farthest from the mean (Grubbs, Technometrics 11, 1969, 1-21).
 
     None for fewer than three values, or values that are all the same.

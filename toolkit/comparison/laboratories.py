@@ -19,18 +19,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.comparison.differences import ROUNDED, deviations, grubbs_p
 from toolkit.comparison.model import Spread
 from toolkit.comparison.precision import Consistency, Departure, consistencies, factor_spread, spread
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 FACTOR = 1.134  # as the standard prints it; 1.1334 of a normal distribution cut at 1.5 standard deviations
 _CUT = 1.5
@@ -54,7 +52,7 @@ class Robust:
         return float(1.25 * self.sd / np.sqrt(self.n))
 
 
-def algorithm_a(values: NDArray[np.float64], *, factor: float = FACTOR) -> Robust:
+def algorithm_a(values: Array, *, factor: float = FACTOR) -> Robust:
     """Return the robust mean and standard deviation of results (n,), by iteration until they stay.
 
     It begins with the median and the scaled median absolute deviation, and settles by its own s*: how far the

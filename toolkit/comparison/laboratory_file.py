@@ -14,16 +14,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from toolkit.comparison.laboratories import K, Results
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign, number_or_text, read_lines
-from toolkit.units import split_header, unit
-
-if TYPE_CHECKING:
-    from toolkit.units import Unit
+from toolkit.units import Unit, split_header, unit
 
 _COLUMNS = ("measurand", "laboratory", "value", "U", "k")
 _UNITS = ("value", "U")

@@ -18,7 +18,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
@@ -40,7 +40,7 @@ from toolkit.reduction.model import Condition
 from toolkit.reduction.selection import of_one_condition
 from toolkit.spelling import nearest
 from toolkit.tires.fit import fit_curves, why_not
-from toolkit.tires.model import Curve
+from toolkit.tires.model import Curve, CurveFit
 from toolkit.tires.plausibility import demand_possible
 from toolkit.tires.table import TireTable, read_table
 from toolkit.tires.table_fit import (
@@ -51,9 +51,6 @@ from toolkit.tires.table_fit import (
     table_curves,
 )
 from toolkit.units import from_si, split_header, unit
-
-if TYPE_CHECKING:
-    from toolkit.tires.model import CurveFit
 
 # The characteristics that a maker can state against load, by name, with their SI unit.
 _STATED = {declared.name: declared for declared in compared() if declared.scope != "angle"}

@@ -33,8 +33,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.comparison.differences import Series, at_load, deviations, grubbs_p, holm, series_of
 from toolkit.comparison.model import Entry, Factor, FactorSpread, Precision, Repeats, Spread
 
@@ -110,7 +110,7 @@ def _partition(levels: Sequence[Hashable]) -> tuple[int, ...]:
 def _precision(
     series: Series,
     load_N: float,
-    values: NDArray[np.float64],
+    values: Array,
     cells: Sequence[Hashable],
     varied: Sequence[Factor],
     labels: Sequence[str],
@@ -134,7 +134,7 @@ def _precision(
     )
 
 
-def _within(values: NDArray[np.float64], levels: Sequence[Hashable]) -> tuple[float, int]:
+def _within(values: Array, levels: Sequence[Hashable]) -> tuple[float, int]:
     """Return the pooled variance inside levels and its degrees of freedom."""
     squares, dof = 0.0, 0
     for level in dict.fromkeys(levels):
@@ -144,7 +144,7 @@ def _within(values: NDArray[np.float64], levels: Sequence[Hashable]) -> tuple[fl
     return (squares / dof if dof else 0.0), dof
 
 
-def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, factor: str) -> FactorSpread:
+def factor_spread(values: Array, levels: Sequence[Hashable], *, factor: str) -> FactorSpread:
     """Return what a factor with at least two levels adds to the spread of values (tests,)."""
     from scipy.special import fdtrc
 

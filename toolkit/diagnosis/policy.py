@@ -149,14 +149,10 @@ class _Averages:
         "more rows in a mean would only blur what is looked for",
     )
     beside_recorded: float = _set(
-        0.25,
-        "of the recorded power",
-        "of the quickest octave kept: more noise is worth a low-pass of its own",
+        0.25, "of the recorded power", "of the quickest octave kept: more noise is worth its own low-pass"
     )
     beside_shared: float = _set(
-        0.5,
-        "of the power in common",
-        "or as little: a recording that a lag has made weak is followed even so",
+        0.5, "of the power in common", "or as little: what a lag has made weak is followed even so"
     )
     fewest: int = _set(32, "means of all runs", "as many must be left to judge by")
     window: int = _set(256, "rows", "of a window of the spectra: five octaves and more")
@@ -207,6 +203,11 @@ class _Scatter:
     fewest: int = _set(2, "runs held out", "one alone has no scatter that could be told from a mismatch")
     least: float = _set(0.3, "sd of what a run shows of its own zero", "a smaller scatter changes no score")
     intervals: int = _set(3, "runs", "whose zeros and gains enter values and intervals; two tell no scatter")
+    loudness: tuple[float, ...] = _set(
+        tuple(2.0**k for k in range(12)),
+        "degrees of freedom",
+        "of how loud runs are: from twice to 2 % apart",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -422,9 +423,6 @@ class _Laws:
     fitted: int = _set(5, "laws", "fitted jointly, of those that are ranked first")
     judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
-    same: float = _set(
-        0.95, "of what laws take of the held-out mean square", "by effects: the laws are their own formulas"
-    )
     outdoes: float = _set(2.0, "times what effects take", "of unseen rows: they are the smaller part")
     kept: float = _set(
         0.5, "of its size", "by which an effect may be smaller or larger beside laws and be the same effect"
@@ -456,7 +454,9 @@ class _Verdict:
     close: float = _set(3.0, "of the log-likelihood", "within which the data prefer neither of two effects")
     mostly: float = _set(0.5, "of the log-likelihood", "named effects explain it, beside what stays unknown")
     nearly: float = _set(
-        0.9, "of the held-out mean square above the noise", "effects that take it stay, whatever the rest is"
+        0.9,
+        "of the held-out mean square above the noise, or of what laws take of it",
+        "effects that take it stay, whatever the rest is",
     )
     taken: float = _set(
         2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"

@@ -7,15 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
-from toolkit.calibration.records.use import signature_of
+from toolkit.calibration.records.use import CalibrationUse, signature_of
 from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError
 from toolkit.printable import escaped
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.report.deliver import Delivered

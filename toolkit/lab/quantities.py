@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import ColumnError, UnitError
 from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import NDArray
 
     from toolkit.tires.table import TireTable
 
@@ -38,10 +38,10 @@ Stated = defaultdict[str, list[str]]
 class Column:
     """One column: its numbers (rows,) as they are, and their unit."""
 
-    numbers: NDArray[np.float64]
+    numbers: Array
     unit: str
 
-    def to(self, other: str, *, where: str) -> NDArray[np.float64]:
+    def to(self, other: str, *, where: str) -> Array:
         """Return the values in another unit of the same dimension; the very numbers where it is the same.
 
         Raises
@@ -267,7 +267,7 @@ def _column(name: str, values: Any, stated: list[str], example: str) -> Column:
     return Column(numbers=_numbers(name, magnitudes, _index(values)), unit=texts[0])
 
 
-def _numbers(name: str, values: Any, index: Any) -> NDArray[np.float64]:
+def _numbers(name: str, values: Any, index: Any) -> Array:
     """Return values as numbers (rows,), each real, finite and unmasked; refuse the first row that is not."""
     try:
         array = np.asarray(values)

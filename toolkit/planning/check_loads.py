@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.registry.gates import VERIFIED
 from toolkit.calibration.terms import INTERCEPT
 from toolkit.declared import Entry
@@ -44,7 +45,7 @@ class Verification:
 
 
 def choose_check_loads(
-    knowledge: Knowledge, loads: NDArray[np.float64], avoid: frozenset[int]
+    knowledge: Knowledge, loads: Array, avoid: frozenset[int]
 ) -> tuple[NDArray[np.intp], tuple[Verification, ...]]:
     """Return the fewest check loads found among feasible ones (candidates, loads), and what they verify.
 
@@ -63,7 +64,7 @@ def choose_check_loads(
     return order, verification(knowledge, loads[order])
 
 
-def verification(knowledge: Knowledge, check: NDArray[np.float64]) -> tuple[Verification, ...]:
+def verification(knowledge: Knowledge, check: Array) -> tuple[Verification, ...]:
     """Return of every term of every load whether check loads (rows, loads) verify it."""
     results = []
     for fit in knowledge.record.loads:
@@ -85,7 +86,7 @@ def verification(knowledge: Knowledge, check: NDArray[np.float64]) -> tuple[Veri
     return tuple(results)
 
 
-def _value(knowledge: Knowledge, loads: NDArray[np.float64], points: list[int]) -> float:
+def _value(knowledge: Knowledge, loads: Array, points: list[int]) -> float:
     """Return how far check loads are on their way: rank, and each term's movement up to what is needed."""
     total = 0.0
     for fit in knowledge.record.loads:
@@ -99,7 +100,7 @@ def _value(knowledge: Knowledge, loads: NDArray[np.float64], points: list[int]) 
     return total
 
 
-def _rank(terms: NDArray[np.float64]) -> int:
+def _rank(terms: Array) -> int:
     if not len(terms):
         return 0
     length = np.sqrt(np.einsum("ij,ij->j", terms, terms))

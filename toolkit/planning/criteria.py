@@ -10,14 +10,11 @@ so that each criterion of every candidate row costs products with C, and no matr
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from toolkit.arrays import Array
 
 Criterion = Literal["D", "I", "G"]
 CRITERIA: tuple[Criterion, ...] = ("D", "I", "G")

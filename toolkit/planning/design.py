@@ -5,16 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.channels import Rotation
+from toolkit.machine import Machine
 from toolkit.simulation.steps import Motion
 from toolkit.simulation.tire import TireTruth, revolution_time_s
-
-if TYPE_CHECKING:
-    from toolkit.machine import Machine
 
 _ACTUATOR_S = 2.5  # from one load to the next, as the virtual machine waits on average
 _ORDERS = 400

@@ -10,14 +10,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from toolkit.arrays import Array
 
 _SHORTEST = 1 / 16  # of the first piece of a course that goes ever faster, its last one
 _PEAK_RATE, _PEAK_ACCELERATION = 15 / 8, 10 / math.sqrt(3)  # of a move of least jerk, by the mean

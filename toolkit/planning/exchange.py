@@ -15,12 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from toolkit.arrays import Array
 
 Design = TypeVar("Design")
 Points = tuple[int, ...]
@@ -36,7 +35,7 @@ class Alternatives(Generic[Design]):
     ``present`` is the alternative that the design has; ``design`` returns the design with another one.
     """
 
-    losses: NDArray[np.float64]
+    losses: Array
     present: int
     design: Callable[[int], Design]
 
@@ -130,7 +129,7 @@ class PointSearch:
     candidates : how many there are
     """
 
-    def __init__(self, criterion: Callable[[Sequence[Points]], NDArray[np.float64]], candidates: int) -> None:
+    def __init__(self, criterion: Callable[[Sequence[Points]], Array], candidates: int) -> None:
         self._criterion, self.candidates = criterion, candidates
         self._judged: dict[Points, float] = {}
 
@@ -138,7 +137,7 @@ class PointSearch:
         """Return the criterion of a design, in whatever order its points stand."""
         return float(self.losses([tuple(sorted(design))])[0])
 
-    def losses(self, designs: Sequence[Points]) -> NDArray[np.float64]:
+    def losses(self, designs: Sequence[Points]) -> Array:
         """Return the criterion (designs,) of ascending designs; those that are new are judged at once."""
         new = [design for design in dict.fromkeys(designs) if design not in self._judged]
         if new:

@@ -10,12 +10,14 @@ degrees of freedom too.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.characteristics.characterise import rows_of
 from toolkit.characteristics.characteristic import Characteristic
@@ -32,14 +34,13 @@ from toolkit.simulation.tire import TireTruth, revolution_time_s
 from toolkit.tires.evaluate import estimate_at, slope_estimate_at, value_at
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.pipeline import TestResult
     from toolkit.tires.model import CurveFit
 
-    Array = NDArray[np.float64]
 
 _NEAR_ZERO_RAD = float(np.radians(2.5))
 
@@ -189,6 +190,10 @@ class EarlierTest:
             variances = variances + np.array([0.0, 0.0, (self.load_spread * loads.pop()) ** 2, 0.0])
         return scatter_of(directions, expected=variances)
 
+    def foreseen(self, design: Design, *, shift: float = 0.0) -> tuple[tuple[Direction, ...], Scatter]:
+        """Return the directions of a design with the scatter that its residuals will show on average."""
+        return _foreseen(self, design, shift)
+
     def rows(self, design: Design, demands: Collection[Demand], *, shift: float = 0.0) -> tuple[Row, ...]:
         """Return the rows that demands name, as the design's reduced test will have them.
 
@@ -196,7 +201,7 @@ class EarlierTest:
         ----------
         shift : of the scatter's variances, in their standard uncertainties: how sure the rows are
         """
-        directions = self.directions(design)
+        directions, scatter = self.foreseen(design, shift=shift)
         named = {(demand.characteristic, demand.SA_rad) for demand in demands if demand.name != PEAK}
         peaks = self._peaks(design) if any(demand.name == PEAK for demand in demands) else ()
 
@@ -207,7 +212,6 @@ class EarlierTest:
                 name == declared.name and at is not None and abs(at - SA) < 1e-9 for name, at in named
             )
 
-        scatter = self.expected_scatter(directions, shift=shift)
         return rows_of(directions, shared=self.shared, scatter=scatter, wanted=wanted)
 
     def _peaks(self, design: Design) -> frozenset[float]:
@@ -221,6 +225,13 @@ class EarlierTest:
                     if len(side):
                         peaks.add(float(side[np.argmax(force[np.isin(angles, side)])]))
         return frozenset(peaks)
+
+
+@functools.lru_cache(maxsize=128)
+def _foreseen(earlier: EarlierTest, design: Design, shift: float) -> tuple[tuple[Direction, ...], Scatter]:
+    # A search asks for the same design by its screen, by its budget and for other demands.
+    directions = earlier.directions(design)
+    return directions, earlier.expected_scatter(directions, shift=shift)
 
 
 def earlier_test(result: TestResult, *, machine: Machine, record: CalibrationRecord | None) -> EarlierTest:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.declared import Quantity
 from toolkit.errors import ConfigError
 from toolkit.planning.session_reach import AS_READ, calibrated_interval
@@ -38,11 +39,11 @@ class FeasibleLoads:
     """
 
     source: str
-    loads: NDArray[np.float64]
+    loads: Array
     mount: tuple[str, ...]
     label: tuple[str, ...]
-    amount: NDArray[np.float64]
-    minutes: NDArray[np.float64] | None
+    amount: Array
+    minutes: Array | None
     setup_minutes: Mapping[str, float] | None
     run_minutes: float | None
     refused: int = 0
@@ -131,9 +132,7 @@ def loads_of_fixtures(
     )  # fmt: skip
 
 
-def _bounds(
-    record: CalibrationRecord, limits: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _bounds(record: CalibrationRecord, limits: Array) -> tuple[Array, Array]:
     """Return the lowest and the highest load (loads,) that may be put on, by limits of their sizes (loads,).
 
     Each sense goes as much beyond what was calibrated of it as the largest load may; what a fixture makes of
@@ -177,7 +176,7 @@ def loads_of_record(record: CalibrationRecord, tables: list[Table]) -> FeasibleL
     )  # fmt: skip
 
 
-def _direction(share: NDArray[np.float64], names: list[str]) -> str:
+def _direction(share: Array, names: list[str]) -> str:
     """Return which loads a direction has and their signs, ``+FY -MX``; parts below a twentieth are none."""
     return " ".join(
         f"{'+' if part > 0 else '-'}{name}" + ("" if abs(part) > 0.95 else f"*{abs(part):.1f}")

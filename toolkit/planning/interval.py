@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.declared import Entry
 from toolkit.errors import ConfigError
 
@@ -60,8 +61,8 @@ class Path:
     load: str
     check_load: str
     begin: dt.date
-    years: NDArray[np.float64]
-    errors: NDArray[np.float64]
+    years: Array
+    errors: Array
     segment: NDArray[np.intp]
 
 
@@ -70,11 +71,11 @@ class Drift:
     """What a path tells: trend v, its standard uncertainty, q and r over the grid with their ``weight``."""
 
     path: Path
-    weight: NDArray[np.float64]
-    trend: NDArray[np.float64]
-    u_trend: NDArray[np.float64]
-    walk: NDArray[np.float64]
-    noise: NDArray[np.float64]
+    weight: Array
+    trend: Array
+    u_trend: Array
+    walk: Array
+    noise: Array
 
     @property
     def trend_per_year(self) -> float:

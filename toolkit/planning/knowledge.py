@@ -8,31 +8,27 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.rounding import rounding_of
 from toolkit.calibration.fit.row_noise import weighed_rows
 from toolkit.calibration.fit.run_scatter import spread
 from toolkit.calibration.fit.session_rows import HIGHEST_POWER, SessionRows
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.records.scatter import RunScatter, rows_of
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.budget import calibration_budget
+from toolkit.calibration.uncertainty.model import Budget
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 from toolkit.errors import ConfigError
 from toolkit.estimate import coverage_factor
 from toolkit.planning.row_exchange import Response
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.uncertainty.model import Budget
 
 DETECTABLE = 7.85
 """Noncentrality of one degree of freedom that a test at 5 % sees in 80 % of all sessions: (1.96 + 0.84)^2."""
@@ -56,7 +52,7 @@ class Knowledge:
     record: CalibrationRecord
     loads: Table
     check: Table | None
-    plane: NDArray[np.float64]
+    plane: Array
     scatter: tuple[Scatter, ...]
     runs: tuple[RunScatter, ...]
     today: tuple[Budget, ...]
@@ -106,7 +102,7 @@ class Knowledge:
         """Names of the loads."""
         return tuple(fit.load for fit in self.record.loads)
 
-    def indications(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    def indications(self, loads: Array) -> Array:
         """Return what loads (rows, loads) will indicate (rows, indications)."""
         return np.column_stack([loads, np.ones(len(loads))]) @ self.plane
 
@@ -125,12 +121,12 @@ class Knowledge:
         share = rest / np.maximum(np.ptp(shown, axis=0), 1e-300)
         return self.record.indications[int(np.argmax(share))], float(share.max())
 
-    def terms(self, fit: LoadFit, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    def terms(self, fit: LoadFit, loads: Array) -> Array:
         """Return the equation's terms (rows, terms) under loads (rows, loads)."""
         columns = dict(zip(self.record.indications, self.indications(loads).T, strict=True))
         return term_matrix(fit.terms, columns)
 
-    def table(self, loads: NDArray[np.float64], run: NDArray[np.intp], up: NDArray[np.bool_]) -> Table:
+    def table(self, loads: Array, run: NDArray[np.intp], up: NDArray[np.bool_]) -> Table:
         """Return planned rows as a session's table, every reading as expected."""
         return Table(
             names=(*self.record.indications, *self.names),
@@ -139,9 +135,7 @@ class Knowledge:
             rotation=None,
         )  # fmt: skip
 
-    def responses(
-        self, loads: NDArray[np.float64], up: NDArray[np.bool_], *, misfits: float = 1.0
-    ) -> tuple[Response, ...]:
+    def responses(self, loads: Array, up: NDArray[np.bool_], *, misfits: float = 1.0) -> tuple[Response, ...]:
         """Return each load's model over feasible rows for the choice of rows.
 
         Beside the equation's terms, a misfit bent like powers of the load, a difference of the directions,
@@ -224,7 +218,7 @@ class Knowledge:
             sizes.append(noise.runs.within * math.sqrt(DETECTABLE / squares[0]) if squares else None)
         return tuple(sizes)
 
-    def weights(self, table: Table) -> NDArray[np.float64]:
+    def weights(self, table: Table) -> Array:
         """Return what a unit error of every planned row makes where U is stated (loads, rows)."""
         weights = []
         for fit, budget in zip(self.record.loads, self.today, strict=True):
@@ -235,7 +229,7 @@ class Knowledge:
             weights.append((at @ rows.operator)[0])
         return np.array(weights)
 
-    def relative(self, table: Table) -> NDArray[np.float64]:
+    def relative(self, table: Table) -> Array:
         """Return planned loads by the largest ones (loads, rows)."""
         return np.array([table.column(fit.load) / fit.largest for fit in self.record.loads])
 
@@ -293,12 +287,7 @@ def cautious(scatter: Scatter) -> RunScatter:
 
 
 def _response(
-    terms: NDArray[np.float64],
-    relative: NDArray[np.float64],
-    up: NDArray[np.bool_],
-    noise: Scatter,
-    runs: RunScatter,
-    misfits: float,
+    terms: Array, relative: Array, up: NDArray[np.bool_], noise: Scatter, runs: RunScatter, misfits: float
 ) -> Response:
     """Return the model of one load, in units of its repeatability."""
     within = noise.runs.within
@@ -320,7 +309,7 @@ def _response(
     )
 
 
-def _unit_columns(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unit_columns(columns: Array) -> Array:
     """Return columns each divided by its largest size: terms differ by powers of ten."""
     size = np.abs(columns).max(axis=0)
     return np.asarray(columns / np.where(size > 0, size, 1.0))

@@ -12,24 +12,18 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
+from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis
+from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.noise import Autoregression, layout, whiten
+from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.search.candidates import CandidateEffect, candidates
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError, FitError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis
-    from toolkit.diagnosis.case.case import Run
-    from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.effects.applied import AppliedEffect
-
-    Array = NDArray[np.float64]
 
 _STARTS = 3  # of each place, from the first to the last
 _STEP = 1e-4

@@ -11,19 +11,17 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.diagnosis.case.case import Run
+from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.planning.drives import Drive
 from toolkit.planning.exchange import Alternatives, exchanged
 from toolkit.planning.members import Member, Predicted, denser, expected_log_evidence, predict
 from toolkit.planning.run_changes import RATES, Change, Level, RunLimits, changed, conditions, movable
-
-if TYPE_CHECKING:
-    from toolkit.diagnosis.case.case import Run
-    from toolkit.diagnosis.fit.problem import Problem
 
 _SIZES = (0.0, 0.5, 1.0, 2.0, 4.0)
 _LEVELS: tuple[Level, ...] = ("low", "high")

@@ -7,12 +7,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from toolkit.channels import Rotation
 from toolkit.declared import Entry, toml_text
+from toolkit.machine import Machine, Protocol
 from toolkit.planning.demands import Demand
 from toolkit.planning.design import Design, ordered, standard
+from toolkit.planning.expectation import EarlierTest
 from toolkit.planning.printed_units import PrintedUnits, units_of
 from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan, shared_loads
 from toolkit.planning.reach import Reach
@@ -26,10 +28,6 @@ from toolkit.planning.sweep_plan import (
 from toolkit.planning.sweep_search import RELAXATION, least_sweeps
 from toolkit.planning.tread import Tread, tread_statement
 from toolkit.tires.fit import MIN_POINTS
-
-if TYPE_CHECKING:
-    from toolkit.machine import Machine, Protocol
-    from toolkit.planning.expectation import EarlierTest
 
 _SEED = 25  # of the order in which the slip angles are measured
 

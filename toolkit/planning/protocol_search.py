@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import by_name
 from toolkit.errors import ConfigError
@@ -274,7 +275,7 @@ class ProtocolSearch:
         """Return how many slip angles fit into a time."""
         return int(min(minutes / self.exposure.minutes.min() + 1e-9, len(self.candidates)))
 
-    def _criterion(self, designs: Sequence[Points]) -> NDArray[np.float64]:
+    def _criterion(self, designs: Sequence[Points]) -> Array:
         losses = np.full(len(designs), math.inf)
         serves = np.array([self.question.covers(points) for points in designs])
         if serves.any():

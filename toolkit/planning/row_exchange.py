@@ -16,15 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.planning.criteria import Criterion, criterion, together, with_each_row
 from toolkit.planning.exchange import Alternatives, best_of, exchanged
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LACKING = 1e6  # of a run in which a span is lacking: more than any criterion gains
 _RIDGE = 1e-9  # a first draw may not determine what an exchange will
@@ -40,18 +38,18 @@ class Response:
     from them.
     """
 
-    common: NDArray[np.float64]
-    of_run: NDArray[np.float64]
-    precision: NDArray[np.float64]
-    run_precision: NDArray[np.float64]
-    targets: NDArray[np.float64]
+    common: Array
+    of_run: Array
+    precision: Array
+    run_precision: Array
+    targets: Array
 
     @property
     def wanted(self) -> int:
         """Number of coefficients that are sought."""
         return int(self.targets.shape[1])
 
-    def rows(self, runs: int) -> NDArray[np.float64]:
+    def rows(self, runs: int) -> Array:
         """Return the rows of every candidate in every run: (runs, candidates, columns + runs * effects)."""
         (candidates, columns), effects = self.common.shape, self.of_run.shape[1]
         rows = np.zeros((runs, candidates, columns + runs * effects))
@@ -61,18 +59,16 @@ class Response:
             rows[run, :, start : start + effects] = self.of_run
         return rows
 
-    def before(self, runs: int) -> NDArray[np.float64]:
+    def before(self, runs: int) -> Array:
         """Return the information that is there before any row."""
         return np.diag(np.concatenate([self.precision, np.tile(self.run_precision, runs)]))
 
-    def information(self, points: NDArray[np.intp], run: NDArray[np.intp], runs: int) -> NDArray[np.float64]:
+    def information(self, points: NDArray[np.intp], run: NDArray[np.intp], runs: int) -> Array:
         """Return the information of rows, with what is known beforehand."""
         return _information(self.rows(runs), self.before(runs), points, run)
 
 
-def _information(
-    rows: NDArray[np.float64], before: NDArray[np.float64], points: NDArray[np.intp], run: NDArray[np.intp]
-) -> NDArray[np.float64]:
+def _information(rows: Array, before: Array, points: NDArray[np.intp], run: NDArray[np.intp]) -> Array:
     order = np.argsort(run, kind="stable")
     chosen = rows[run[order], points[order]]
     return np.asarray(chosen.T @ chosen + before)
@@ -87,11 +83,11 @@ class Price:
     """
 
     mount: NDArray[np.intp]
-    minutes: NDArray[np.float64]
-    setup: NDArray[np.float64]
+    minutes: Array
+    setup: Array
     weight: float
 
-    def added(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+    def added(self, rows: NDArray[np.intp]) -> Array:
         """Return what each candidate costs in a run that has these rows."""
         absent = ~np.isin(self.mount, self.mount[rows]) & (self.mount >= 0)
         return self.weight * (self.minutes + self.setup * absent)
@@ -184,8 +180,8 @@ class _Rows:
     price: Price | None
     once: bool
     spans: Sequence[Span]
-    of_candidates: Sequence[NDArray[np.float64]]
-    before: Sequence[NDArray[np.float64]]
+    of_candidates: Sequence[Array]
+    before: Sequence[Array]
 
     def drawn(self, rng: np.random.Generator) -> NDArray[np.intp]:
         """Return a design (rows,) drawn at random."""
@@ -221,9 +217,7 @@ class _Rows:
 
         return Alternatives(losses=losses, present=int(points[at]), design=exchanged_for)
 
-    def _losses(
-        self, remaining: NDArray[np.intp], run_of_rest: NDArray[np.intp], run: int
-    ) -> NDArray[np.float64]:
+    def _losses(self, remaining: NDArray[np.intp], run_of_rest: NDArray[np.intp], run: int) -> Array:
         """Return the criterion (candidates,) of what remains with each candidate added to a run."""
         values = []
         for response, rows, before in zip(self.responses, self.of_candidates, self.before, strict=True):

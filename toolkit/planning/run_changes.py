@@ -17,17 +17,15 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.diagnosis.simulators.setting import pauses
 from toolkit.planning.drives import Drive, Pace, driven, fastest
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.fit.problem import Problem
 
-    Array = NDArray[np.float64]
 
 Level = Literal["low", "high"]
 

@@ -14,27 +14,29 @@ what is read off it has another U.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
+from toolkit.channels import ROTATIONS
 from toolkit.characteristics.catalogue import by_name
-from toolkit.characteristics.groups import CHANNELS, Channel, Direction
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction, DirectionFit
 from toolkit.characteristics.reading import Reader
+from toolkit.planning.design import Design
 from toolkit.tires.models import model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.planning.design import Design
     from toolkit.planning.expectation import EarlierTest
     from toolkit.planning.reach import Reach
     from toolkit.tires.model import CurveFit
 
-    Array = NDArray[np.float64]
 
 _OWN = ("repeatability", "fit", "slip angle scatter")  # of the budget, what follows the design
 _STEP = 1e-4  # of a parameter's size
@@ -103,9 +105,8 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
     full : the design of every candidate slip angle, ascending, once
     reaches : what it reaches of each demand at each load, by the whole budget
     """
-    directions = earlier.directions(full)
+    directions, scatter = earlier.foreseen(full)
     places: dict[tuple[float, str, str], int] = {}
-    scatter = earlier.expected_scatter(directions)
     tangents, variances, scales = [], [], []
     for direction in directions:
         for channel in CHANNELS:
@@ -120,9 +121,11 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
             variances.append(direction.group.own_u(channel) ** 2 + scatter.each(direction, channel))
     gradients = np.zeros((len(reaches), len(tangents), len(scales[0])))
     for row, reach in enumerate(reaches):
-        for (direction, channel), gradient in _gradients(earlier, directions, reach):
-            at = places[direction.group.load_N, direction.group.rotation, channel]
-            gradients[row, at] = gradient * scales[at]
+        demand = reach.demand
+        for curve, gradient in _gradients(
+            earlier, full.slip_angles_rad, demand.characteristic, reach.load_N, reach.rotation, reach.SA_rad
+        ):
+            gradients[row, places[curve]] = gradient * scales[places[curve]]
     fixed = [sum(u * u for source, u in reach.sources if source not in _OWN) for reach in reaches]
     every, own = np.array(tangents), np.array(variances)
     pseudo = np.asarray(np.linalg.pinv(every, rcond=_NO_DATA), dtype=np.float64)
@@ -143,27 +146,36 @@ def _fit(direction: Direction, channel: Channel) -> CurveFit:
     return fit
 
 
+@functools.lru_cache(maxsize=1024)
 def _gradients(
-    earlier: EarlierTest, directions: Sequence[Direction], reach: Reach
-) -> Iterator[tuple[tuple[Direction, Channel], Array]]:
-    """Yield d value / d parameters of each curve that a reading is read off."""
-    declared = by_name()[reach.demand.characteristic]
-    load = earlier.curves[reach.load_N, "forward"].fit.load_N
-    runs = declared.runs if declared.scope == "load" else (reach.rotation,)
-    read_off = [d for run in runs for d in directions if (d.group.load_N, d.group.rotation) == (load, run)]
-    at = () if reach.SA_rad is None else (reach.SA_rad,)
+    earlier: EarlierTest,
+    slip_angles_rad: tuple[float, ...],
+    characteristic: str,
+    load_N: float,
+    rotation: str,
+    SA_rad: float | None,
+) -> tuple[tuple[tuple[float, str, Channel], Array], ...]:
+    """Return d value / d parameters of each curve that a reading is read off, by load, rotation and channel.
+
+    Whatever other loads a design has: what they change is how sure the conditions are, and no value.
+    """
+    declared = by_name()[characteristic]
+    runs = declared.runs if declared.scope == "load" else (rotation,)
+    design = Design(slip_angles_rad=slip_angles_rad, loads_N=(load_N,), rotations=ROTATIONS)
+    directions: dict[str, Direction] = {each.group.rotation: each for each in earlier.directions(design)}
+    at = () if SA_rad is None else (SA_rad,)
     # Of the value alone: what the rows share is not asked for.
     shared = dataclasses.replace(earlier.shared, record=None)
+    still = [Reader(directions[run], shared=shared, stepped=False) for run in runs]
 
-    def value(moved: Direction | None, place: int) -> float:
-        readers = [
-            Reader(moved if moved is not None and i == place else direction, shared=shared, stepped=False)
-            for i, direction in enumerate(read_off)
-        ]
+    def value(place: int, fit: DirectionFit) -> float:
+        readers = [*still[:place], still[place].on_curves(fit), *still[place + 1 :]]
         number = declared.read(declared, *readers, *at)
         return math.nan if number is None else number.value
 
-    for place, direction in enumerate(read_off):
+    found = []
+    for place, reader in enumerate(still):
+        direction = reader.direction
         for channel in CHANNELS:
             fit = _fit(direction, channel)
             slopes = []
@@ -179,6 +191,7 @@ def _gradients(
                         if channel == "FY"
                         else dataclasses.replace(direction.fit, MZ=changed)
                     )
-                    ends.append(value(dataclasses.replace(direction, fit=moved), place))
+                    ends.append(value(place, moved))
                 slopes.append((ends[0] - ends[1]) / (2 * step))
-            yield (direction, channel), np.array(slopes)
+            found.append(((direction.group.load_N, direction.group.rotation, channel), np.array(slopes)))
+    return tuple(found)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.planning.exchange import Alternatives, best_of, exchanged
 
 if TYPE_CHECKING:
@@ -46,11 +47,8 @@ def visits(
 
 
 def in_order(
-    runs: list[list[NDArray[np.intp]]],
-    weights: NDArray[np.float64],
-    relative: NDArray[np.float64],
-    rng: np.random.Generator,
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    runs: list[list[NDArray[np.intp]]], weights: Array, relative: Array, rng: np.random.Generator
+) -> tuple[NDArray[np.intp], Array]:
     """Return the rows of a session in the order that its results answer least to, and what they answer.
 
     Parameters
@@ -68,10 +66,7 @@ def in_order(
 
 
 def _best_order(
-    groups: list[NDArray[np.intp]],
-    weights: NDArray[np.float64],
-    relative: NDArray[np.float64],
-    rng: np.random.Generator,
+    groups: list[NDArray[np.intp]], weights: Array, relative: Array, rng: np.random.Generator
 ) -> NDArray[np.intp]:
     """Return a run's rows by exchange of its visits' places, the best of a few starts."""
     places = range(len(groups))
@@ -97,9 +92,7 @@ def _sequence(groups: list[NDArray[np.intp]], order: tuple[int, ...]) -> NDArray
     return np.concatenate([groups[at] for at in order])
 
 
-def _squares(
-    rows: NDArray[np.intp], weights: NDArray[np.float64], relative: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _squares(rows: NDArray[np.intp], weights: Array, relative: Array) -> Array:
     """Return the squared answers (results, 2) of a run's rows in their order."""
     drift, each = _drift(len(rows)), weights[:, rows]
     creep = np.diff(relative[:, rows], axis=1, prepend=0.0)  # what the load before leaves
@@ -107,7 +100,7 @@ def _squares(
 
 
 @functools.cache
-def _drift(count: int) -> NDArray[np.float64]:
+def _drift(count: int) -> Array:
     """Return a drift of one unit over a run (rows,), zero in the mean."""
     drift = np.linspace(-0.5, 0.5, count)
     drift -= drift.mean()

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.standards.cell_rows import e74_points
 from toolkit.calibration.standards.e74 import MIN_POINTS
 from toolkit.declared import Entry
 from toolkit.findings import Finding
 from toolkit.planning.check_loads import Verification, choose_check_loads
 from toolkit.planning.criteria import Criterion
+from toolkit.planning.fixtures import FeasibleLoads
+from toolkit.planning.knowledge import Knowledge
 from toolkit.planning.row_exchange import loss
 from toolkit.planning.sequence import in_order, visits
 from toolkit.planning.session_search import Demand, Design, SessionSearch
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.session.table import Table
-    from toolkit.planning.fixtures import FeasibleLoads
-    from toolkit.planning.knowledge import Knowledge
 
 _LARGE = 0.5  # of one repeatability: an answer to drift or creep that a reader should know of
 
@@ -184,9 +182,7 @@ class _Finished:
             direction="up" if up else "down", loads=tuple(self.feasible.loads[at].tolist()),
         )  # fmt: skip
 
-    def _outlook(
-        self, design: Design, table: Table, drawn: NDArray[np.float64], answers: NDArray[np.float64]
-    ) -> tuple[Outlook, ...]:
+    def _outlook(self, design: Design, table: Table, drawn: Array, answers: Array) -> tuple[Outlook, ...]:
         knowledge = self.knowledge
         misfits, likely = knowledge.visible_misfit(table), knowledge.likely(table)
         return tuple(

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 AS_READ = 0.02
@@ -62,7 +61,7 @@ def calibrated_interval(fit: LoadFit) -> tuple[float, float]:
     return min(fit.minimum or 0.0, 0.0), max(fit.maximum or 0.0, 0.0)
 
 
-def reach_of(record: CalibrationRecord, feasible: NDArray[np.float64]) -> tuple[Reach, ...]:
+def reach_of(record: CalibrationRecord, feasible: Array) -> tuple[Reach, ...]:
     """Return how far each load may go, by feasible loads (candidates, loads) in the record's order."""
     reached = []
     for fit, loads in zip(record.loads, feasible.T, strict=True):
@@ -76,9 +75,7 @@ def reach_of(record: CalibrationRecord, feasible: NDArray[np.float64]) -> tuple[
     return tuple(reached)
 
 
-def stated_loads(
-    reach: Sequence[Reach], feasible: NDArray[np.float64], at: Mapping[str, float]
-) -> tuple[float, ...]:
+def stated_loads(reach: Sequence[Reach], feasible: Array, at: Mapping[str, float]) -> tuple[float, ...]:
     """Return the load at which U of each is stated: as asked for, no farther than it reaches."""
     stated = []
     for one, loads in zip(reach, feasible.T, strict=True):

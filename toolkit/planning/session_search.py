@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.findings import FEW_POINTS
+from toolkit.calibration.session.table import Table
 from toolkit.errors import ConfigError
 from toolkit.planning.check_loads import choose_check_loads
 from toolkit.planning.criteria import Criterion
-from toolkit.planning.knowledge import RANK_TOLERANCE
+from toolkit.planning.fixtures import FeasibleLoads
+from toolkit.planning.knowledge import RANK_TOLERANCE, Knowledge
 from toolkit.planning.row_exchange import Price, Response, Span, exchange, loss
 from toolkit.planning.session_reach import AS_READ, reach_of, refuse_beyond, stated_loads
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.session.table import Table
-    from toolkit.planning.fixtures import FeasibleLoads
-    from toolkit.planning.knowledge import Knowledge
 
 FEWEST_RUNS, MOST_RUNS = 3, 10
 MOST_ROWS = 160
@@ -63,7 +58,7 @@ class Design:
 
     points: NDArray[np.intp]
     run: NDArray[np.intp]
-    U: NDArray[np.float64]
+    U: Array
     minutes: float | None
 
     @property
@@ -209,7 +204,7 @@ class SessionSearch:
         self._designs[key] = design
         return design
 
-    def _expected(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> NDArray[np.float64]:
+    def _expected(self, points: NDArray[np.intp], run: NDArray[np.intp]) -> Array:
         """Return U of each load; infinite of rows that do not span the loads at which it is stated."""
         if any(span.lacking(points, run) for span in self.spans):
             return np.full(len(self.asked), np.inf)

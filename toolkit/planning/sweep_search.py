@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.characteristics.sweep_fit import Lag, SweepFit, forms_of
 from toolkit.characteristics.sweep_length import relaxation_length
 from toolkit.effects.filters import lag
@@ -26,8 +27,6 @@ from toolkit.planning.reach import Reach
 from toolkit.reduction.sweep import Sweep
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.channels import Rotation
     from toolkit.machine import Machine, Sweeping
     from toolkit.planning.demands import Demand
@@ -243,9 +242,7 @@ def _facts(fit: Lag, form: float) -> tuple[float, float, float]:
     return float(fit.moved @ fit.moved) / len(fit.moved), form, -fit.slope
 
 
-def sweep_of(
-    s: NDArray[np.float64], SA: NDArray[np.float64], FY: NDArray[np.float64], *, load_N: float
-) -> Sweep:
+def sweep_of(s: Array, SA: Array, FY: Array, *, load_N: float) -> Sweep:
     """Return signals over the distance as a sweep of a metre a second."""
     return Sweep(
         file="", file_sha256="", rotation=ROTATION, first_row=1, last_row=len(s), t=s, SA=SA, FY=FY,

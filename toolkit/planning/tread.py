@@ -16,17 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.planning.design import pace_of
+from toolkit.arrays import Array
+from toolkit.planning.design import Design, Pace, pace_of
 from toolkit.simulation.steps import Motion
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.machine import Machine
-    from toolkit.planning.design import Design, Pace
     from toolkit.planning.expectation import EarlierTest
 
-    Array = NDArray[np.float64]
 
 _TREAD = Motion()
 

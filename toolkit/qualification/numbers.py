@@ -14,10 +14,11 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.inverse import StraightLine, x_from_y
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_terms
@@ -25,9 +26,6 @@ from toolkit.calibration.standards.e74 import evaluate_e74
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import is_number, read_toml, sha256_bytes, sha256_file
 from toolkit.qualification.model import Check, correct_digits, digits_check, not_run, printed_check
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 FOLDER = Path(__file__).with_name("data")
 DIGESTS = "digests.toml"
@@ -51,8 +49,8 @@ class CertifiedSet:
     estimates: tuple[float, ...]
     errors: tuple[float, ...]
     residual_sd: float
-    y: NDArray[np.float64]
-    columns: dict[str, NDArray[np.float64]]
+    y: Array
+    columns: dict[str, Array]
     required: tuple[float, ...]
     public: tuple[float, ...]
 
@@ -95,7 +93,7 @@ def number(value: Any, where: Path) -> float:
     return float(value)
 
 
-def numbers(values: Any, where: Path) -> NDArray[np.float64]:
+def numbers(values: Any, where: Path) -> Array:
     """Return a list of finite numbers as an array (n,)."""
     if not isinstance(values, list) or not values:
         raise damaged(where, repr(values))
@@ -180,9 +178,7 @@ def _note(public: float, required: float) -> str:
     return f"public QR solvers reach {public:g}{short}"
 
 
-def _high_polynomial(
-    x: NDArray[np.float64], y: NDArray[np.float64], degree: int
-) -> tuple[tuple[float, ...], tuple[float, ...], float]:
+def _high_polynomial(x: Array, y: Array, degree: int) -> tuple[tuple[float, ...], tuple[float, ...], float]:
     centre = float(np.mean(x))
     half = math.ldexp(1.0, math.frexp(float(np.abs(x - centre).max()))[1])
     z = (x - centre) / half

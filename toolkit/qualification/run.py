@@ -10,11 +10,10 @@ import platform
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.records.record import CalibrationRecord
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.registry.refit import GOLDEN
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.terms import term_matrix
@@ -24,9 +23,6 @@ from toolkit.qualification.gates import check_gates
 from toolkit.qualification.model import Check, NotCovered, QualificationRecord, not_run
 from toolkit.qualification.numbers import check_certified, check_e74, check_lines
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import LoadFit
 
 GROUP = "golden vectors"
 

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.recording.grid import Grid
+from toolkit.recording.grid import Grid
 
 MAX_ROW, MAX_COLUMN = 1_048_576, 16_384
 

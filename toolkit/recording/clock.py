@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from toolkit.arrays import Array
 
 _LISTED = 5
 """Places that are named one by one: a reader needs them to find the rows, and a count of the others."""
@@ -24,7 +22,7 @@ class TimeFault:
     remedy: str
 
 
-def time_fault(t: NDArray[np.float64]) -> TimeFault | None:
+def time_fault(t: Array) -> TimeFault | None:
     """Return why times (n,) do not rise from row to row, None where they do.
 
     Rows out of order are told before times that stand twice: of those, sorting shows which there are.

@@ -10,13 +10,10 @@ import codecs
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from toolkit.machine import Machine
 from toolkit.recording.columns import assign_columns, header_of
 from toolkit.recording.csvfile import HINT, decimal_sign, decode, first_line, separator_of, split_rows
-
-if TYPE_CHECKING:
-    from toolkit.machine import Machine
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"),

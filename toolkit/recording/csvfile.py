@@ -9,17 +9,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.columns import header_of
 from toolkit.recording.table import Table
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # How a text table was saved: its encoding, what separates its cells, and its decimal sign.
 
@@ -289,9 +286,7 @@ def _decimal_of(part: bytes, separator: str, where: Path) -> str:
     return decimal_sign(cells[:-1] or cells, separator, where=where)
 
 
-def _plain_numbers(
-    data: bytes, begin: int, separator: bytes, decimal: bytes, width: int
-) -> NDArray[np.float64] | None:
+def _plain_numbers(data: bytes, begin: int, separator: bytes, decimal: bytes, width: int) -> Array | None:
     """Return what stands from ``begin`` on (rows, columns); None where it is anything but plain numbers."""
     tail = data[max(begin, len(data) - _BLANK_LINES) :]
     end = len(data) - (len(tail) - len(tail.rstrip(b"\r\n")))
@@ -310,7 +305,7 @@ def _plain_numbers(
     return columns.T
 
 
-def _numbers_of(part: bytes, separator: bytes, decimal: bytes, width: int) -> NDArray[np.float64] | None:
+def _numbers_of(part: bytes, separator: bytes, decimal: bytes, width: int) -> Array | None:
     part = part.replace(b"\r\n", b"\n")
     if part.translate(None, _PLAIN + separator + decimal) or _LONG_EXPONENT.search(part):
         return None

@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -45,7 +47,7 @@ _BY_CHANCE = -9.0  # log10 of the share of columns of any other numbers that loo
 _HALF = np.array([0.5 * float(f"1e{-places}") for places in range(_FULL)] + [0.0])  # by decimals
 
 
-def rounding(series: Series) -> NDArray[np.float64]:
+def rounding(series: Series) -> Array:
     """Return how far each value may lie from the one that was measured (rows,), in the channel's unit.
 
     Half a unit of its last printed place, or half the step in which a binary file stores it if that is more.
@@ -53,7 +55,7 @@ def rounding(series: Series) -> NDArray[np.float64]:
     return np.asarray(roundings([series])[0])
 
 
-def roundings(series: Sequence[Series]) -> NDArray[np.float64]:
+def roundings(series: Sequence[Series]) -> Array:
     """Return `rounding` of several channels of one file (channels, rows)."""
     printed = half_last_places(np.stack([channel.values for channel in series]))
     for channel, half in zip(series, printed, strict=True):
@@ -62,7 +64,7 @@ def roundings(series: Sequence[Series]) -> NDArray[np.float64]:
     return printed
 
 
-def half_last_places(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def half_last_places(columns: Array) -> Array:
     """Return half a unit of the last printed place of every value, 0 where it is a full double.
 
     ``columns`` (columns, rows), finite. Of a column of single floats it is half their step, with what
@@ -117,7 +119,7 @@ def _parts(rows: int) -> list[slice]:
     return [slice(start, start + _ROWS) for start in range(0, rows, _ROWS)]
 
 
-def _shown(most: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.float64]:
+def _shown(most: NDArray[np.int64], count: NDArray[np.int64]) -> Array:
     """Return half a last place by column, decade and sign (columns, 2 decades + 1), that of zeros last.
 
     ``most`` and ``count`` (columns, decades, 2): decimals of the finest value, and how many values there are.
@@ -138,7 +140,7 @@ def _shown(most: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.floa
     return table
 
 
-def _single_floats(column: NDArray[np.float64]) -> bool:
+def _single_floats(column: Array) -> bool:
     """Tell whether a column (rows,) holds single floats, by the digits that its values show."""
     log_chance = 0.0
     for part in _parts(len(column)):
@@ -155,14 +157,14 @@ def _single_floats(column: NDArray[np.float64]) -> bool:
     return log_chance <= _BY_CHANCE
 
 
-def _decades(size: NDArray[np.float64]) -> NDArray[np.int64]:
+def _decades(size: Array) -> NDArray[np.int64]:
     # floor(log10), mended where the logarithm was rounded up to a whole number.
     decade = np.floor(np.log10(size)).astype(np.int64)
     too_high = _POWER[decade.clip(-_LEAST) + _LEAST] > size
     return np.where(too_high, decade - 1, decade)
 
 
-def _places(size: NDArray[np.float64], decade: NDArray[np.int64]) -> NDArray[np.int64]:
+def _places(size: Array, decade: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return how many decimals each value needs, `_FULL` for a full double; 0 or more.
 
     ``round(v 10^k) / 10^k == v`` is an exact test: both operands of the division are exact, so the

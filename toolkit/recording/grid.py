@@ -12,12 +12,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from toolkit.arrays import Array
 
 _LARGEST = 16 * 2**20  # bytes of XML; beyond, the places of all tags would take too much memory
 _MOST_COLUMNS = 26
@@ -48,7 +48,7 @@ class Grid:
         """Return the worksheet without these rows."""
         return xml[: self.begin] + xml[self.end :]
 
-    def numbers(self, xml: bytes) -> NDArray[np.float64] | None:
+    def numbers(self, xml: bytes) -> Array | None:
         """Return the numbers (rows, columns), each the double nearest to its text.
 
         None where a text is no finite number in plain digits: a parser then tells what stands there.
@@ -129,7 +129,7 @@ def _row_attributes(xml: bytes, quotes: list[int], cells: list[int]) -> bool:
 
 def _decimals(
     octets: NDArray[np.uint8], starts: NDArray[np.int64], stops: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+) -> tuple[Array, NDArray[np.bool_]]:
     """Return the values of plain decimals, and which texts are such (texts,).
 
     At most `_EXACT` characters: digits and power of ten are exact in a double, so their quotient is the

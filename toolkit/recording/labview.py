@@ -9,18 +9,15 @@ import re
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import OutputError
 from toolkit.machine import Machine
 from toolkit.publication import write_result
 from toolkit.recording.cells import reference
 from toolkit.recording.marks import GENERATOR, STAMP, recording_keywords
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 SIMULATED_SHEET = "simulated"
 _SHEET = "Sheet1"
@@ -32,7 +29,7 @@ _OPTIONAL_ROLES = ("acquired",)
 def write_labview(
     path: Path,
     machine: Machine,
-    columns: Mapping[str, NDArray[np.float64]],
+    columns: Mapping[str, Array],
     *,
     simulated: bool,
     title: str | None = None,
@@ -94,7 +91,7 @@ def _shell(headers: tuple[str, ...], *, sheet: str, title: str, keywords: str, c
     return stream.getvalue()
 
 
-def _rows_xml(values: list[NDArray[np.float64]]) -> bytes:
+def _rows_xml(values: list[Array]) -> bytes:
     # openpyxl writes 16 digits, one too few for a double; repr has as many as are needed.
     letters = [reference(1, column + 1)[:-1] for column in range(len(values))]
     lines = []
@@ -125,7 +122,7 @@ def _filled(shell: bytes, rows: bytes, created: dt.datetime) -> bytes:
     return stream.getvalue()
 
 
-def _layout(path: Path, machine: Machine, columns: Mapping[str, NDArray[np.float64]]) -> list[str]:
+def _layout(path: Path, machine: Machine, columns: Mapping[str, Array]) -> list[str]:
     by_symbol = {column.symbol: column for column in machine.columns}
     wrong = [name for name in columns if name not in by_symbol and "[" not in name]
     missing = [
@@ -142,7 +139,7 @@ def _layout(path: Path, machine: Machine, columns: Mapping[str, NDArray[np.float
     return [name for name in by_symbol if name in columns] + [name for name in columns if "[" in name]
 
 
-def _check(path: Path, names: list[str], values: list[NDArray[np.float64]]) -> None:
+def _check(path: Path, names: list[str], values: list[Array]) -> None:
     rows = values[0].shape
     for name, value in zip(names, values, strict=True):
         if value.shape != rows or value.ndim != 1 or not len(value):

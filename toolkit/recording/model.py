@@ -7,16 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
+from toolkit.arrays import Array
 from toolkit.channels import Reversal
 from toolkit.errors import ColumnError
 from toolkit.printable import escaped
 from toolkit.units import to_si
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.machine import Machine
     from toolkit.machine.definition import Role
 
@@ -35,16 +32,16 @@ class Series:
     header: str
     unit: str
     role: Role
-    values: NDArray[np.float64]
-    half: NDArray[np.float64] | None = None
+    values: Array
+    half: Array | None = None
     sign: Literal[1, -1] = 1
 
     @property
-    def si(self) -> NDArray[np.float64]:
+    def si(self) -> Array:
         """The values in SI (rows,)."""
         return self.si_of(slice(None))
 
-    def si_of(self, rows: slice) -> NDArray[np.float64]:
+    def si_of(self, rows: slice) -> Array:
         """Return the values of some rows in SI."""
         values = to_si(self.values[rows], self.unit)
         return values if self.sign == 1 else -values

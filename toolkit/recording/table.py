@@ -7,18 +7,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.cells import reference
 from toolkit.recording.columns import Assigned, assign_columns
 from toolkit.recording.model import Series
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _NUMBERS = frozenset((float, int))
 _EMPTY = ("", None)
@@ -37,7 +35,7 @@ class Table:
     where: str
     rows: Sequence[Sequence[Any]]
     errors: tuple[tuple[str, str], ...] = ()
-    numbers: NDArray[np.float64] | None = None
+    numbers: Array | None = None
     hidden: tuple[int, ...] = ()
 
     def in_rows(self) -> Table:
@@ -137,7 +135,7 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     return tuple(_as_series(column, matrix[column.index]) for column in assigned)
 
 
-def _numbers(body: Sequence[Sequence[Any]]) -> NDArray[np.float64] | None:
+def _numbers(body: Sequence[Sequence[Any]]) -> Array | None:
     # Every column (columns, rows) where each cell is a finite number, as of most files; else None.
     width = len(body[0])
     if set(map(len, body)) != {width}:
@@ -151,7 +149,7 @@ def _numbers(body: Sequence[Sequence[Any]]) -> NDArray[np.float64] | None:
     return columns
 
 
-def _array(cells: list[Any]) -> NDArray[np.float64] | None:
+def _array(cells: list[Any]) -> Array | None:
     # The types are looked at before numpy sees them: it would take True for 1 and "12.3" for text.
     if not _NUMBERS.issuperset(map(type, cells)):
         return None
@@ -170,7 +168,7 @@ def _series(assigned: Assigned, cells: list[Any], where: str, first_row: int) ->
     return _as_series(assigned, values)
 
 
-def _as_series(assigned: Assigned, values: NDArray[np.float64]) -> Series:
+def _as_series(assigned: Assigned, values: Array) -> Series:
     return Series(
         symbol=assigned.symbol, header=assigned.header, unit=assigned.unit, role=assigned.role, values=values
     )

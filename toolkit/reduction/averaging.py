@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.reduction.blocks import Block
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def window(recording: Recording, block: Block, *, machine: Machine, rolling_radi
 
 def revolutions(
     recording: Recording, block: Block, *, machine: Machine, rolling_radius_m: float | None
-) -> NDArray[np.float64] | None:
+) -> Array | None:
     """Return revolutions of the protocol's shaft since the block's first row (rows,), None if unknown.
 
     The tire rolls on the drum: what the drum's surface travels, the tire's does too. A turn of the other
@@ -119,7 +119,7 @@ def revolutions(
     return None
 
 
-def clock_of(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def clock_of(time: Array) -> Array | None:
     """Return what a clock counts since its first row (rows,), None where it stands still or runs backwards.
 
     >>> clock_of(np.array([5.0, 5.0, 5.1])).round(9).tolist()
@@ -133,7 +133,7 @@ def clock_of(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
     return np.asarray(elapsed)
 
 
-def shaft_turns(angle: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def shaft_turns(angle: Array) -> Array | None:
     """Return the turns of a shaft since its first row (rows,), None where it does not turn in one direction.
 
     An encoder's jitter is no turn backwards.
@@ -146,7 +146,7 @@ def shaft_turns(angle: NDArray[np.float64]) -> NDArray[np.float64] | None:
     return np.asarray(rising)
 
 
-def means(values: NDArray[np.float64], *, explained: NDArray[np.float64] | None = None) -> tuple[Mean, ...]:
+def means(values: Array, *, explained: Array | None = None) -> tuple[Mean, ...]:
     """Return the mean of consecutive rows and its uncertainty, for each channel.
 
     Parameters
@@ -178,7 +178,7 @@ def means(values: NDArray[np.float64], *, explained: NDArray[np.float64] | None 
     )
 
 
-def turning(rows: int, revolutions: float | None) -> NDArray[np.float64]:
+def turning(rows: int, revolutions: float | None) -> Array:
     """Return the first two harmonics of the tire's revolution (4, rows), none where its turns are not whole.
 
     Over whole revolutions a non-uniformity of the tire has no mean: its swing is no error.
@@ -190,9 +190,7 @@ def turning(rows: int, revolutions: float | None) -> NDArray[np.float64]:
     return np.stack([wave(order * phase) for order in (1, 2) for wave in (np.cos, np.sin)])
 
 
-def _unexplained(
-    residual: NDArray[np.float64], explained: NDArray[np.float64] | None
-) -> tuple[NDArray[np.float64], int]:
+def _unexplained(residual: Array, explained: Array | None) -> tuple[Array, int]:
     """Return what signals leave of rows about their mean (channels, rows), and the freedoms that it took."""
     count = 0 if explained is None else len(explained)
     if explained is None or not count or residual.shape[1] < _ROWS_EACH * (count + 1):

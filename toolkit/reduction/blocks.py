@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.arrays import Array
+
 # A jump is larger than the row-to-row noise and than a small part of the largest load. The upper limit
 # keeps a file with one row a load in five blocks: there every step is a jump and noise cannot be seen.
 _NOISE_FACTOR = 8.0
@@ -37,7 +39,7 @@ class Block:
         return self.stop - self.start
 
 
-def find_blocks(FZ: NDArray[np.float64]) -> tuple[Block, ...]:
+def find_blocks(FZ: Array) -> tuple[Block, ...]:
     """Split rows where the load jumps.
 
     Parameters
@@ -63,7 +65,7 @@ def find_blocks(FZ: NDArray[np.float64]) -> tuple[Block, ...]:
     return tuple(Block(start=a, stop=b, mean_FZ=mean) for (a, b), mean in zip(rows, means, strict=True))
 
 
-def block_means(values: NDArray[np.float64], rows: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+def block_means(values: Array, rows: Sequence[tuple[int, int]]) -> Array:
     """Return the mean of the values (rows,) in each block (blocks,); ``rows``: first row and stop of each.
 
     Each is what ``mean`` gives of that block alone, to the last bit. Blocks of one length are taken at once:
@@ -104,14 +106,7 @@ _ARRIVED = 0.25
 
 
 def find_rests(
-    *,
-    SA: NDArray[np.float64],
-    FZ: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    band_SA: float,
-    band_FZ: float,
-    floor_FZ: float,
-    least_turns: float,
+    *, SA: Array, FZ: Array, turns: Array, band_SA: float, band_FZ: float, floor_FZ: float, least_turns: float
 ) -> tuple[Block, ...]:
     """Return the rests of a recording that holds the moves too, in the order of recording.
 
@@ -158,9 +153,7 @@ def find_rests(
     return tuple(sorted(blocks, key=lambda block: block.start))
 
 
-def _ends(
-    SA: NDArray[np.float64], FZ: NDArray[np.float64], *, band_SA: float, band_FZ: float, floor_FZ: float
-) -> NDArray[np.int64]:
+def _ends(SA: Array, FZ: Array, *, band_SA: float, band_FZ: float, floor_FZ: float) -> NDArray[np.int64]:
     """Return for every row where the run that begins there leaves a band, (rows,), the row excluded."""
     angles, loads = _Extremes(SA.tolist()), _Extremes(FZ.tolist())
     ends = np.empty(len(SA), dtype=np.int64)
@@ -215,14 +208,7 @@ class _Extremes:
 
 
 def _arrived(
-    SA: NDArray[np.float64],
-    FZ: NDArray[np.float64],
-    start: int,
-    stop: int,
-    *,
-    band_SA: float,
-    band_FZ: float,
-    floor_FZ: float,
+    SA: Array, FZ: Array, start: int, stop: int, *, band_SA: float, band_FZ: float, floor_FZ: float
 ) -> tuple[int, int]:
     """Return the run without the rows at its ends in which the machine still moves."""
     stretch = slice(start, stop)

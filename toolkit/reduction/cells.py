@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import seen_by_cells, signs
 from toolkit.findings import Finding
 from toolkit.reduction import limits
@@ -35,8 +36,6 @@ from toolkit.reduction.physics import Departure, Readings, departures, longest_t
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import TestInfo
@@ -58,14 +57,14 @@ class Cells:
     """
 
     names: tuple[str, ...]
-    indications: NDArray[np.float64]
-    per_FY: NDArray[np.float64]
-    per_MZ: NDArray[np.float64]
-    per_MX: NDArray[np.float64] | None
+    indications: Array
+    per_FY: Array
+    per_MZ: Array
+    per_MX: Array | None
     radius_m: float | None
-    tares: NDArray[np.float64]
-    FY_sign: NDArray[np.float64]
-    MZ_sign: NDArray[np.float64]
+    tares: Array
+    FY_sign: Array
+    MZ_sign: Array
 
 
 def physics_findings(
@@ -157,8 +156,8 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
     return tuple(findings)
 
 
-def _readings(conditions: Sequence[Condition], info: TestInfo, IA: NDArray[np.float64]) -> Readings:
-    def column(name: str) -> NDArray[np.float64]:
+def _readings(conditions: Sequence[Condition], info: TestInfo, IA: Array) -> Readings:
+    def column(name: str) -> Array:
         return np.array([getattr(c, name) for c in conditions], dtype=np.float64)
 
     none = np.zeros(len(conditions))
@@ -201,8 +200,8 @@ def _cells(
 
 
 def _overturning(
-    record: CalibrationRecord, per_FY: NDArray[np.float64], levers: Mapping[str, float], machine: Machine
-) -> NDArray[np.float64] | None:
+    record: CalibrationRecord, per_FY: Array, levers: Mapping[str, float], machine: Machine
+) -> Array | None:
     # A right-handed MX about the spindle falls with FY by the loaded radius where z points down.
     if machine.hub is not None and "MX" in machine.hub.loads:
         return _linear(record, "MX") * (1.0 if machine.axes == "ISO-W" else -1.0)
@@ -212,7 +211,7 @@ def _overturning(
     return _linear(record, "MX") if any(load.load == "MX" for load in record.loads) else None
 
 
-def _linear(record: CalibrationRecord, load: str) -> NDArray[np.float64]:
+def _linear(record: CalibrationRecord, load: str) -> Array:
     fit = record.load(load)
     by_term = dict(zip(fit.terms, fit.coefficients, strict=True))
     return np.array([by_term.get(name, 0.0) for name in record.indications]) * si_scale(fit.unit)
@@ -235,7 +234,7 @@ def _changes(readings: Readings, cells: Cells) -> list[tuple[str, tuple[Readings
     return [(text, _with(readings, cells, now)) for text, now in changes]
 
 
-def _with(readings: Readings, cells: Cells, now: NDArray[np.float64]) -> tuple[Readings, Cells]:
+def _with(readings: Readings, cells: Cells, now: Array) -> tuple[Readings, Cells]:
     step = now - cells.indications
     changed = dataclasses.replace(
         readings,

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from toolkit.channels import Rotation
+from toolkit.arrays import Array
+from toolkit.channels import Rotation
 
 # Rests at no step of the protocol are at two slip angles where they are further apart than half a degree.
 _GAP_RAD = float(np.radians(0.5))
@@ -78,7 +77,7 @@ def at_one_angle(conditions: Sequence[OnCurve]) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(sorted(group)) for group in groups.values())
 
 
-def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | None, ...]:
+def slopes(FZ: Array, y: Array) -> tuple[Slope | None, ...]:
     """Return dy/dFZ at each block of one file from its neighbours in load.
 
     Parameters
@@ -118,14 +117,14 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
     return tuple(slopes_found)
 
 
-def _nodes(x: NDArray[np.float64], place: int, middle: int) -> list[int]:
+def _nodes(x: Array, place: int, middle: int) -> list[int]:
     """Return up to five blocks in the order in which a polynomial at one of them takes them up."""
     nodes = [place, *(i for i in (middle - 1, middle, middle + 1) if i != place)]
     outer = sorted(set(range(len(x))) - set(nodes), key=lambda i: abs(x[i] - x[place]))
     return nodes + outer[:2]
 
 
-def _terms(x: NDArray[np.float64], y: NDArray[np.float64], nodes: Sequence[int]) -> list[float]:
+def _terms(x: Array, y: Array, nodes: Sequence[int]) -> list[float]:
     """Return what each order of Newton's polynomial adds to the slope at its first node."""
     at, table = x[nodes], y[nodes]
     terms, product = [], 1.0

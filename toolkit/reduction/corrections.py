@@ -8,42 +8,33 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.apply import apply_record
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.effects import forward
 from toolkit.findings import Finding
+from toolkit.machine import Machine
+from toolkit.recording.model import Recording
 from toolkit.reduction.averaging import means
 from toolkit.reduction.blocks import Block
 from toolkit.reduction.health import tare_under_load
 from toolkit.reduction.model import Tare
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine
-    from toolkit.recording.model import Recording
-
 
 ENOUGH_ROWS = 20
 """Rows of a tare that tell its scatter: of fewer, twice the standard deviation is too short."""
 _FEWEST_ROWS = 8  # of a load block that tells a scatter
 
 
-def corrected(
-    machine: Machine, channels: Mapping[str, NDArray[np.float64]]
-) -> dict[str, NDArray[np.float64]]:
+def corrected(machine: Machine, channels: Mapping[str, Array]) -> dict[str, Array]:
     """Return SA, FZ, FY and MZ, each (n,), SI and machine axes, with every correction of the machine."""
     return forward.corrected([correction.in_SI for correction in machine.corrections], channels)
 
 
-def u_SA(machine: Machine, MZ: NDArray[np.float64]) -> float:
+def u_SA(machine: Machine, MZ: Array) -> float:
     """Return the standard uncertainty [rad] that corrections leave in the slip angle.
 
     Where it goes with the moment, that at the largest moment (n,) [N·m] of the test: an upper bound for the
@@ -170,9 +161,7 @@ def _of_few_rows(tare: Tare, files: Sequence[tuple[Recording, Sequence[Block], S
     )
 
 
-def zero_shifts(
-    record: CalibrationRecord, indications: NDArray[np.float64], u: Sequence[float]
-) -> dict[str, NDArray[np.float64]]:
+def zero_shifts(record: CalibrationRecord, indications: Array, u: Sequence[float]) -> dict[str, Array]:
     """Return how far each cell's open zero moves each load [SI]: load -> (cells, rows).
 
     Parameters
@@ -183,7 +172,7 @@ def zero_shifts(
     names = record.indications
     units = dict(zip(names, record.indication_units, strict=True))
 
-    def loads(cell: int, sign: float) -> dict[str, NDArray[np.float64]]:
+    def loads(cell: int, sign: float) -> dict[str, Array]:
         moved = {name: indications[i] + sign * u[i] * (i == cell) for i, name in enumerate(names)}
         return apply_record(record, moved, units=units)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import RecordingError
 from toolkit.findings import Finding, Level
 from toolkit.reduction.averaging import clock_of, shaft_turns
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from toolkit.machine import Machine
     from toolkit.recording.model import Recording, Series
 
-    Array = NDArray[np.float64]
 
 _FEW_ROWS = 8  # fewer prove nothing
 _STUCK = 6  # rows in a row at one value, of a channel whose neighbouring rows otherwise differ

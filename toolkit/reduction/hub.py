@@ -17,29 +17,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.apply import apply_record, coefficient_jacobian
-from toolkit.channels import hub_signs, signs
+from toolkit.calibration.records.record import CalibrationRecord
+from toolkit.channels import Rotation, hub_signs, signs
 from toolkit.errors import ColumnError, RecordError
 from toolkit.findings import Finding
+from toolkit.machine import Machine
 from toolkit.recording.model import Recording, Series
 from toolkit.reduction.averaging import means
 from toolkit.reduction.corrections import zero_shifts
 from toolkit.reduction.model import HubLoad
 from toolkit.units import si_scale
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.channels import Rotation
-    from toolkit.machine import Machine
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,11 +44,11 @@ class HubBlock:
     ``explained`` (signals, rows) what the rows follow without its being an error of their mean.
     """
 
-    loads: Mapping[str, NDArray[np.float64]]
-    cells: NDArray[np.float64]
+    loads: Mapping[str, Array]
+    cells: Array
     u_zero: tuple[float, ...]
     tared: bool
-    explained: NDArray[np.float64]
+    explained: Array
 
 
 def check_hub(record: CalibrationRecord, machine: Machine) -> None:
@@ -83,7 +77,7 @@ def hub_means(
     *,
     machine: Machine,
     record: CalibrationRecord,
-    covariance: Mapping[str, NDArray[np.float64]],
+    covariance: Mapping[str, Array],
     seen: Rotation,
 ) -> tuple[HubLoad, ...]:
     """Return the mean of each load of the hub over a block, in SAE J670 axes that follow the travel.
@@ -179,9 +173,7 @@ def hub_findings(machine: Machine) -> list[Finding]:
 _CARRIED = {"MX": ("FY", 1.0), "MY": ("FX", -1.0)}
 
 
-def _u_fit(
-    block: HubBlock, record: CalibrationRecord, load: str, covariance: Mapping[str, NDArray[np.float64]]
-) -> float:
+def _u_fit(block: HubBlock, record: CalibrationRecord, load: str, covariance: Mapping[str, Array]) -> float:
     """Return what the record's coefficients leave in a load at the mean indications [SI]."""
     if load not in covariance:
         return 0.0

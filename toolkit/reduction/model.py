@@ -10,15 +10,13 @@ from toolkit.calibration.records.use import CalibrationUse
 from toolkit.channels import Rotation
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
-from toolkit.machine import load_machine
+from toolkit.machine import Machine, TypeB, load_machine
 from toolkit.machine.definition import machine_of_text
 from toolkit.recording.model import TestInfo
 from toolkit.reduction.physics import RULES
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from toolkit.machine import Machine, TypeB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

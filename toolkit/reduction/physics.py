@@ -17,15 +17,14 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.findings import Finding, Level
 from toolkit.reduction import limits
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Rule = Literal[
     "impossible-force",
@@ -61,16 +60,16 @@ class Readings:
     """
 
     place: tuple[str, ...]
-    FZ: NDArray[np.float64]
-    SA: NDArray[np.float64]
-    FY: NDArray[np.float64]
-    MZ: NDArray[np.float64]
+    FZ: Array
+    SA: Array
+    FY: Array
+    MZ: Array
     reverse: NDArray[np.bool_]
     block: tuple[tuple[float | None, float | None], ...]
-    u_FY: NDArray[np.float64]
-    u_MZ: NDArray[np.float64]
-    FX: NDArray[np.float64]
-    IA: NDArray[np.float64]
+    u_FY: Array
+    u_MZ: Array
+    FX: Array
+    IA: Array
     trail_m: float = limits.TRAIL.high
     signed: bool = True
 
@@ -289,12 +288,12 @@ def _count(over: NDArray[np.intp], r: Readings) -> str:
 def of_sizes(
     places: Sequence[str],
     *,
-    FZ: NDArray[np.float64],
-    SA: NDArray[np.float64],
-    FY: NDArray[np.float64],
-    MZ: NDArray[np.float64],
-    FX: NDArray[np.float64] | None = None,
-    IA: NDArray[np.float64] | None = None,
+    FZ: Array,
+    SA: Array,
+    FY: Array,
+    MZ: Array,
+    FX: Array | None = None,
+    IA: Array | None = None,
     trail_m: float = limits.TRAIL.high,
 ) -> Readings:
     """Return readings of which only sizes can be judged: blocks of one file, or rows of a table; FZ > 0."""

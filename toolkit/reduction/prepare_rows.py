@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.apply import apply_record
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.channels import Rotation
 from toolkit.errors import RecordError, RecordingError
+from toolkit.machine import Machine
 from toolkit.recording.digits import rounding
+from toolkit.recording.model import Recording, TestInfo
 from toolkit.reduction.averaging import ROLLING_RATIO, Window, free_radius_m, revolutions, window
 from toolkit.reduction.blocks import Block, find_blocks, find_rests, is_tare
 from toolkit.reduction.corrections import corrected
 from toolkit.reduction.hub import check_hub
 from toolkit.reduction.model import Tare
 from toolkit.units import from_si, si_scale
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine
-    from toolkit.recording.model import Recording, TestInfo
 
 # Compare the acquisition program's own FY and MZ with ours, row by row.
 
@@ -45,7 +40,7 @@ def compare(
     record: CalibrationRecord,
     *,
     file: str,
-    indications: Mapping[str, NDArray[np.float64]],
+    indications: Mapping[str, Array],
     units: Mapping[str, str],
     tare: Mapping[str, float] | None,
 ) -> tuple[Difference, ...]:
@@ -59,7 +54,7 @@ def compare(
         return ()
     symbols = [channel.symbol for channel in channels]
 
-    def reading(offset: Mapping[str, float] | None, *, issued: bool) -> Mapping[str, NDArray[np.float64]]:
+    def reading(offset: Mapping[str, float] | None, *, issued: bool) -> Mapping[str, Array]:
         return apply_record(record, indications, units=units, tare=offset, issued=issued, only=symbols)
 
     readings = [
@@ -87,12 +82,12 @@ def compare(
 def _moved(
     record: CalibrationRecord,
     load: str,
-    indications: Mapping[str, NDArray[np.float64]],
+    indications: Mapping[str, Array],
     units: Mapping[str, str],
-    halves: Mapping[str, NDArray[np.float64]],
+    halves: Mapping[str, Array],
     *,
-    plain: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    plain: Array,
+) -> Array:
     """Return how far half a printed digit of every indication may move a load [SI], summed."""
     fit = record.load(load)
     coefficients = dict(zip(fit.terms, fit.coefficients, strict=True))
@@ -126,13 +121,13 @@ class OpenedFile:
     name: str
     recording: Recording
     rotation: Rotation
-    indications: NDArray[np.float64]
-    channels: NDArray[np.float64]
+    indications: Array
+    channels: Array
     blocks: tuple[Block, ...]
     windows: tuple[Window, ...]
     differences: tuple[Difference, ...]
     tare: Tare
-    hub: Mapping[str, NDArray[np.float64]]
+    hub: Mapping[str, Array]
 
 
 def check_record(record: CalibrationRecord, machine: Machine) -> None:

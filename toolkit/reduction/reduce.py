@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.records.use import not_asked
 from toolkit.calibration.uncertainty.common_errors import record_covariance
 from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
+from toolkit.findings import Finding
+from toolkit.machine import Machine, Protocol, TypeB
+from toolkit.recording.model import Recording, TestInfo
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means, turning
@@ -25,15 +30,6 @@ from toolkit.reduction.remarks import drift_findings
 from toolkit.reduction.selection import CONDITIONS, Selection, of_one_condition, parted
 from toolkit.reduction.strays import copied_findings, stray_findings
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.findings import Finding
-    from toolkit.machine import Machine, Protocol, TypeB
-    from toolkit.recording.model import Recording, TestInfo
-
 
 # Blocks at a load that the protocol does not know are one load while they lie within this part of each other.
 _SAME_LOAD = 0.10
@@ -279,7 +275,7 @@ def _condition(
     machine: Machine,
     record: CalibrationRecord,
     reversal: Reversal,
-    covariance: Mapping[str, NDArray[np.float64]],
+    covariance: Mapping[str, Array],
 ) -> Condition:
     recording, rows = file.recording, window.rows
     seen_rotation = seen_by_cells(file.rotation, reversal)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.findings import Finding
 from toolkit.reduction.common_load import OnCurve, at_one_angle
 from toolkit.units import from_si
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from toolkit.recording.model import Recording
     from toolkit.reduction.model import Condition
 
-    Array = NDArray[np.float64]
 
 _UNITS = {"FY": "N", "MZ": "N*m"}
 _FAR = 10.0  # times what the other files leave; healthy tests stay under 5. And

@@ -9,27 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.apply import apply_record
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.channels import Rotation, seen_by_cells, signs
 from toolkit.findings import Finding
+from toolkit.machine import Machine
 from toolkit.recording.clock import time_fault
+from toolkit.recording.model import Recording, TestInfo
 from toolkit.reduction.corrections import corrected
 from toolkit.reduction.health import health_findings
 from toolkit.reduction.hub import with_load
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine
-    from toolkit.recording.model import Recording, TestInfo
-    from toolkit.reduction.model import Tare
-
-    Array = NDArray[np.float64]
+from toolkit.reduction.model import Tare
 
 SMALL_RAD = float(np.radians(1.5))
 """Slip angles beyond it are not near zero: the curve is a cubic within, and the length hardly falls."""

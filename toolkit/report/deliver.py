@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from toolkit.errors import RenderError, ToolkitError
 from toolkit.files import sha256_bytes, sha256_file
@@ -24,17 +24,15 @@ from toolkit.inputs import PDF_FILE, read_input
 from toolkit.publication import publication
 from toolkit.recording.marks import GENERATOR, refuse_original
 from toolkit.report.content import Plot, ReportContent
+from toolkit.report.drawer import Drawer
+from toolkit.report.figures import Picture
 from toolkit.report.word.chart import with_alternatives
-from toolkit.report.word.fill import fill, needed_figures
+from toolkit.report.word.fill import Survey, fill, survey
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
 from toolkit.report.word.package import Template
 from toolkit.report.word.toc_pages import Printed, print_copies
 from toolkit.report.word.verify import Check, verify_docx, verify_pdf
-
-if TYPE_CHECKING:
-    from toolkit.report.drawer import Drawer
-    from toolkit.report.figures import Picture
 
 Step = Callable[[str], None]
 Writer = Callable[[Path], object]
@@ -211,8 +209,9 @@ def _pictures(runs: Sequence[_Run], drawer: Drawer | None) -> Mapping[str, Pictu
     plots: dict[str, Plot] = {}
     for index, run in enumerate(runs):
         if run.error is None:
-            run.attempt(run.choose)
-            plots |= {f"{index}/{name}": run.job.content.plots[name] for name in run.figures}
+            run.attempt(run.survey)
+            figures = () if run.surveyed is None else run.surveyed.figures
+            plots |= {f"{index}/{name}": run.job.content.plots[name] for name in figures}
     return drawer.pictures(plots) if drawer else {name: draw(plot) for name, plot in plots.items()}
 
 
@@ -223,7 +222,7 @@ class _Run:
         self.job, self.keep = job, keep
         self.publication = contextlib.ExitStack()
         self.stage: Path | None = None
-        self.figures: tuple[str, ...] = ()
+        self.surveyed: Survey | None = None
         self.filled: Filled | None = None
         self.checks: list[Check] = []
         self.error: ToolkitError | None = None
@@ -256,12 +255,15 @@ class _Run:
         stop = RenderError("the report was not finished")
         self.publication.__exit__(type(stop), stop, None)
 
-    def choose(self) -> None:
-        self.figures = needed_figures(self.job.template, self.job.content)
+    def survey(self) -> None:
+        # A template that cannot be used is refused before a figure is drawn.
+        self.surveyed = survey(self.job.template, self.job.content, fonts=True)
 
     def fill(self, pictures: Mapping[str, Picture], allow_missing: bool) -> None:
         job = self.job
-        filled = fill(job.template, job.content, pictures, allow_missing=allow_missing, fonts=True)
+        filled = fill(
+            job.template, job.content, pictures, allow_missing=allow_missing, surveyed=self.surveyed
+        )
         self._file(".docx").write_bytes(filled.docx)
         self.checks += verify_docx(filled)
         self.filled = filled

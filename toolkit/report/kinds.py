@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from toolkit.report.content import ReportContent, Value
+from toolkit.report.document import Document
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN
 from toolkit.report.vocabulary import Entry, Vocabulary
 from toolkit.report.word.check import LintFinding, check_template, vocabulary_of
-from toolkit.report.word.package import open_package
+from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import scan
 from toolkit.report.word.xml import stories
-
-if TYPE_CHECKING:
-    from toolkit.report.document import Document
-    from toolkit.report.word.package import Template
 
 
 def list_tags(content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> list[dict[str, Any]]:

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.declared import AtLeast, Entry, Unit
 from toolkit.simulation.cells import CELLS, CellsTruth
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
     from toolkit.machine import Machine
 
@@ -83,7 +82,7 @@ def true_program(cells: CellsTruth) -> OwnProgram:
     return OwnProgram(record=None, FY=truth["FY"], MZ=truth["MZ"])
 
 
-def low_pass(signal: NDArray[np.float64], *, time_constant: float, dt: float) -> NDArray[np.float64]:
+def low_pass(signal: Array, *, time_constant: float, dt: float) -> Array:
     """Return a signal (rows, ...) behind a first-order filter that had settled on its first row.
 
     >>> import numpy as np
@@ -105,9 +104,9 @@ def low_pass(signal: NDArray[np.float64], *, time_constant: float, dt: float) ->
 class Noise:
     """Noise of every sample before the filter: cells [V/V] (rows, 3), SA [rad] and FZ [N] (rows,)."""
 
-    cells: NDArray[np.float64]
-    SA: NDArray[np.float64]
-    FZ: NDArray[np.float64]
+    cells: Array
+    SA: Array
+    FZ: Array
 
 
 def draw_noise(truth: AcquisitionTruth, cells: CellsTruth, rows: int, rng: np.random.Generator) -> Noise:
@@ -130,14 +129,8 @@ def joined(parts: Sequence[Noise]) -> Noise:
 
 
 def digitise(
-    truth: AcquisitionTruth,
-    *,
-    cells: NDArray[np.float64],
-    FZ: NDArray[np.float64],
-    SA: NDArray[np.float64],
-    noise: Noise,
-    dt: float,
-) -> dict[str, NDArray[np.float64]]:
+    truth: AcquisitionTruth, *, cells: Array, FZ: Array, SA: Array, noise: Noise, dt: float
+) -> dict[str, Array]:
     """Return the recorded channels in SI, symbol to (rows,): noise, then the filter of cells and angle."""
     smooth = low_pass(cells + noise.cells, time_constant=truth.filter_time_constant_s, dt=dt)
     angle = low_pass(SA + noise.SA, time_constant=truth.filter_time_constant_s, dt=dt)
@@ -145,9 +138,7 @@ def digitise(
     return {"FZ": FZ + noise.FZ, "SA": angle, **channels}
 
 
-def own_columns(
-    program: OwnProgram, channels: dict[str, NDArray[np.float64]]
-) -> dict[str, NDArray[np.float64]]:
+def own_columns(program: OwnProgram, channels: dict[str, Array]) -> dict[str, Array]:
     """Return the program's FY [N] and MZ [N·m] from the recorded cells, zeros included."""
     cells = np.column_stack([channels[name] for name in CELLS])
     return {
@@ -156,9 +147,9 @@ def own_columns(
     }
 
 
-def printed(machine: Machine, channels: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+def printed(machine: Machine, channels: dict[str, Array]) -> dict[str, Array]:
     """Return the columns as the machine's files have them: their units, their order, their digits."""
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, Array] = {}
     for column in machine.columns:
         if column.symbol in channels:
             values = from_si(channels[column.symbol], column.unit)
@@ -166,7 +157,7 @@ def printed(machine: Machine, channels: dict[str, NDArray[np.float64]]) -> dict[
     return columns
 
 
-def round_printed(symbol: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def round_printed(symbol: str, values: Array) -> Array:
     """Return values with the digits that the machine's files show for a channel.
 
     >>> import numpy as np

@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.declared import Entry, Unit
 from toolkit.simulation.tire import TireForces
 from toolkit.units import to_si
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,16 +36,12 @@ class RoadTruth:
     ] = 2.1
 
 
-def drum_angle(
-    *, time: NDArray[np.float64], speed_m_s: float, radius_m: float, start_rad: float, reverse: bool
-) -> NDArray[np.float64]:
+def drum_angle(*, time: Array, speed_m_s: float, radius_m: float, start_rad: float, reverse: bool) -> Array:
     """Return the drum's angle [rad] at times [s]; a reversed drum counts down."""
     return start_rad + (-1.0 if reverse else 1.0) * time * speed_m_s / radius_m
 
 
-def load_on_drum(
-    road: RoadTruth, *, load: NDArray[np.float64], angle: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def load_on_drum(road: RoadTruth, *, load: Array, angle: Array) -> Array:
     """Return the load [N] between tire and drum: the actuator's load plus the run-out's lines.
 
     >>> import numpy as np
@@ -62,7 +56,7 @@ def load_on_drum(
     )
 
 
-Angle = TypeVar("Angle", float, "NDArray[np.float64]")
+Angle = TypeVar("Angle", float, "Array")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,10 +88,10 @@ class CarriageTruth:
 class HubLoads:
     """FY [N], MZ and MX [N·m] on the hub, machine axes, and the load FZ [N] beside them."""
 
-    FY: NDArray[np.float64]
-    MZ: NDArray[np.float64]
-    MX: NDArray[np.float64]
-    FZ: NDArray[np.float64]
+    FY: Array
+    MZ: Array
+    MX: Array
+    FZ: Array
 
 
 def wheel_angle(carriage: CarriageTruth, *, step_rad: Angle) -> Angle:
@@ -105,7 +99,7 @@ def wheel_angle(carriage: CarriageTruth, *, step_rad: Angle) -> Angle:
     return step_rad + carriage.steering_zero_rad - carriage.steer_offset_rad
 
 
-def sensed_angle(carriage: CarriageTruth, *, SA: NDArray[np.float64]) -> NDArray[np.float64]:
+def sensed_angle(carriage: CarriageTruth, *, SA: Array) -> Array:
     """Return what the slip-angle sensor stands at [rad]."""
     return SA + carriage.steer_offset_rad
 
@@ -115,7 +109,7 @@ def set_load(carriage: CarriageTruth, *, step_N: float, rng: np.random.Generator
     return step_N * (1.0 + carriage.load_spread * float(rng.uniform(-1.0, 1.0)))
 
 
-def hub_loads(carriage: CarriageTruth, *, tire: TireForces, FZ: NDArray[np.float64]) -> HubLoads:
+def hub_loads(carriage: CarriageTruth, *, tire: TireForces, FZ: Array) -> HubLoads:
     """Carry the tire's forces to the hub: MX = loaded radius x FY + the wheel's weight moment.
 
     Without load (a wheel that hangs free) only the weight is left.

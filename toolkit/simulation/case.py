@@ -7,11 +7,13 @@ else of kind ``columns`` with what the plan's tire does at the measured slip ang
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.effects.signals import Drive, drive
 from toolkit.errors import ConfigError
 from toolkit.inputs import TIRE_FILE, read_input
@@ -26,11 +28,6 @@ from toolkit.simulation.write import shown, unit_of
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_write import file_text
 from toolkit.units import from_si
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 CASE, TIRE, RUNS = "CASE.toml", "tire.tir", "runs"
 _TARE = "tare.csv"
@@ -198,12 +195,12 @@ def _parameter(parameter: CaseParameter) -> list[str]:
 
 
 def _columns(
-    file: VirtualFile, names: Sequence[str], nominal: list[tuple[str, NDArray[np.float64]]]
-) -> list[tuple[str, NDArray[np.float64]]]:
+    file: VirtualFile, names: Sequence[str], nominal: list[tuple[str, Array]]
+) -> list[tuple[str, Array]]:
     return [*((name, shown(file.signals, name)) for name in names), *nominal]
 
 
-def _nominal(test: VirtualTest, file: VirtualFile) -> list[tuple[str, NDArray[np.float64]]]:
+def _nominal(test: VirtualTest, file: VirtualFile) -> list[tuple[str, Array]]:
     plan, signals = test.plan, file.signals
     facing = -1.0 if file.run.mounting == "turned" else 1.0
     pressure = plan.pressure_Pa if file.run.pressure_Pa is None else file.run.pressure_Pa
@@ -216,10 +213,10 @@ def _nominal(test: VirtualTest, file: VirtualFile) -> list[tuple[str, NDArray[np
     ]
 
 
-def _tare(test: VirtualTest, names: Sequence[str]) -> list[tuple[str, NDArray[np.float64]]]:
+def _tare(test: VirtualTest, names: Sequence[str]) -> list[tuple[str, Array]]:
     rows = len(test.tare_rows[CELLS[0]])
     first = {name: values[:1] for name, values in test.files[0].signals.items()}
-    columns: list[tuple[str, NDArray[np.float64]]] = []
+    columns: list[tuple[str, Array]] = []
     for name in names:
         if name == "t":
             times = -_TARE_BEFORE_S + test.tare_dt * np.arange(rows)

@@ -9,15 +9,12 @@ down, as in the recording of Figure 4.4.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.simulation.carriage import HubLoads
 from toolkit.units import to_si
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 CELLS = ("D51", "D52", "E5")
 LOADS = ("FY", "MZ", "MX")
@@ -72,13 +69,13 @@ class CellsTruth:
         return self.D51, self.D52, self.E5
 
 
-def cell_forces(loads: NDArray[np.float64]) -> NDArray[np.float64]:
+def cell_forces(loads: Array) -> Array:
     """Return the forces [N] (rows, 3: D51, D52, E5) in the cells under loads (rows, 3: FY, MZ, MX)."""
-    indications: NDArray[np.float64] = np.linalg.solve(np.array(MAP), np.asarray(loads, dtype=np.float64).T).T
+    indications: Array = np.linalg.solve(np.array(MAP), np.asarray(loads, dtype=np.float64).T).T
     return indications
 
 
-def outputs(truth: CellsTruth, *, loads: NDArray[np.float64], tared: bool = False) -> NDArray[np.float64]:
+def outputs(truth: CellsTruth, *, loads: Array, tared: bool = False) -> Array:
     """Return the outputs [V/V] (rows, 3: D51, D52, E5) without noise.
 
     ``tared`` leaves out every zero, as an amplifier that was zeroed does.
@@ -92,7 +89,7 @@ def outputs(truth: CellsTruth, *, loads: NDArray[np.float64], tared: bool = Fals
     return np.column_stack(columns)
 
 
-def sense(truth: CellsTruth, *, hub: HubLoads) -> NDArray[np.float64]:
+def sense(truth: CellsTruth, *, hub: HubLoads) -> Array:
     """Return the cells' outputs [V/V] (rows, 3) under the loads at the hub."""
     FY = hub.FY + truth.crosstalk_FZ_FY * hub.FZ
     return outputs(truth, loads=np.column_stack([FY, hub.MZ, hub.MX]))

@@ -18,12 +18,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from toolkit.effects.applied import AppliedEffect, Condition
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.errors import ConfigError, UnitError
+from toolkit.machine import Machine
 from toolkit.simulation.places import (
     can_join,
     channels_of,
@@ -34,9 +34,6 @@ from toolkit.simulation.places import (
 )
 from toolkit.spelling import nearest
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    from toolkit.machine import Machine
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII | re.DOTALL)
 

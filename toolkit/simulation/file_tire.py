@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Rotation
 from toolkit.effects.signals import TireForces
 from toolkit.errors import ConfigError
 from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import state
 from toolkit.tires.tir import TirFile, read_tir, si_number
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _PRESSURE = ("PPY1", "PPY2", "PPY3", "PPY4", "PPZ1", "PPZ2")
 _CAMBER = (
@@ -90,14 +87,7 @@ def read_file_tire(path: Path) -> FileTire:
 
 
 def file_forces(
-    tire: FileTire,
-    *,
-    SA: NDArray[np.float64],
-    FZ: NDArray[np.float64],
-    IA: NDArray[np.float64],
-    V: NDArray[np.float64],
-    pressure_Pa: NDArray[np.float64],
-    rotation: Rotation,
+    tire: FileTire, *, SA: Array, FZ: Array, IA: Array, V: Array, pressure_Pa: Array, rotation: Rotation
 ) -> TireForces:
     """Return FY [N] and MZ [N·m] in the machine's axes, each (n,); nothing where there is no load.
 

@@ -9,10 +9,10 @@ a file that it names and that has changed since is refused, because the fit is n
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from toolkit.channels import AXES, Axes
 from toolkit.effects.applied import AppliedEffect, Condition
@@ -23,9 +23,6 @@ from toolkit.files import check_keys, is_number, number_expected, parse_toml, sh
 from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, read_input
 from toolkit.publication import settle
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 CONTENT = "augmented simulation"
 FILES = ("tire", "path", "calibration", "machine")

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
+from toolkit.arrays import Array
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.forward import through
+from toolkit.effects.signals import Setting
 from toolkit.machine import Machine
 from toolkit.simulation.cells import CELLS
 from toolkit.units import from_si, to_si
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from toolkit.effects.applied import AppliedEffect
-    from toolkit.effects.signals import Setting
 
 # Units in which effects act on a signal; a cell is in the unit of the machine's own files.
 _UNITS = {"FY": "N", "MZ": "N*m", "MX": "N*m", "FZ": "N", "SA": "deg"}
@@ -67,11 +62,8 @@ def default_channels(effect: Effect) -> tuple[str, ...]:
 
 
 def through_machine(
-    signals: Mapping[str, NDArray[np.float64]],
-    effects: Iterable[AppliedEffect],
-    setting: Setting,
-    machine: Machine,
-) -> dict[str, NDArray[np.float64]]:
+    signals: Mapping[str, Array], effects: Iterable[AppliedEffect], setting: Setting, machine: Machine
+) -> dict[str, Array]:
     """Return signals [SI] by name when effects have acted on them, each in the signal's own unit."""
     return through(
         signals,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit, from_bytes
 from toolkit.errors import ConfigError, RecordError
 from toolkit.inputs import RECORD_FILE, is_regular, read_input
 from toolkit.simulation.acquisition import OwnProgram
@@ -13,7 +13,6 @@ from toolkit.simulation.cells import CELLS
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.registry.registry import Registry
     from toolkit.simulation.plan import Plan
 

@@ -15,10 +15,11 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Rotation
 from toolkit.effects.applied import AppliedEffect, acting, in_order
 from toolkit.effects.filters import lag
@@ -36,10 +37,7 @@ from toolkit.simulation.steps import RunSteps, machine_speed
 from toolkit.simulation.timeline import Block, Timeline
 from toolkit.simulation.tire import TireForces as HubTire
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Signals = dict[str, NDArray[np.float64]]
+Signals = dict[str, Array]
 
 _TARE_FILE = 1_000_000  # the tare's place among the seeds, beyond any file's number
 _TARE_ROWS = 100  # of the lifted wheel's one revolution, however few a recording has
@@ -74,10 +72,10 @@ class VirtualFile:
 
     name: str
     rotation: Rotation
-    columns: dict[str, NDArray[np.float64]]
+    columns: dict[str, Array]
     truth: tuple[BlockTruth, ...]
     run: RunSteps
-    signals: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    signals: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,7 +92,7 @@ class VirtualTest:
     tare_u: tuple[tuple[str, float], ...]
     tare_unit: str
     program: OwnProgram
-    tare_rows: dict[str, NDArray[np.float64]]
+    tare_rows: dict[str, Array]
     tare_dt: float
 
 
@@ -322,8 +320,8 @@ class Walked:
     """
 
     hub: carriage.HubLoads
-    SA: NDArray[np.float64]
-    sensed: NDArray[np.float64]
+    SA: Array
+    sensed: Array
     setting: Setting
     after: Before
 
@@ -417,9 +415,7 @@ def _setting(plan: Plan, run: RunSteps, line: Timeline, before: Before, speed: f
     )
 
 
-def _warmed(
-    plan: Plan, setting: Setting, line: Timeline, power_W: NDArray[np.float64], before: Before
-) -> Setting:
+def _warmed(plan: Plan, setting: Setting, line: Timeline, power_W: Array, before: Before) -> Setting:
     # T' = heat * power - (T - room) / cooling, on top of the room's own temperature.
     cooling = plan.motion.tread_cooling_s
     gain = plan.motion.tread_heating_K_J * cooling

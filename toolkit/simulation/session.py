@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.simulation.cells import CELLS, LOADS, outputs
 from toolkit.simulation.plan import Plan
 from toolkit.units import from_si
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 INDICATION_UNIT = "mV/V"  # of the fit, whatever the files hold
 LOAD_UNITS = {"FY": "lbf", "MZ": "lbf*ft", "MX": "lbf*ft"}
@@ -46,12 +43,12 @@ class VirtualSession:
     """
 
     plan: Plan
-    indications: NDArray[np.float64]
-    loads: NDArray[np.float64]
+    indications: Array
+    loads: Array
     run: tuple[int, ...]
     direction: tuple[str, ...]
-    check_indications: NDArray[np.float64]
-    check_loads: NDArray[np.float64]
+    check_indications: Array
+    check_loads: Array
     zeros: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
@@ -110,9 +107,7 @@ def reference_sd(plan: Plan) -> dict[str, float]:
     return {load: float(from_si(si[load], LOAD_UNITS[load])) for load in LOADS}
 
 
-def _measure(
-    plan: Plan, shares: NDArray[np.float64], rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _measure(plan: Plan, shares: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     truth = plan.session
     largest = {"FY": truth.FY_N, "MZ": truth.MZ_Nm, "MX": truth.MX_Nm}
     stated = np.column_stack(
@@ -129,7 +124,7 @@ def _measure(
     return recorded(plan, bridge), stated
 
 
-def recorded(plan: Plan, bridge: NDArray[np.float64]) -> NDArray[np.float64]:
+def recorded(plan: Plan, bridge: Array) -> Array:
     """Return bridge outputs [V/V] as the plan's files hold them: rounded mV/V, mV, or whole counts."""
     output = plan.session.output
     if output == "count":
@@ -183,9 +178,7 @@ def _header(session: VirtualSession) -> list[str]:
     return [f"{name} [{output}]" for name in CELLS] + [f"{x} [{LOAD_UNITS[x]}]" for x in LOADS]
 
 
-def _cells(
-    session: VirtualSession, indications: NDArray[np.float64], loads: NDArray[np.float64]
-) -> list[list[str]]:
+def _cells(session: VirtualSession, indications: Array, loads: Array) -> list[list[str]]:
     decimals = DECIMALS[session.plan.session.output]
     rows = []
     for row, reference in zip(indications.tolist(), loads.tolist(), strict=True):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Rotation
 from toolkit.effects.applied import acting
 from toolkit.effects.forward import Steady, tire_forces
@@ -16,12 +17,7 @@ from toolkit.simulation import tire as bakker
 from toolkit.simulation.file_tire import file_forces
 from toolkit.simulation.plan import Plan
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import NDArray
-
-    Answer = Callable[[float, float, Rotation], tuple[float, float]]
+Answer = Callable[[float, float, Rotation], tuple[float, float]]
 
 
 def steady_of(plan: Plan, *, rotation: Rotation, facing: float, pressure_Pa: float) -> Steady:
@@ -29,7 +25,7 @@ def steady_of(plan: Plan, *, rotation: Rotation, facing: float, pressure_Pa: flo
     file = plan.tire_file
     if file is None:
 
-        def published(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+        def published(SA: Array, drive: Drive) -> TireForces:
             forces = bakker.forces(
                 plan.tire, SA=SA, FZ=drive.FZ, rotation=rotation, camber=drive.IA, facing=facing
             )
@@ -37,7 +33,7 @@ def steady_of(plan: Plan, *, rotation: Rotation, facing: float, pressure_Pa: flo
 
         return published
 
-    def from_file(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+    def from_file(SA: Array, drive: Drive) -> TireForces:
         pressure = pressure_Pa + drive.pressure_error
         return file_forces(
             file, SA=SA, FZ=drive.FZ, IA=drive.IA, V=drive.V, pressure_Pa=pressure, rotation=rotation
@@ -73,7 +69,7 @@ def settled(plan: Plan, conditions: Mapping[str, str]) -> Answer:
     return answer
 
 
-def loaded_radius(plan: Plan, FZ: NDArray[np.float64]) -> NDArray[np.float64]:
+def loaded_radius(plan: Plan, FZ: Array) -> Array:
     """Return the distance of the hub from the drum [m], (n,)."""
     truth = plan.tire
     return truth.free_radius_m - np.maximum(FZ, 0.0) / truth.vertical_stiffness_N_m

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.errors import ConfigError
 from toolkit.simulation import acquisition, carriage, tire
 from toolkit.simulation.acquisition import Noise
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.steps import RunSteps, machine_speed
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LIFT_S = 1.0  # from the lifted wheel to the first load
 _MOST_ROWS = 1_048_575  # of an .xlsx sheet, less its header
@@ -44,12 +42,12 @@ class Timeline:
     ``recorded`` the rows of the file.
     """
 
-    t: NDArray[np.float64]
-    clock: NDArray[np.float64]
+    t: Array
+    clock: Array
     dt: float
-    SA_CMD: NDArray[np.float64]
-    FZ_CMD: NDArray[np.float64]
-    FZ_SET: NDArray[np.float64]
+    SA_CMD: Array
+    FZ_CMD: Array
+    FZ_SET: Array
     noise: Noise
     recorded: NDArray[np.bool_]
     blocks: tuple[Block, ...]
@@ -74,7 +72,7 @@ class _Path:
         self.y += [start_value, target] if arrived > start else [target]
         return arrived
 
-    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, times: Array) -> Array:
         """Return the values at times."""
         return np.interp(times, self.t, self.y)
 
@@ -94,7 +92,7 @@ def dwell(plan: Plan, run: RunSteps, rng: np.random.Generator, extra: np.random.
     rates = _rates(plan, run)
     clock = float(rng.uniform(0.0, 60.0))  # the drum turns on between files
     paths = {"SA": _Path(), "CMD": _Path(), "SET": _Path()}
-    times: list[NDArray[np.float64]] = []
+    times: list[Array] = []
     noises: list[Noise] = []
     recorded: list[NDArray[np.bool_]] = []
     blocks: list[Block] = []
@@ -192,7 +190,7 @@ def _move(
     return max(turned, loaded)
 
 
-def _between(start: float, end: float, dt: float, *, first: bool) -> NDArray[np.float64]:
+def _between(start: float, end: float, dt: float, *, first: bool) -> Array:
     count = max(math.ceil((end - start) / dt - 1e-6) - 1, 0)
     rows = start + dt * np.arange(1, count + 1, dtype=np.float64)
     return np.concatenate([[start], rows]) if first else rows
@@ -200,7 +198,7 @@ def _between(start: float, end: float, dt: float, *, first: bool) -> NDArray[np.
 
 def _made(
     paths: dict[str, _Path],
-    clock: NDArray[np.float64],
+    clock: Array,
     dt: float,
     noises: list[Noise],
     recorded: NDArray[np.bool_],

@@ -17,15 +17,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from toolkit.arrays import Array
 from toolkit.channels import Rotation
 from toolkit.errors import ConfigError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 # A passenger-car tire: the Magic Formula and coefficients of Bakker, Nyborg and Pacejka (1987).
 
@@ -51,7 +49,7 @@ ALIGNING = Coefficients(
 )
 
 
-def lateral_force(*, slip_angle: ArrayLike, load: ArrayLike, camber: ArrayLike = 0.0) -> NDArray[np.float64]:
+def lateral_force(*, slip_angle: ArrayLike, load: ArrayLike, camber: ArrayLike = 0.0) -> Array:
     """Return FY [N] in adapted-SAE axes.
 
     Parameters
@@ -72,9 +70,7 @@ def lateral_force(*, slip_angle: ArrayLike, load: ArrayLike, camber: ArrayLike =
     return _curve(LATERAL, a3 * np.sin(a4 * np.arctan(a5 * kN)), kN, slip_angle, camber)
 
 
-def aligning_moment(
-    *, slip_angle: ArrayLike, load: ArrayLike, camber: ArrayLike = 0.0
-) -> NDArray[np.float64]:
+def aligning_moment(*, slip_angle: ArrayLike, load: ArrayLike, camber: ArrayLike = 0.0) -> Array:
     """Return MZ [N·m] in adapted-SAE axes; parameters as in `lateral_force`.
 
     >>> import math
@@ -86,9 +82,7 @@ def aligning_moment(
     return _curve(ALIGNING, (a3 * kN**2 + a4 * kN) / np.exp(a5 * kN), kN, slip_angle, camber)
 
 
-def _curve(
-    table: Coefficients, BCD: NDArray[np.float64], kN: NDArray[np.float64], slip: ArrayLike, camber: ArrayLike
-) -> NDArray[np.float64]:
+def _curve(table: Coefficients, BCD: Array, kN: Array, slip: ArrayLike, camber: ArrayLike) -> Array:
     gamma = np.degrees(np.asarray(camber, dtype=np.float64))
     a1, a2 = table.a[:2]
     a6, a7, a8 = table.a[5:]
@@ -99,7 +93,7 @@ def _curve(
     E = (a6 * kN**2 + a7 * kN + a8) / (1 - a13 * np.abs(gamma))
     x = np.degrees(np.asarray(slip, dtype=np.float64)) + a9 * gamma
     phi = (1 - E) * x + E / B * np.arctan(B * x)
-    force: NDArray[np.float64] = D * np.sin(table.C * np.arctan(B * phi)) + (a10 * kN**2 + a11 * kN) * gamma
+    force: Array = D * np.sin(table.C * np.arctan(B * phi)) + (a10 * kN**2 + a11 * kN) * gamma
     return force
 
 
@@ -127,9 +121,9 @@ class TireTruth:
 class TireForces:
     """FY [N] and MZ [N·m] in the machine's axes, and the loaded radius [m]; all of one shape."""
 
-    FY: NDArray[np.float64]
-    MZ: NDArray[np.float64]
-    loaded_radius: NDArray[np.float64]
+    FY: Array
+    MZ: Array
+    loaded_radius: Array
 
 
 def forces(

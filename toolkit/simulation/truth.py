@@ -9,23 +9,19 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Rotation
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import VirtualTest
-from toolkit.simulation.steady import settled
+from toolkit.simulation.steady import Answer, settled
 from toolkit.simulation.steps import Motion
 from toolkit.simulation.tire import TireTruth, forces, pseudo_camber
 from toolkit.tires.slopes import limit_slope
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.simulation.steady import Answer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +54,7 @@ def true_stiffness(tire: TireTruth | Answer, *, load_N: float, rotation: Rotatio
     one_degree = math.radians(1.0)
     answer = _answer(tire)
 
-    def curves(SA: NDArray[np.float64]) -> NDArray[np.float64]:
+    def curves(SA: Array) -> Array:
         return np.array([_sae(answer, float(angle), load_N, rotation) for angle in SA]).T
 
     slope_FY, slope_MZ = (float(slope) for slope in limit_slope(curves))

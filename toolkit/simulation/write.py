@@ -8,18 +8,22 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.declared import toml_text
 from toolkit.errors import OutputError
+from toolkit.machine import Protocol
 from toolkit.machine.definition import Machine, load_machine, machine_names
 from toolkit.publication import publication
 from toolkit.recording.labview import write_labview
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
+from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import VirtualTest
 from toolkit.simulation.session import (
     DECIMALS,
@@ -35,14 +39,6 @@ from toolkit.simulation.steps import machine_speed
 from toolkit.simulation.truth import truth_document
 from toolkit.staging import PASSING
 from toolkit.units import from_si, si_scale
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from toolkit.machine import Protocol
-    from toolkit.simulation.plan import Plan
 
 # The further columns of a continuous recording and of a case: their units and digits.
 
@@ -72,13 +68,13 @@ def unit_of(name: str) -> str:
     return UNITS[name][0]
 
 
-def shown(signals: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.float64]:
+def shown(signals: Mapping[str, Array], name: str) -> Array:
     """Return a signal [SI] in its column's unit and digits."""
     text, decimals = UNITS[name]
     return np.asarray(np.round(from_si(signals[name], text), decimals) + 0.0, dtype=np.float64)
 
 
-def further(signals: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+def further(signals: Mapping[str, Array]) -> dict[str, Array]:
     """Return the further columns of a continuous recording, under headers with their units."""
     return {f"{name} [{unit_of(name)}]": shown(signals, name) for name in FURTHER}
 

@@ -10,12 +10,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.use import UNSIGNED
-from toolkit.characteristics.model import answer_lists
+from toolkit.characteristics.model import Characteristics, answer_lists
 from toolkit.estimate import Estimate
 from toolkit.reduction.model import Condition
 
 if TYPE_CHECKING:
-    from toolkit.characteristics.model import Characteristics
     from toolkit.pipeline import TestResult
 
 SCHEMA = 2

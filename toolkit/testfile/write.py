@@ -19,15 +19,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 from toolkit.characteristics.characteristic import BOTH
 from toolkit.characteristics.sweep_fit import SweepFit
 from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
+from toolkit.findings import Finding
+from toolkit.pipeline import TestResult
 from toolkit.publication import write_result
 from toolkit.recording.cells import reference
 from toolkit.recording.marks import mark_workbook
+from toolkit.recording.model import Recording
 from toolkit.testfile.layout import (
     CONDITION_FIELDS,
     DIGEST,
@@ -40,12 +43,7 @@ from toolkit.testfile.layout import (
     header,
 )
 from toolkit.testfile.readable import Sheet, Shown, readable_sheets
-
-if TYPE_CHECKING:
-    from toolkit.findings import Finding
-    from toolkit.pipeline import TestResult
-    from toolkit.recording.model import Recording
-    from toolkit.tires.model import CurveFit
+from toolkit.tires.model import CurveFit
 
 Rows = Iterable[Sequence[Any]]
 

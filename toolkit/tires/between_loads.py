@@ -9,17 +9,14 @@ are two); a model that departs from it by more than `LIMIT` of the largest value
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from toolkit.tires.global_model import Departure, Rows, make_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from toolkit.tires.global_data import Measured
-    from toolkit.tires.global_model import Array, GlobalModel
+from toolkit.arrays import Array
+from toolkit.tires.global_data import Measured
+from toolkit.tires.global_model import Departure, GlobalModel, Rows, make_rows
 
 LIMIT = {2: 0.125, 3: 0.10}
 """Of the largest value at a load, by how many loads tell what to expect.

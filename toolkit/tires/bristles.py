@@ -8,14 +8,11 @@ to -1, a bristle has the force w (over load, per du), and the sums are FX/FZ, FY
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from toolkit.arrays import Array
 
 _TOLERANCE = 1e-11  # of the carcass's slopes, rad
 _ROUNDS = 25  # of Broyden's method; most states need five to ten

@@ -18,14 +18,11 @@ go beyond what these weights allow are slower than an autoregression of first or
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from toolkit.arrays import Array
 
 # The autocorrelation of a fit's residuals: by how many rows they repeat themselves.
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import signs
 from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.evaluate import value_at
@@ -18,9 +19,6 @@ from toolkit.tires.global_model import GlobalModel, ModelFit, make_rows, pooled_
 from toolkit.tires.model import CurveFit
 from toolkit.tires.models import model as find_curve_model
 from toolkit.tires.quality import scatter_floor_percent
-
-if TYPE_CHECKING:
-    from toolkit.tires.global_model import Array
 
 _FREE = 0.005  # longitudinal slip up to which a row is of pure side slip
 

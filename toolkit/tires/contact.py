@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.tires.recorded import as_array
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from toolkit.tires.global_model import Rows
 
-    Array = NDArray[np.float64]
 
 _LOCKED = 1e-6  # 1 + KAPPA of a wheel that stands still: all slides, in the direction of the velocity
 _ANGLE = np.deg2rad(89.0)

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from toolkit.arrays import Array
 from toolkit.estimate import Estimate
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit
 from toolkit.tires.models import model
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
 _REACH = math.radians(20.0)  # a crossing further out is no property of the tire near zero slip
 
 
-def value_at(fit: CurveFit, SA: ArrayLike) -> NDArray[np.float64]:
+def value_at(fit: CurveFit, SA: ArrayLike) -> Array:
     """Return the fitted FY [N] or MZ [N·m] at slip angles [rad], of any shape."""
     return model(fit.model).value(fit.values, SA)
 
 
-def slope_at(fit: CurveFit, SA: ArrayLike) -> NDArray[np.float64]:
+def slope_at(fit: CurveFit, SA: ArrayLike) -> Array:
     """Return the fitted slope [N/rad or N·m/rad] at slip angles [rad], of any shape."""
     return model(fit.model).slope(fit.values, SA)
 
@@ -74,7 +72,7 @@ def zero_crossing(fit: CurveFit) -> Estimate | None:
     return Estimate(value=SA, u=value.u / abs(slope), unit="rad", dof=value.dof)
 
 
-def _estimate(fit: CurveFit, value: float, gradient: NDArray[np.float64], unit: str) -> Estimate:
+def _estimate(fit: CurveFit, value: float, gradient: Array, unit: str) -> Estimate:
     variance = float(gradient @ np.asarray(fit.covariance) @ gradient)
     at_zero = fit.value_at_zero or fit.slope_at_zero
     return Estimate(

@@ -15,10 +15,12 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.channels import CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.files import reads_as_number
@@ -27,9 +29,6 @@ from toolkit.recording.csvfile import decimal_sign, decode
 from toolkit.recording.safe_open import gate
 from toolkit.recording.sniff import sniff
 from toolkit.units import split_header, unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 CHANNEL = "channel"
 _SYMBOLS = {
@@ -54,7 +53,7 @@ class FieldFile:
 
     path: Path
     axes: Axes
-    columns: Mapping[str, NDArray[np.float64]]
+    columns: Mapping[str, Array]
     passed: tuple[str, ...]
 
     @property
@@ -211,7 +210,7 @@ def _cell(path: Path, line: int, name: str, actual: str, expected: str, rule: st
     )  # fmt: skip
 
 
-def _in_si(name: str, values: NDArray[np.float64], text: str, path: Path) -> NDArray[np.float64]:
+def _in_si(name: str, values: Array, text: str, path: Path) -> Array:
     channel, where = CHANNELS[_SYMBOLS[name]], f"{path}, channel {name}"
     stated = unit(text, where=where)
     if stated.dimension != channel.dimension:

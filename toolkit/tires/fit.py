@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
 from toolkit.tires.colour import noise_of
@@ -26,12 +26,8 @@ from toolkit.tires.kernel import (
 from toolkit.tires.model import CHANNEL_UNIT, LOSSES, Curve, CurveFit, Loss, Parameter
 from toolkit.tires.models.magic_formula import MODEL
 from toolkit.tires.quality import error_percent, scatter_floor_percent
-from toolkit.tires.solver import solve, solve_robust
+from toolkit.tires.solver import Solution, solve, solve_robust
 from toolkit.tires.uncertainty import Spread, curve_columns, spread
-
-if TYPE_CHECKING:
-    from toolkit.tires.kernel import Array
-    from toolkit.tires.solver import Solution
 
 __all__ = [
     "MIN_POINTS",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Axes, signs
 from toolkit.reduction.selection import CONDITIONS, parted
 from toolkit.tires.global_model import Rows, make_rows
@@ -15,7 +16,6 @@ from toolkit.tires.global_model import Rows, make_rows
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.tires.global_model import Array
     from toolkit.tires.table import TireTable
 
 # Load blocks of a table: the gaps in the sorted loads, not a list of nominal ones.
@@ -26,9 +26,7 @@ _SAME_ANGLE, _SHARED = np.radians(0.25), 0.5
 _RESOLVED = 0.008  # gaps below this are all alike
 
 
-def load_blocks(
-    load: NDArray[np.float64], SA: NDArray[np.float64] | None = None
-) -> tuple[NDArray[np.intp], ...]:
+def load_blocks(load: Array, SA: Array | None = None) -> tuple[NDArray[np.intp], ...]:
     """Return the rows of each load block, ascending in load, rows in their order.
 
     Parameters
@@ -54,12 +52,12 @@ def load_blocks(
     return tuple(joined)
 
 
-def _share_angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+def _share_angles(one: Array, other: Array) -> bool:
     few, many = sorted((np.unique(np.rint(angles / _SAME_ANGLE)) for angles in (one, other)), key=len)
     return float(np.isin(few, many).mean()) >= _SHARED
 
 
-def loaded_blocks(load: NDArray[np.float64], SA: NDArray[np.float64]) -> tuple[NDArray[np.intp], ...]:
+def loaded_blocks(load: Array, SA: Array) -> tuple[NDArray[np.intp], ...]:
     """Return the load blocks without those in the air, or whose load was not recorded."""
     return tuple(block for block in load_blocks(load, SA) if load[block].mean() >= _NO_LOAD)
 

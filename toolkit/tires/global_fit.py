@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import signs
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
@@ -32,9 +32,6 @@ from toolkit.tires.global_stage import StageFit, Task, refit, run
 from toolkit.tires.model import LOSSES, Loss, Parameter
 from toolkit.tires.quality import scatter_floor_percent
 from toolkit.tires.slopes import stiffness
-
-if TYPE_CHECKING:
-    from toolkit.tires.global_model import Array
 
 _NEAR = np.radians(3.0)  # rows must come as near to SA = 0 for a slope there
 _SLIP = frozenset({"kappa", "both_kappas", "alpha_and_kappa"})

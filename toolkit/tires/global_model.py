@@ -39,20 +39,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.channels import Axes
 from toolkit.estimate import Estimate
 from toolkit.reduction.selection import Selection
 from toolkit.tires.model import Parameter
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-
 
 _NEEDS: dict[str, str] = {
     "2": "two_loads", "3": "three_loads", "c": "camber", "p": "pressure", "P": "three_pressures",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.errors import FitError
 from toolkit.tires.fit import fit_curves, why_not
@@ -13,9 +14,6 @@ from toolkit.tires.global_data import Measured, binned
 from toolkit.tires.global_model import GlobalModel, Seeds
 from toolkit.tires.model import Curve, CurveFit
 from toolkit.tires.models.magic_formula import slope, value
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _UPRIGHT = np.radians(0.75)  # of the least camber
 _FREE = 0.01  # longitudinal slip

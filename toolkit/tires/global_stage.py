@@ -16,18 +16,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.estimate import coverage_factor
+from toolkit.tires.between_loads import Between
 from toolkit.tires.colour import autocorrelation_time
 from toolkit.tires.global_data import Measured
+from toolkit.tires.global_model import GlobalModel
 from toolkit.tires.global_solver import Box, Descent, descend, descend_each, linearise, spread_starts
-
-if TYPE_CHECKING:
-    from toolkit.tires.between_loads import Between
-    from toolkit.tires.global_model import Array, GlobalModel
 
 _SAME = 1e-3  # the files contract: starts that agree in cost to this are at one minimum
 _EXACT = 1e-18  # a cost below this share of the data's square is rounding

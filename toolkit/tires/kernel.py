@@ -20,15 +20,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from toolkit.arrays import Array
 
-    Array = NDArray[np.float64]
-    Array32 = NDArray[np.float32]
+Array32 = NDArray[np.float32]
 
 E_TOP = 1.25
 C_LOW, C_HIGH = 1e-3, 4.0

@@ -15,21 +15,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Axes, signs
-from toolkit.tires.global_model import Factor, Factors, Responses, parameters
+from toolkit.tires.global_model import Factor, Factors, GlobalParameter, Responses, Rows, Seeds, parameters
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine, state
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    from toolkit.tires.global_model import GlobalParameter, Rows, Seeds
-
 
 # name, default, low, high, size, needs, text
 _LATERAL = """

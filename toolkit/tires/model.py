@@ -9,8 +9,9 @@ from toolkit.channels import Axes
 from toolkit.estimate import Estimate
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from toolkit.arrays import Array
 
 Loss = Literal["linear", "robust"]
 LOSSES: tuple[str, ...] = get_args(Loss)
@@ -26,12 +27,12 @@ class Curve:
     the load scatters about ``load_N`` from row to row.
     """
 
-    SA: NDArray[np.float64]
-    y: NDArray[np.float64]
+    SA: Array
+    y: Array
     channel: Literal["FY", "MZ"]
     load_N: float | None
     axes: Axes = "SAE"
-    sigma: NDArray[np.float64] | None = None
+    sigma: Array | None = None
     load_sd_N: float = 0.0
 
 
@@ -117,18 +118,18 @@ class TireModel(Protocol):
     channels: tuple[str, ...]
     parameters: tuple[ParameterSpec, ...]
 
-    def value(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def value(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return y at slip angles [rad]."""
         ...
 
-    def slope(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def slope(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return dy/dSA."""
         ...
 
-    def jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def jacobian(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return dy/dparameter."""
         ...
 
-    def slope_jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def slope_jacobian(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return d(dy/dSA)/dparameter."""
         ...

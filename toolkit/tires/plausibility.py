@@ -9,18 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import CellError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N, STIFFNESS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.tires.model import CurveFit
+from toolkit.tires.model import CurveFit
 
 # The largest size [SI] by dimension; of a slip or inclination angle any, of the two angles that turn on none.
 LARGEST = {
@@ -60,9 +56,7 @@ def demand_possible(value: float, unit: str, *, where: str, U: bool = False) -> 
     )
 
 
-def load_of(
-    FZ: NDArray[np.float64], *, where: str, rows: Sequence[int] | None = None, spikes: float = 0.0
-) -> NDArray[np.float64]:
+def load_of(FZ: Array, *, where: str, rows: Sequence[int] | None = None, spikes: float = 0.0) -> Array:
     """Return the load [N], not negative: FZ in whatever sense its axes give it, one sense in all rows.
 
     Parameters

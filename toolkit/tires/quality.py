@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-
+from toolkit.arrays import Array
 
 _BIN = np.deg2rad(0.25)
 _ROWS = 3  # fewer rows in a bin have no mean to speak of
 _PLACES = 200.0  # of half the range of slip angle
 
 
-def error_percent(residual: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+def error_percent(residual: Array, y: Array) -> float:
     """Return 100 sqrt(sum residual^2 / sum y^2) over the rows fitted, the channel as given.
 
     >>> error_percent(np.array([3.0, 4.0]), np.array([30.0, 40.0]))
@@ -26,9 +21,7 @@ def error_percent(residual: NDArray[np.float64], y: NDArray[np.float64]) -> floa
     return float(100 * np.sqrt(np.sum(residual**2) / np.sum(y**2)))
 
 
-def scatter_floor_percent(
-    SA: NDArray[np.float64], y: NDArray[np.float64], load: NDArray[np.intp] | None = None
-) -> float | None:
+def scatter_floor_percent(SA: Array, y: Array, load: NDArray[np.intp] | None = None) -> float | None:
     """Return the error in percent of the rows about their own mean in bins of slip angle (and load).
 
     Parameters

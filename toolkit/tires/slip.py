@@ -15,16 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from toolkit.arrays import Array
 from toolkit.tires.recorded import as_array
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    Array = NDArray[np.float64]
 
 Angles = Literal["star", "raw"]
 ANGLES: tuple[Angles, ...] = get_args(Angles)

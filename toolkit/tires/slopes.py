@@ -10,17 +10,13 @@ Advances in Engineering Software 4 (1982) 75).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.tires.global_model import GlobalModel, Rows, make_rows
 from toolkit.tires.recorded import as_array
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 _WIDEST = 1e-3  # rad
 _PART = 4.0  # each chord is so many times shorter than the one before

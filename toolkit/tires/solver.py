@@ -9,17 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.tires.kernel import Problems, State, assess, at_limit, pick, sine, theta_of
 from toolkit.tires.quality import median, shares
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.tires.kernel import Array
 
 _SAME = 1e-3  # the files contract: starts that agree in cost to this are at one minimum
 _BINS = 32

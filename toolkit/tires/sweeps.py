@@ -10,18 +10,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.channels import AXES, Axes
 from toolkit.errors import ConfigError, FitError
 from toolkit.tires.field_file import FieldFile, read_field_file
 from toolkit.tires.plausibility import load_of
 from toolkit.tires.table import TireTable
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _WIDTHS = {"IA": np.radians(0.5), "P": 4e3, "SA": np.radians(0.5)}  # of a level, about its peak [rad, Pa]
 _LOAD_WIDTH = 0.05  # of the largest load
@@ -63,7 +62,7 @@ class Sweeps:
     left_out: int
 
 
-def levels(values: NDArray[np.float64], width: float) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def levels(values: Array, width: float) -> tuple[NDArray[np.intp], Array]:
     """Return the level of every sample (rows,), -1 for those on the way, and the levels' medians, ascending.
 
     >>> at, medians = levels(np.repeat([0.0, 0.0, 2.0, 4.0], 100), 0.5)
@@ -176,12 +175,12 @@ def split(file: FieldFile, *, axes: Axes | None = None) -> Sweeps:
     )
 
 
-def _several_speeds(rolling: NDArray[np.float64]) -> bool:
+def _several_speeds(rolling: Array) -> bool:
     low, high = np.quantile(rolling, [_TAIL, 1 - _TAIL])
     return bool(high - low > 2 * _SPEED_WIDTH * float(np.median(rolling)))
 
 
-def _direction(values: NDArray[np.float64], t: NDArray[np.float64], rate: float) -> NDArray[np.intp]:
+def _direction(values: Array, t: Array, rate: float) -> NDArray[np.intp]:
     """Return 1 where the slip is swept up, -1 down, 0 where it is held (rows,)."""
     interval = max(float(np.median(np.diff(t))), 1e-6) if len(t) > 1 else 1.0
     half = max(1, round(_SMOOTH_S / interval / 2))
@@ -191,9 +190,7 @@ def _direction(values: NDArray[np.float64], t: NDArray[np.float64], rate: float)
     return np.where(np.abs(speed) < rate, 0, np.sign(speed)).astype(np.intp)
 
 
-def _sweeps(
-    cells: NDArray[np.intp], count: NDArray[np.intp], medians: dict[str, NDArray[np.float64]]
-) -> tuple[Sweep, ...]:
+def _sweeps(cells: NDArray[np.intp], count: NDArray[np.intp], medians: dict[str, Array]) -> tuple[Sweep, ...]:
     names = list(medians)
     conditions, where = np.unique(cells[:, :-1], axis=0, return_inverse=True)
     samples = np.bincount(where.reshape(-1), weights=count)

@@ -17,10 +17,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, get_args
+from typing import NoReturn, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.channels import AXES, CHANNELS, Axes, channel_of
 from toolkit.declared import nearest
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
@@ -29,9 +31,6 @@ from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import Line, pointed, read_lines
 from toolkit.tires.plausibility import LARGEST, load_of
 from toolkit.units import split_header, unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 MARKS = "calibration"
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
@@ -50,7 +49,7 @@ class TireTable:
 
     path: Path
     axes: Axes
-    columns: tuple[tuple[str, NDArray[np.float64]], ...]
+    columns: tuple[tuple[str, Array], ...]
     header: tuple[str, ...] = ()
     cells: tuple[tuple[str, ...], ...] = ()
     marks: tuple[str, ...] = ()
@@ -78,11 +77,11 @@ class TireTable:
             marks=self.marks,
         )
 
-    def get(self, symbol: str) -> NDArray[np.float64] | None:
+    def get(self, symbol: str) -> Array | None:
         """Return a column [SI], None where the table has none."""
         return dict(self.columns).get(symbol)
 
-    def __getitem__(self, symbol: str) -> NDArray[np.float64]:
+    def __getitem__(self, symbol: str) -> Array:
         """Return a column [SI]."""
         return dict(self.columns)[symbol]
 
@@ -131,7 +130,7 @@ def read_table(
 
 def table_of(
     header: Sequence[str],
-    values: Sequence[NDArray[np.float64]],
+    values: Sequence[Array],
     *,
     path: Path,
     axes: str,
@@ -298,13 +297,7 @@ def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[
 
 
 def _refuse_impossible(
-    symbol: str,
-    cell: str,
-    column: NDArray[np.float64],
-    si: NDArray[np.float64],
-    scale: tuple[float, float],
-    path: Path,
-    rows: list[int],
+    symbol: str, cell: str, column: Array, si: Array, scale: tuple[float, float], path: Path, rows: list[int]
 ) -> None:
     limit = LARGEST.get(symbol, LARGEST[CHANNELS[symbol].dimension])
     lowest = 0.0 if CHANNELS[symbol].dimension == "temperature" else -limit

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import Axes, channel_of, signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
@@ -24,9 +24,6 @@ from toolkit.tires.plausibility import size_findings
 from toolkit.tires.quality import median, shares
 from toolkit.tires.table import TireTable
 from toolkit.units import in_both, split_header
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # Gross outliers that a least squares fit has followed: told, never removed.
 
@@ -67,18 +64,18 @@ def gross_outliers(curves: Sequence[Curve], fits: Sequence[CurveFit]) -> tuple[F
     return tuple(findings)
 
 
-def _residual(fit: CurveFit, curve: Curve) -> NDArray[np.float64]:
+def _residual(fit: CurveFit, curve: Curve) -> Array:
     return np.asarray(curve.y - value_at(fit, curve.SA))
 
 
-def _largest(residual: NDArray[np.float64], curve: Curve) -> float:
+def _largest(residual: Array, curve: Curve) -> float:
     # In robust standard deviations; an exact fit has none.
     size = np.abs(residual)
     middle = _typical(size, curve)
     return float(size.max()) / (_SD_OF_MEDIAN * middle) if middle > 0 else 0.0
 
 
-def _typical(size: NDArray[np.float64], curve: Curve) -> float:
+def _typical(size: Array, curve: Curve) -> float:
     low, high = curve.SA.min(), curve.SA.max()
     u = (2 * curve.SA - low - high) / (high - low)
     return float(median(size[None], shares(u[None], np.ones((1, len(u)), dtype=np.bool_)))[0])
@@ -251,7 +248,7 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
     if not rows.any():
         return unusual
 
-    def column(symbol: str) -> NDArray[np.float64]:
+    def column(symbol: str) -> Array:
         values = table.get(symbol)
         return np.zeros(int(rows.sum())) if values is None else values[rows]
 

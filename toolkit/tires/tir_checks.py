@@ -8,7 +8,7 @@ shows in the factor, whichever of its coefficients it came from.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
@@ -17,9 +17,6 @@ from toolkit.reduction.limits import FRICTION, LEAST_LOAD_N, STIFFNESS
 from toolkit.tires.plausibility import LARGEST
 from toolkit.tires.slip import readers
 from toolkit.tires.tir import TirFile, factors, si_number
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 # Without these the Magic Formula gives nothing of that channel.
 MAKES = {

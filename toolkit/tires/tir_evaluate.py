@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from toolkit.arrays import Array
 from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import FRICTION, LARGEST_TRAIL_M, LEAST_LOAD_N
@@ -14,11 +16,6 @@ from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import ANGLES, Angles, state
 from toolkit.tires.tir import TirFile, factors, scale, si_number
 from toolkit.tires.tir_checks import RADIUS_M, demanded, file_findings, nominal_pressure
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import ArrayLike, NDArray
 
 _RANGES = (
     ("SA", "ALPMIN", "ALPMAX", "rad"),
@@ -119,9 +116,7 @@ def forces_of(
     return forces(p, q, UNLOADED_RADIUS=UNLOADED_RADIUS)
 
 
-def _pressure_change(
-    tir: TirFile, version: str, P: ArrayLike | None
-) -> tuple[NDArray[np.float64] | float, list[Finding]]:
+def _pressure_change(tir: TirFile, version: str, P: ArrayLike | None) -> tuple[Array | float, list[Finding]]:
     nominal = nominal_pressure(tir)
     if version == "5.2" or nominal is None:
         why = "MF 5.2 has no pressure terms" if version == "5.2" else "the file has no NOMPRES"

@@ -11,22 +11,18 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.channels import CHANNELS
 from toolkit.errors import CellError, UnreadableError
 from toolkit.findings import Finding
 from toolkit.inputs import TYDEX_FILE, read_input
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
 
 SYMBOLS = {channel.tydex: symbol for symbol, channel in CHANNELS.items() if channel.tydex} | {
     "FXW": "FX", "FXC": "FX", "RUNTIME": "t",
@@ -45,7 +41,7 @@ class TydexChannel:
     name: str
     symbol: str | None
     unit: str
-    values: NDArray[np.float64]
+    values: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -176,7 +172,7 @@ def _lines(section: Sequence[tuple[int, str]]) -> list[tuple[int, str]]:
     return [(number, line) for number, line in section if number and line.strip() and line[0] != "!"]
 
 
-def _data(section: list[tuple[int, str]], count: int, path: Path) -> tuple[NDArray[np.float64], int]:
+def _data(section: list[tuple[int, str]], count: int, path: Path) -> tuple[Array, int]:
     rows, misaligned = [], 0
     for number, line in _lines(section):
         where = f"{path}, line {number}"
@@ -199,7 +195,7 @@ def _data(section: list[tuple[int, str]], count: int, path: Path) -> tuple[NDArr
     return np.array(rows, dtype=np.float64), misaligned
 
 
-def _channel(number: int, line: str, values: NDArray[np.float64], path: Path) -> TydexChannel:
+def _channel(number: int, line: str, values: Array, path: Path) -> TydexChannel:
     where = f"{path}, line {number}"
     name = line[:_WIDTH].strip()
     cells = [line[at : at + _WIDTH].strip() for at in (50, 60, 70)]
@@ -214,7 +210,7 @@ def _channel(number: int, line: str, values: NDArray[np.float64], path: Path) ->
     return _made(name, SYMBOLS.get(name.upper()), line[40:50].strip(), physical, where)
 
 
-def _made(name: str, symbol: str | None, text: str, values: NDArray[np.float64], where: str) -> TydexChannel:
+def _made(name: str, symbol: str | None, text: str, values: Array, where: str) -> TydexChannel:
     if symbol is not None:
         text = text or ("1" if symbol == "KAPPA" else "")
         stated = unit(text if text != "-" else "1", where=f"{where}, {name}")
@@ -227,7 +223,7 @@ def _made(name: str, symbol: str | None, text: str, values: NDArray[np.float64],
 
 
 def tydex_text(
-    columns: Mapping[str, tuple[str, NDArray[np.float64]]], *, comments: Sequence[str] = ()
+    columns: Mapping[str, tuple[str, Array]], *, comments: Sequence[str] = ()
 ) -> tuple[str, tuple[Finding, ...]]:
     """Return the text of a file in the W axes, and the finding of what ten columns could not hold.
 

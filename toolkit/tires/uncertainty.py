@@ -22,11 +22,13 @@ determines more. Rows of a 100 Hz sweep repeat themselves: `colour` says what in
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.estimate import coverage_factor
+from toolkit.tires.colour import Noise
 from toolkit.tires.kernel import (
     C_HIGH,
     C_LOW,
@@ -41,14 +43,7 @@ from toolkit.tires.kernel import (
     theta_of,
 )
 from toolkit.tires.models.magic_formula import jacobian, slope, slope_jacobian, value
-from toolkit.tires.solver import compress
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.tires.colour import Noise
-    from toolkit.tires.kernel import Array
-    from toolkit.tires.solver import Solution
+from toolkit.tires.solver import Solution, compress
 
 # Would rows like these determine the parameters of a curve of the usual shape? Asked apart from the error.
 

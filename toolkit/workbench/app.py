@@ -7,26 +7,20 @@ from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Mount, Route
 
+from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
 from toolkit.report.pages.kit import KIT
+from toolkit.trust.people import Person
 from toolkit.workbench.bench import Bench
-from toolkit.workbench.page import Instead, is_part, page, refusal
-
-if TYPE_CHECKING:
-    from starlette.requests import Request
-
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.trust.people import Person
-    from toolkit.workbench.guard import Keys
-    from toolkit.workbench.page import Page, Routes
-
+from toolkit.workbench.guard import Keys
+from toolkit.workbench.page import Instead, Page, Routes, is_part, page, refusal
 
 STATIC = Path(__file__).with_name("static")
 _SCRIPT, _STYLE = "text/javascript; charset=utf-8", "text/css; charset=utf-8"

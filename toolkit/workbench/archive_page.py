@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlencode
 
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
 
 from toolkit.audit.model import GRADES
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk.agenda import unfinished_audits
-from toolkit.lab.desk.audited import ORDERS, Audited, stamp
-from toolkit.workbench.bench import holding
-from toolkit.workbench.page import page
-
-if TYPE_CHECKING:
-    from starlette.requests import Request
-    from starlette.responses import Response
-
-    from toolkit.lab.desk.audited import Order
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
+from toolkit.lab.desk.audited import ORDERS, Audited, Order, stamp
+from toolkit.workbench.bench import Bench, holding
+from toolkit.workbench.page import Routes, page
 
 WINDOW = 200
 """Rows of the list of files that are asked for at once."""

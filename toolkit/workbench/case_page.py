@@ -6,10 +6,11 @@ Its code reads what the server's user reads: like a case that is handed in, it c
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
+from pathlib import Path
 from urllib.parse import quote
 
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.diagnosis.case.reader import CaseFile
@@ -18,18 +19,10 @@ from toolkit.lab.desk import built_case
 from toolkit.lab.desk.holdings import CASE, holding_id
 from toolkit.lab.desk.statements import with_statement
 from toolkit.lab.desk.versions import Origin, StaleError, version_of
-from toolkit.workbench.bench import holding
+from toolkit.workbench.bench import Bench, holding
 from toolkit.workbench.diagnosis_page import diagnoses_page
-from toolkit.workbench.page import is_part, page
+from toolkit.workbench.page import Routes, is_part, page
 from toolkit.workbench.stale import new_page, stale
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from starlette.requests import Request
-
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
 
 _ANSWERING = threading.Lock()  # one simulation at a time
 

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import re
 import threading
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from starlette.exceptions import HTTPException
-from starlette.responses import RedirectResponse
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
 
 from toolkit.errors import ToolkitError
 from toolkit.lab.desk.built_case import is_open, kinds
@@ -18,6 +19,7 @@ from toolkit.lab.desk.holdings import ANSWER, CASE, holding_id
 from toolkit.lab.desk.jobs import start_job
 from toolkit.lab.desk.sized_model import (
     MODELS,
+    SizableModel,
     keep_model,
     read_diagnosis,
     sizable_model,
@@ -25,19 +27,8 @@ from toolkit.lab.desk.sized_model import (
     trial_answer,
 )
 from toolkit.lab.desk.uploads import hand_in_case
-from toolkit.workbench.bench import holding
-from toolkit.workbench.page import page
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from starlette.requests import Request
-    from starlette.responses import Response
-
-    from toolkit.lab.desk.sized_model import SizableModel
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
-
+from toolkit.workbench.bench import Bench, holding
+from toolkit.workbench.page import Routes, page
 
 DIAGNOSES = "diagnoses"
 """Folder of the home into which jobs write."""

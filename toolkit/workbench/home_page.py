@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from starlette.exceptions import HTTPException
 
 from toolkit.lab.desk import agenda as questions
-from toolkit.workbench.page import page
+from toolkit.workbench.page import Routes, page
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
 
 MOST_ROWS = 50
 

@@ -6,20 +6,18 @@ import os
 from typing import TYPE_CHECKING
 
 from starlette.exceptions import HTTPException
-from starlette.responses import RedirectResponse
+from starlette.responses import RedirectResponse, Response
 
 from toolkit.errors import ConfigError
 from toolkit.lab.desk.holdings import archives_of, holding_id
 from toolkit.lab.desk.jobs import Kind as JobKind
 from toolkit.lab.desk.jobs import SeenJob, cancel_job, job_of, jobs_of, log_of, start_job
-from toolkit.workbench.page import page
+from toolkit.workbench.page import Routes, page
 
 if TYPE_CHECKING:
     from starlette.requests import Request
-    from starlette.responses import Response
 
     from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
 
 MOST_JOBS = 100
 AUDITS, REPAIRED = "audits", "repaired"

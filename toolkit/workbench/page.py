@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from gettext import NullTranslations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jinja2 import Environment, pass_context
 from jinja2.runtime import Context
 from markupsafe import Markup
-from starlette.responses import HTMLResponse
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
 
+from toolkit.errors import ToolkitError
 from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import one_line
 from toolkit.lab.desk.holdings import holding_id
@@ -25,17 +27,9 @@ from toolkit.report.pages.kit import data, drawn, environment
 from toolkit.words import phrasebook as words
 from toolkit.words.phrasebook import SOURCE, decimal_sign, phrasebook
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from starlette.requests import Request
-    from starlette.responses import Response
-
-    from toolkit.errors import ToolkitError
-
-    Page = Callable[[Request], Response]
-    Routes = tuple[tuple[str, str, Page], ...]
-    """Method, path and handler of each address of a page."""
+Page = Callable[[Request], Response]
+Routes = tuple[tuple[str, str, Page], ...]
+"""Method, path and handler of each address of a page."""
 
 
 class Instead(Exception):  # noqa: N818  no error: another answer than the page that was asked for

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.inputs import RESULT_FILE, read_regular
 from toolkit.lab.desk.chart import Chart, Series
 from toolkit.lab.desk.jobs import start_job
-from toolkit.lab.desk.kept_plans import KINDS, fixtures_of, plan_words, read_plan, titles_of
+from toolkit.lab.desk.kept_plans import KINDS, PlanKind, fixtures_of, plan_words, read_plan, titles_of
 from toolkit.lab.desk.previews import templates_of
-from toolkit.workbench.bench import holding
-from toolkit.workbench.page import page
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from starlette.requests import Request
-
-    from toolkit.lab.desk.kept_plans import PlanKind
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
+from toolkit.workbench.bench import Bench, holding
+from toolkit.workbench.page import Routes, page
 
 _TYPES = {
     "pdf": "application/pdf", "png": "image/png", "json": "application/json",

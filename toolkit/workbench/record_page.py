@@ -6,11 +6,12 @@ Every part is the answer of a command: `calibration show`, `history`, `report`, 
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from starlette.exceptions import HTTPException
-from starlette.responses import RedirectResponse
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
 
 from toolkit.calibration.registry.registry import ID
 from toolkit.days import parse_day
@@ -19,18 +20,8 @@ from toolkit.lab.desk.chart import Chart, Series
 from toolkit.lab.desk.pending import decide as settle_decision
 from toolkit.lab.records.decisions import Order
 from toolkit.trust.requested import Requested
-from toolkit.workbench.bench import waiting
-from toolkit.workbench.page import page
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from starlette.requests import Request
-    from starlette.responses import Response
-
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
-
+from toolkit.workbench.bench import Bench, waiting
+from toolkit.workbench.page import Routes, page
 
 DECISIONS = ("approve", "withdraw", "discard")
 

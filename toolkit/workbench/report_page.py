@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.errors import ConfigError, ToolkitError
@@ -26,17 +27,9 @@ from toolkit.lab.desk.previews import (
 from toolkit.lab.desk.uploads import hand_in_template
 from toolkit.lab.desk.versions import Origin, StaleError, version_of
 from toolkit.lab.home import TEMPLATES
-from toolkit.workbench.bench import holding
-from toolkit.workbench.page import page
+from toolkit.workbench.bench import Bench, holding
+from toolkit.workbench.page import Routes, page
 from toolkit.workbench.stale import new_page, stale
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from starlette.requests import Request
-
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
 
 STEPS = ("preview", "issue")
 _DRAWING = threading.Lock()  # a browser asks for all pages at once

@@ -9,10 +9,13 @@ from __future__ import annotations
 import contextlib
 import datetime as dt
 import json
+from collections.abc import Mapping
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from toolkit.calibration.session.session_file import SessionFile
@@ -26,17 +29,9 @@ from toolkit.lab.desk.versions import Origin, StaleError
 from toolkit.lab.records.decisions import Order
 from toolkit.trust.requested import Requested
 from toolkit.workbench.bench import Bench, waiting
-from toolkit.workbench.page import Instead, fragment, is_part, page
+from toolkit.workbench.page import Instead, Routes, fragment, is_part, page
 from toolkit.workbench.record_page import PARTS
 from toolkit.workbench.stale import new_page, stale
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from starlette.requests import Request
-
-    from toolkit.workbench.page import Routes
 
 
 def sessions(request: Request) -> Response:

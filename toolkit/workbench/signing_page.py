@@ -6,23 +6,17 @@ that of whoever runs the server, and signs only where nobody else reaches the se
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from toolkit.calibration.registry.registry import ID
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab.desk.pending import Pending, add_answer, drop_request, pending_request, sign_by_agent
-from toolkit.workbench.bench import waiting
+from toolkit.workbench.bench import Bench, waiting
+from toolkit.workbench.page import Routes
 from toolkit.workbench.record_page import record_page
 from toolkit.workbench.session_page import session_page
-
-if TYPE_CHECKING:
-    from starlette.requests import Request
-
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
 
 
 def request_file(request: Request) -> Response:

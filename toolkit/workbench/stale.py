@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import difflib
 import secrets
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
+from starlette.requests import Request
+from starlette.responses import Response
+
+from toolkit.lab.desk.versions import StaleError
 from toolkit.workbench.page import is_part, page
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from starlette.requests import Request
-    from starlette.responses import Response
-
-    from toolkit.lab.desk.versions import StaleError
 
 Lines = list[tuple[str, bool]]
 """Lines of a text, each with whether the other text has another one in its place."""

@@ -5,27 +5,21 @@ Every part is the answer of a command: `audit` of its folder for the recordings,
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 from urllib.parse import urlencode
 
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.responses import Response
 
 from toolkit.lab.desk.chart import common_ranges
 from toolkit.lab.desk.holdings import Reported, rows_of_tests
 from toolkit.lab.desk.seen_test import recordings_answer, results_answer, shown_conditions
-from toolkit.workbench.bench import holding
-from toolkit.workbench.page import page
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from starlette.requests import Request
-
-    from toolkit.lab.tire_tests.resolve import Resolved
-    from toolkit.workbench.bench import Bench
-    from toolkit.workbench.page import Routes
+from toolkit.lab.tire_tests.resolve import Resolved
+from toolkit.workbench.bench import Bench, holding
+from toolkit.workbench.page import Routes, page
 
 WINDOW = 100
 """Rows of a list that are asked for at once."""

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 from toolkit.errors import ConfigError, FitError, ToolkitError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    Arrays = Mapping[str, NDArray[np.float64]]
+    Arrays = Mapping[str, Array]
 
 REQUEST = struct.Struct("<Q")
 REPLY = struct.Struct("<IQ")
@@ -95,7 +94,7 @@ def _error(content: object) -> ToolkitError:
 
 def read_arrays(
     head: Mapping[str, Any], body: bytes, shapes: Mapping[str, tuple[int, ...]]
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Array]:
     """Return the arrays of a reply, which must have these names and shapes.
 
     Raises

@@ -25,13 +25,10 @@ from toolkit.worker.frames import (
     read_head,
 )
 from toolkit.worker.posix import Limits, begin, end_of, finish
-from toolkit.worker.serve import BEGIN, CUT_OFF
+from toolkit.worker.serve import BEGIN, CUT_OFF, Handlers
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from toolkit.worker.serve import Handlers
+    from toolkit.arrays import Array
 
 _LAST = 8_192  # bytes of output that are remembered: the report of a crash fits in
 _WORDS = 400  # characters of them that a message has
@@ -107,7 +104,7 @@ class Worker:
 
     def arrays(
         self, name: str, arguments: tuple[Any, ...], until: float, shapes: Mapping[str, tuple[int, ...]]
-    ) -> dict[str, NDArray[np.float64]]:
+    ) -> dict[str, Array]:
         """Return the arrays that a handler answers; all that `value` raises, and arrays of these shapes."""
         import math
 

@@ -252,9 +252,10 @@ OTHER = pytest.mark.campaign("the other model: each method has one in every run,
     ("method", "tail", "model"),
     [
         ("gls", GLS, "linear"),
-        ("odr", ODR, "polynomial"),
-        pytest.param("gls", GLS, "polynomial", marks=OTHER),
-        pytest.param("odr", ODR, "linear", marks=OTHER),
+        *(
+            pytest.param(*each, marks=OTHER)
+            for each in (("odr", ODR, "polynomial"), ("gls", GLS, "polynomial"), ("odr", ODR, "linear"))
+        ),
     ],
 )
 def test_every_mutated_coefficient_of_such_a_record_is_refused(

@@ -28,7 +28,7 @@ BETWEEN = pytest.mark.campaign(
     [
         (12, 2, 300),
         pytest.param(20, 4, 300, marks=BETWEEN),
-        (81, 4, 300),
+        pytest.param(81, 4, 300, marks=BETWEEN),
         pytest.param(81, 8, 300, marks=BETWEEN),
         (120, 13, 15),
     ],

@@ -62,6 +62,9 @@ def drawn(folder: Path, seed: int, stated: bool) -> tuple[Path, np.ndarray]:
     return folder / "SESSION.toml", truth
 
 
+@pytest.mark.campaign(
+    "hundreds of drawn sessions: what rounding adds stands against its formula in every run"
+)
 def test_coefficients_lie_within_their_standard_errors_as_often_as_they_say(tmp_path: Path) -> None:
     inside = dict.fromkeys((True, False), 0)
     for seed in range(30):

@@ -60,6 +60,7 @@ def test_an_intercept_that_tared_rows_leave_is_part_of_the_uncertainty() -> None
     )
 
 
+@pytest.mark.campaign("many sessions of short runs: gains of longer runs are told in every run")
 def test_runs_of_two_rows_tell_their_gain(make_session: Make, tmp_path: Path) -> None:
     """Sixty runs of a zero and one load, gain 0.1 % from run to run: U at full scale holds it."""
     rng = np.random.default_rng(9)

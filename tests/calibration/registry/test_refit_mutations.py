@@ -81,7 +81,12 @@ def test_every_mutated_coefficient_of_the_projects_records_is_refused(tmp_path: 
     assert refuse_all(registry, registry.load(record_id)) > 0
 
 
-@pytest.mark.parametrize("model", ["polynomial", "wls"])
+OTHER = pytest.mark.campaign(
+    "twice the coefficients: those of weights, and of every record, are mutated in every run"
+)
+
+
+@pytest.mark.parametrize("model", [pytest.param("polynomial", marks=OTHER), "wls"])
 def test_mutations_of_other_models(tmp_path: Path, model: str, make_session: Callable[..., Path]) -> None:
     path = make_session(name=model, model='"polynomial"', degree="2") if model == "polynomial" else (
         make_session(name=model, method='"wls"', loads='["FY"]')

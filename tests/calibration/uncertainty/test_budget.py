@@ -52,6 +52,9 @@ def test_whole_degrees_of_freedom_stay_whole() -> None:
         assert combine([(float(u), 9.0)], 0.95)[2] == pytest.approx(2.262, abs=5e-4)
 
 
+@pytest.mark.campaign(
+    "hundreds of drawn sessions: each component of a budget stands against its formula in every run"
+)
 def test_variance_components_of_known_truth() -> None:
     """Means over 200 sessions: each component unbiased, none holds another's share."""
     rng = np.random.default_rng(11)

@@ -139,3 +139,17 @@ def test_a_distance_below_what_the_rows_resolve_has_an_interval_up_to_there(prob
             assert estimate.ci95[0] > 0.009
         else:
             assert estimate.ci95 == (0.0, high)
+
+
+@pytest.mark.parametrize("value", [-2.0, 2.0])
+def test_a_size_of_either_sign_has_its_interval_on_both_sides(problem, value):
+    """Only what the rows do not resolve reaches to none; a zero that moved down is no such size."""
+    active = AppliedEffect(effect=effects()["zero_offset"], channel="F", values={"offset": value})
+    search = SimpleNamespace(
+        problem=problem,
+        augmented=SimpleNamespace(active=(active,), covariance=np.eye(3)),
+        variance=lambda _: 0.01,
+    )
+    (estimate,) = _parameters(search, active, None)
+    # Of 160 rows and three parameters: Student's 97.5 % quantile of 157 degrees is 1.975, and sd is 0.1.
+    assert estimate.ci95 == pytest.approx((value - 0.1975, value + 0.1975), abs=1e-3)

@@ -135,7 +135,12 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+EQUATION = pytest.mark.campaign(
+    "an equation, the slowest kind: the other kinds go back into use in every run"
+)
+
+
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[EQUATION] * (kind == "ode")) for kind in KINDS])
 def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(answered, kind):
     name = KINDS[kind][1]
     case, found, path = answered(kind)
@@ -186,6 +191,9 @@ def test_an_equation_is_led_along_its_recording_with_the_effects_that_it_has(ans
     assert not np.allclose(of_model, errors(bare, ()), equal_nan=True)
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis by a model: that a model acts beside its simulation is held in every run"
+)
 def test_a_models_effects_are_in_its_motion_once(tmp_path):
     # The pattern of a small force is read over the position: that of the fall with its drag, once.
     text = BALL_CASE.replace('kind = "ode"', 'kind = "python"')

@@ -112,6 +112,7 @@ def drifting(tmp_path_factory):
     return diagnose(case, None).diagnosis
 
 
+@pytest.mark.campaign("a whole diagnosis: which plant drifts, and what its rates say, is held in every run")
 def test_a_drifting_plant_is_told_and_its_errors_are_those_of_its_rates(drifting):
     told = [finding for finding in drifting.findings if finding.rule == "drift-limited"]
     assert [finding.where for finding in told] == ["CASE.toml: position"]

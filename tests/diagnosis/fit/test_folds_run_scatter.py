@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.optimize import minimize_scalar
+from scipy.stats import multivariate_normal, multivariate_t
 
 from toolkit.diagnosis.fit.folds import UnseenRun, _scores, scattered_scores
 from toolkit.diagnosis.fit.noise import Autoregression, autocovariance, layout, log_likelihood
@@ -97,3 +98,39 @@ def test_units_of_the_output_do_not_change_what_one_hypothesis_gains_over_anothe
 
 def test_no_runs_have_no_score():
     assert scattered_scores([], by_run=True) == ()
+
+
+def test_the_score_of_runs_that_are_not_equally_loud_is_students_density_of_their_residuals():
+    noise = Autoregression(reflection=(0.7, -0.2), sd=0.5)
+    simulated, residuals, covariance = runs((3.0, -4.0, 5.0), (1.0, 0.5, -2.0), noise)
+    residuals = [4.0 * residuals[0], 2.0 * residuals[1], residuals[2]]
+    zero, gain, freedom = 2.0, 1.5, 4.0
+    size = math.sqrt(np.mean(simulated**2))
+    full = covariance + zero**2 + gain**2 * np.outer(simulated, simulated) / size**2
+
+    def densities(square):
+        of_runs = multivariate_t(np.zeros(ROWS), square * full, df=freedom)
+        return [of_runs.logpdf(residual) for residual in residuals]
+
+    likeliest = minimize_scalar(
+        lambda square: -sum(densities(square)), bounds=(1.0, 100.0), method="bounded"
+    ).x
+    found = _scores([unseen(residual, simulated, noise) for residual in residuals], zero, gain, freedom)
+    assert found == pytest.approx(densities(likeliest), rel=1e-5)
+
+
+def test_an_effect_that_halves_the_errors_of_quiet_runs_is_not_lost_to_a_loud_one():
+    simulated, residuals, _ = runs((0.0,) * 3, (0.0,) * 3, Autoregression(reflection=(), sd=1.0))
+    loud = np.array([1.0, 1.0, 10.0])
+    scores = []
+    for left in (np.array([3.0, 3.0, 1.1]), np.array([1.0, 1.0, 1.0])):  # of each run's own noise
+        sizes = loud * left
+        trained = [math.sqrt(np.mean(np.delete(sizes, k) ** 2)) for k in range(3)]
+        listed = [
+            unseen(size * r, simulated, Autoregression(reflection=(), sd=sd))
+            for size, r, sd in zip(sizes, residuals, trained, strict=True)
+        ]
+        scores.append(sum(scattered_scores(listed, by_run=True)))
+    # By the noise of each run it gains log 3 of every value of the quiet ones. Its training rows do not tell how
+    # quiet they are, which may cost it a part, and not all.
+    assert scores[1] - scores[0] > 0.5 * ROWS * 2 * math.log(3)

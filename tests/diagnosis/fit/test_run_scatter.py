@@ -71,6 +71,7 @@ def test_intervals_cover_where_zeros_and_gains_of_the_runs_scatter(tmp_path, dra
     assert np.sqrt(np.mean(np.square(zeros))) == pytest.approx(0.6, rel=0.3)
 
 
+@pytest.mark.campaign("the null of a scatter that intervals cover in every run")
 def test_runs_that_are_alike_leave_the_fit_as_it_is(tmp_path):
     scatters = [drift_beside_scatter(tmp_path / str(k), k, zero_sd=0.0, gain_sd=0.0)[2] for k in range(20)]
     assert sum(bool(scatter) for scatter in scatters) <= 2

@@ -122,6 +122,9 @@ def plates(folder, noise, *, exchange):
     )
 
 
+@pytest.mark.campaign(
+    "two laws of two states, the longest search: unseen runs choose a law in every run (test_unseen_runs)"
+)
 def test_a_law_that_foretells_unseen_runs_is_learned_before_nothing_is_said(tmp_path):
     case = plates(tmp_path, lambda rng, T: rng.normal(0, 0.08, len(T)), exchange=0.06)
     answer = diagnose(case, None, limits=None).diagnosis
@@ -132,7 +135,10 @@ def test_a_law_that_foretells_unseen_runs_is_learned_before_nothing_is_said(tmp_
         assert output.with_laws_rmse == pytest.approx(0.08, rel=0.15)
 
 
-@pytest.mark.parametrize("phi", [0.9, 0.97, 0.99])
+LESS = pytest.mark.campaign("noise of less colour, which asks less than that of every run")
+
+
+@pytest.mark.parametrize("phi", [*(pytest.param(phi, marks=LESS) for phi in (0.9, 0.97)), 0.99])
 def test_coloured_noise_of_all_runs_alike_is_nothing(tmp_path, phi):
     case = tank(tmp_path, lambda rng, h: 0.15 * coloured(phi, rng, len(h)))
     assert diagnose(case, None, limits=None).diagnosis.verdict == "nothing"

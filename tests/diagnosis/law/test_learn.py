@@ -84,7 +84,15 @@ def estimates(law: dict) -> dict[str, tuple[float, float, float]]:
     return {each["name"]: (each["value"], *each["ci95"]) for each in law["parameters"]}
 
 
-def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path):
+NAMES = pytest.mark.campaign(
+    "the search of names before it, half of the time: what it leaves is other tests'"
+)
+
+
+@pytest.mark.parametrize("names", [False, pytest.param(True, marks=NAMES)])
+def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path, monkeypatch, names):
+    if not names:
+        monkeypatch.setattr(search, "candidates", lambda _: ())
     answer = diagnosed(tmp_path, lambda r, _: r.F * (1 + 0.15 * np.exp(-(((r["T"] - 28) / 3) ** 2))))
     assert answer["verdict"] == "unknown"
     (law,) = answer["laws"]
@@ -130,6 +138,7 @@ def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path):
     assert json.loads(settled.output)["verdict"] == "nothing"
 
 
+@pytest.mark.campaign("another form of law: a factor over a covariate and an event are learned in every run")
 def test_a_product_of_two_signals_is_learned(learned):
     answer = learned(lambda r, _: r.F + 12 * r.x * r.v)
     (law,) = answer["laws"]
@@ -141,6 +150,7 @@ def test_a_product_of_two_signals_is_learned(learned):
     assert value == pytest.approx(12, rel=0.02)
 
 
+@pytest.mark.campaign("another form of law: a factor over a covariate and an event are learned in every run")
 def test_a_vibration_that_the_force_drives_is_learned(learned):
     from scipy.signal import lsim
 
@@ -171,6 +181,9 @@ def test_an_event_of_one_run_is_told_and_predicts_nothing(learned):
     assert "from 12" in answer["depends_on"][0]["variables"][0]
 
 
+@pytest.mark.campaign(
+    "another form of law: the fit of a tone is held in every run (test_trial_unlocked_tone)"
+)
 def test_a_tone_without_a_phase_of_its_own_predicts_nothing(learned):
     answer = learned(lambda r, i: r.F + 6 * np.sin(2 * np.pi * 3.3 * r.t + 1.7 * i))
     law = answer["laws"][0]
@@ -181,6 +194,7 @@ def test_a_tone_without_a_phase_of_its_own_predicts_nothing(learned):
     assert values["phase"] is None
 
 
+@pytest.mark.campaign("a whole search of nothing: noise has no law in every run (test_unseen_runs)")
 def test_of_noise_no_law_is_learned(tmp_path):
     answer = diagnosed(tmp_path, lambda r, _: r.F)
     assert answer["verdict"] == "nothing"

@@ -17,8 +17,9 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.fit import fit, sizes_off
 from toolkit.diagnosis.fit.folds import HeldOut, folds_of, hold_out
 from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.law import rivals
 from toolkit.diagnosis.law.learn import Law, Laws
-from toolkit.diagnosis.law.rivals import outdone, without_imitations, without_untested
+from toolkit.diagnosis.law.rivals import judged_by_laws, outdone, without_imitations, without_untested
 from toolkit.diagnosis.law.trial import trials_of
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, joint_fit
@@ -28,6 +29,7 @@ from toolkit.diagnosis.search.time_budget import TimeBudget
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 
+@pytest.mark.campaign("a whole diagnosis: which name stands beside a law is asked of a divider in every run")
 def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(tmp_path: Path) -> None:
     """A pull in proportion to the load stands beside a late force: crosstalk is thought of before the lag.
 
@@ -104,7 +106,8 @@ def outdone_name(tmp_path_factory: pytest.TempPathFactory) -> tuple[Search, Laws
         if trial.acts == "multiplies"
         and "[R]" in trial.signals[0].written
         and trial.shape.text == "a*exp({x}/d)"
-        and trial.applied.values["d"] < 0  # fading: one minimum, no ridge that each processor climbs its way
+        and dict(trial.applied.values)["d"]
+        < 0  # fading: one minimum, no ridge that each processor climbs its way
     )
     whole = joint_fit(problem, made, (trial.applied,))
     assert whole is not None
@@ -166,3 +169,38 @@ def test_sizes_are_told_from_none_together(outdone_name: tuple[Search, Laws]) ->
     assert places == own
     # By hand: 2 x^2 / (sd^2 (1 + r)), that is 2.08; against 3.84 of one alone it would be 1.56 each.
     assert math.isclose(away, 2 * off[0] ** 2 / (sd**2 * (1 + r)), rel_tol=1e-9)
+
+
+@pytest.mark.parametrize("process_noise", [False, True])
+@pytest.mark.parametrize(("share", "stays"), [(0.92, True), (0.88, False)])
+def test_a_name_that_takes_nearly_all_that_laws_take_stays(
+    outdone_name: tuple[Search, Laws],
+    monkeypatch: pytest.MonkeyPatch,
+    share: float,
+    *,
+    stays: bool,
+    process_noise: bool,
+) -> None:
+    """Laws in the name's place leave nothing: whatever they make of the rest, it is what was left out."""
+    search, laws = outdone_name
+    observed = search.problem.observed["gain"]
+
+    def off(error: float) -> HeldOut:
+        return HeldOut(scores=(0.0,), simulated={"gain": observed - error}, fits=())
+
+    problem = replace(search.problem, shown_sd={"gain": 0.01} if process_noise else {})
+    search = replace(
+        search, problem=problem, held_refitted=off(1.0), held_augmented=off(math.sqrt(1 - share))
+    )
+    (law,) = laws.listed
+    alone_fit = replace(laws.fit, active=(law.applied,))
+    alone = Laws(listed=(law,), fit=alone_fit, held_out=off(0.0))
+    beside = replace(laws, held_out=off(0.0))
+    monkeypatch.setattr(rivals, "before_nothing", lambda bare, **_: bare)
+    monkeypatch.setattr(rivals, "learned", lambda *_, **__: alone)
+    monkeypatch.setattr(rivals, "_process_noise", lambda _, fit: process_noise and fit is not alone_fit)
+    monkeypatch.setattr(rivals, "_leaves_process_noise", lambda _: process_noise)
+    monkeypatch.setattr(rivals, "_holds_beside", lambda *_: not process_noise)
+    judged, listed = judged_by_laws(search, beside, seed=1, budget=BUDGET)
+    assert (judged.steps == search.steps) is stays
+    assert listed is (beside if stays else alone)

@@ -15,7 +15,7 @@ from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search import forward_step
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.forward_step import best_step, joint_fits, step_groups
+from toolkit.diagnosis.search.forward_step import Joint, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.screen import best_of
 from toolkit.diagnosis.search.screen_step import look
 from toolkit.diagnosis.simulators.build_simulator import model_of
@@ -77,6 +77,7 @@ def test_a_drift_that_takes_half_of_the_range_is_a_force(tmp_path):
     assert (effect.name, effect.equivalent_to) == ("constant_force", ("zero_drift",))
 
 
+@pytest.mark.campaign("a whole diagnosis of nothing: coloured noise of a tank is nothing in every run")
 def test_noise_that_wanders_gets_no_name(tmp_path):
     assert not diagnose(coasts(tmp_path, force=0.0), None).diagnosis.effects
 
@@ -104,6 +105,9 @@ def fitted_step(tmp_path_factory):
     return problem, base, view, two, hold_out(problem, folds_of(problem, base), (), base)
 
 
+@pytest.mark.campaign(
+    "a look at all effects and two joint fits: of equals the likeliest is taken in every run"
+)
 @pytest.mark.parametrize(("noise_alone", "place"), [(True, 0), (False, 1)])
 def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_before_the_better_fit(
     fitted_step, monkeypatch, noise_alone, place
@@ -125,3 +129,27 @@ def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_bef
     # the better fit stays in the class, whichever goes first
     assert {rival.active for rival in step.rivals} == {two[1 - place].fit.active[-1]}
     assert (step.rivals[0].difference > -VERDICT.close) or place == 0
+
+
+def test_a_candidate_is_held_out_once_however_often_it_stands_beside_others(fitted_step, monkeypatch):
+    problem, base, view, two, before = fitted_step
+    joint = tuple(Joint(scored=each.scored, fit=each.fit, score=each.score) for each in two)
+    asked = []
+
+    def refused(problem, folds, active, start):
+        asked.append(start)
+        return HeldOut(scores=(-1e3,), simulated=before.simulated, fits=())
+
+    monkeypatch.setattr(forward_step, "hold_out", refused)
+    for _ in range(3):
+        folds = folds_of(problem, base)
+        assert best_step(problem, folds, base, before, joint, view.p_of, STEP.first, before) is None
+    assert asked == [each.fit for each in two]
+
+
+def test_what_its_own_fit_refuses_is_held_out_never(fitted_step, monkeypatch):
+    problem, base, view, two, before = fitted_step
+    joint = (Joint(scored=two[0].scored, fit=two[0].fit, score=base.log_posterior),)
+    monkeypatch.setattr(forward_step, "hold_out", lambda *_: pytest.fail("a fit for each fold in vain"))
+    folds = folds_of(problem, base)
+    assert best_step(problem, folds, base, before, joint, view.p_of, STEP.first, before) is None

@@ -56,6 +56,7 @@ def test_a_run_that_leaves_much_more_than_the_others_is_told(tmp_path):
     assert part.noise_sd == pytest.approx(0.1, rel=0.08)
 
 
+@pytest.mark.campaign("a whole diagnosis: what one run leaves is told in every run")
 def test_what_only_one_run_leaves_is_not_told_as_noise(tmp_path):
     def rest(k, _, rng):
         return rng.normal(0, 0.1, N) + (k == 1) * 2 * wave(5, 35)

@@ -17,6 +17,7 @@ from toolkit.diagnosis.fit.folds import folds_of
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG, hidden_in_noise
+from toolkit.diagnosis.search.unexplained import BEYOND_REPEATS, _beyond_noise
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 N = 600
@@ -40,6 +41,35 @@ def case_of(folder, rest, *, runs=3, sd=None):
     return read_case(write_case(folder, text, simulator=CELL, **{"r1__csv": None, **frames}))
 
 
+def beyond_repeats(folder, rest):
+    """Return whether a run and its repeat leave more than they differ by; ``rest(load, seed)`` of each."""
+    text, frames = cell_case(0.01), {}
+    t = np.arange(N) * 0.1
+    L = 50 + 10 * np.sin(0.11 * t) + 7 * np.sin(0.043 * t)
+    for k, condition in enumerate(("", 'repeat_of = "r0.csv"')):
+        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "L": L, "F": L + rest(L, k)})
+        text += f'[[recording.run]]\nfile = "r{k}.csv"\n{condition}\n'
+    case = read_case(write_case(folder, text, simulator=CELL, **frames))
+    problem = problem_of(case, model_of(case, None, None))
+    return _beyond_noise(problem, fit(problem), "F")
+
+
+def test_what_repeats_have_in_common_is_no_noise(tmp_path):
+    # A bend that both runs have, three times as large as what they differ by.
+    found = beyond_repeats(
+        tmp_path, lambda L, k: 0.03 * (L - 50) ** 2 + np.random.default_rng(k).normal(0, 1.0, N)
+    )
+    assert found is not None
+    assert (found.variables, found.rest, found.is_too_large) == (BEYOND_REPEATS, True, True)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.95])
+def test_what_repeats_differ_by_is_noise_of_any_colour_beside_zeros_that_move(tmp_path, phi):
+    assert (
+        beyond_repeats(tmp_path, lambda _, k: 3.0 * k + coloured(phi, 0.5, np.random.default_rng(k))) is None
+    )
+
+
 def hidden(case, *, beside=()):
     problem = problem_of(case, model_of(case, None, None))
     found = [candidate.active for candidate in candidates(problem) if candidate.name in beside]
@@ -56,6 +86,11 @@ def test_a_rest_above_a_tenth_of_the_spread_is_never_nothing(tmp_path):
     case = case_of(tmp_path, lambda _, rng: coloured(0.98, 2.5, rng))
     (found,) = hidden(case)
     assert (found.variables, found.rest) == ((LARGE,), True)
+
+
+@pytest.mark.campaign("a whole diagnosis: that such a rest is told is held in every run")
+def test_the_noise_of_a_large_rest_has_its_size(tmp_path):
+    case = case_of(tmp_path, lambda _, rng: coloured(0.98, 2.5, rng))
     answer = diagnose(case, None).diagnosis
     assert (answer.verdict, answer.remaining, answer.effects) == ("unknown", "unknown", ())
     noise = answer.fit.held_out[0].noise

@@ -42,6 +42,7 @@ def pairs_of(case):
 AGAIN = pytest.mark.campaign("a second draw of the same two effects")
 
 
+@pytest.mark.campaign("a whole diagnosis: that the pair is ranked first is held in every run")
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=AGAIN)])
 def test_two_effects_that_hide_each_other_are_both_named(tmp_path, seed):
     case = carriages(tmp_path, coulomb=COULOMB, drag=DRAG, seed=seed)

@@ -145,6 +145,9 @@ def test_the_worker_answers_as_the_same_process_does(tmp_path: Path) -> None:
     assert sizes(here.scored[0])["k3"] == pytest.approx(K3, rel=0.1)
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis: what is proposed to an equation, and a late channel, are held in every run"
+)
 def test_an_output_that_is_read_late_is_not_told_as_forces(tmp_path: Path) -> None:
     """Led along late readings, an equation seems to lack forces; a delay alone explains them."""
     problem = driven(tmp_path, stiffness=12.0, late_s=0.15)
@@ -202,6 +205,7 @@ def filmed(folder: Path) -> Problem:
     return problem_of(case, model_of(case, None, None))
 
 
+@pytest.mark.campaign("a second loss: a spring, and friction beside a force, are proposed in every run")
 def test_a_slow_loss_is_proposed_in_spite_of_noise_that_the_likeliest_following_takes_for_it(
     tmp_path: Path,
 ) -> None:

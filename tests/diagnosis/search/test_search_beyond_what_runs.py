@@ -40,6 +40,7 @@ def lagging(seed):
     return pd.DataFrame({"t": t, "U": u, "Y": shown}), np.abs(x).max()
 
 
+@pytest.mark.campaign("an equation that stops by itself: a candidate that cannot run goes alone in every run")
 def test_an_equation_that_stops_within_the_reach_of_a_rival_is_diagnosed(tmp_path):
     # The channel shows too much; a force that would explain it drives the equation past its stop.
     made = [lagging(seed) for seed in range(2)]
@@ -70,6 +71,7 @@ def names(folder, **files):
     return [one.name for one in diagnose(case, None).diagnosis.effects]
 
 
+@pytest.mark.campaign("a second whole search: an effect without which nothing runs is kept in every run")
 def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, monkeypatch):
     # Dry friction is there; without it the next best is a friction of another kind, or nothing.
     whole, asked = search.hold_out, []

@@ -73,6 +73,7 @@ def coasting(folder: Path, wave: float = 0.0) -> tuple[Problem, float]:
     return problem_of(case, model_of(case, None, None)), max(ways)
 
 
+@pytest.mark.campaign("proposals to wheels that coast: proposals to a driven body are held in every run")
 def test_what_rolls_out_is_periodic_by_the_way_that_it_rolled_and_not_by_the_simulations(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,6 +126,9 @@ def test_what_the_form_of_a_drag_may_leave_is_dropped_beside_it(tmp_path: Path) 
     assert names(kept) == ["quadratic_drag"]
 
 
+@pytest.mark.campaign(
+    "three more fits of wheels that coast: what is dropped beside the drag is held in every run"
+)
 def test_an_effect_stays_where_the_likelihood_falls_without_it_whatever_the_curvature(tmp_path: Path) -> None:
     problem, _ = coasting(tmp_path, wave=0.05)
     made, unseen, _, steps = fitted(

@@ -105,7 +105,10 @@ def test_a_search_that_is_cut_off_never_says_that_nothing_is_missing(tmp_path):
     assert made.fit.held_out[0].refitted_rmse > 0
 
 
-@pytest.mark.parametrize("step", ["refit of the nominal", "step 1: structure"])
+LATER = pytest.mark.campaign("a later step: a worker that is late at the first is answered for in every run")
+
+
+@pytest.mark.parametrize("step", ["refit of the nominal", pytest.param("step 1: structure", marks=LATER)])
 def test_an_equation_whose_worker_is_late_is_still_answered(tmp_path, monkeypatch, step):
     equation = HEAD.replace('kind = "python"', 'kind = "ode"').replace('function = "simulate"\n', "")
     case = read_case(write_case(tmp_path, equation + TWO, simulator=DRIVEN))

@@ -41,6 +41,7 @@ BETWEEN = pytest.mark.campaign("a damping between the least and the most that ar
 DRAWS = pytest.mark.campaign("three times as many draws")
 
 
+@pytest.mark.campaign("drawn noises of a resonance: what is a tone is told in every run")
 @pytest.mark.parametrize(
     ("damping", "draws"),
     [

@@ -61,6 +61,7 @@ def test_an_input_in_another_unit_is_named_with_both_units(tmp_path, columns, ch
     assert told in names[0].statement
 
 
+@pytest.mark.campaign("an equation in place of a function: the inputs of a function are asked in every run")
 def test_the_inputs_of_an_equation_are_asked_for_their_units(tmp_path):
     rng = np.random.default_rng(3)
     t = np.arange(120) * 0.05
@@ -136,6 +137,7 @@ def basin(seed: int, factor: float) -> pd.DataFrame:
     return pd.DataFrame({"t": t, "q": q * factor, "h": 2 * q / (1 + 0.1 * q) + rng.normal(0, 0.05, 60)})
 
 
+@pytest.mark.campaign("one more factor: a unit, and a sign that was lost, are named in every run")
 def test_a_factor_of_an_input_that_is_no_ratio_of_units_is_told_with_its_interval(tmp_path):
     """Pounds of water for litres: no list of volume flows has it, and the level meets a ratio near."""
     runs = {f"r{seed}__csv": basin(seed, 2.2046226) for seed in range(3)}

@@ -142,6 +142,7 @@ def test_a_sweep_knows_the_tire_between_its_rows(tmp_path):
     assert ColumnsModel(case).capability.findings == ()
 
 
+@pytest.mark.campaign("a whole diagnosis: the flat table against the drum is a brush's in every run")
 def test_a_drum_against_a_table_of_columns_is_the_shorter_patch(tmp_path):
     # Stiffness of force as the patch length squared, of moment as its cube; the peak stays.
     def drum(SA, FZ):

@@ -121,6 +121,7 @@ def outputs(x, u, p):
     assert model.capability.motion.sizes("x0", lambda _: 1.0).feeds == feeds
 
 
+@pytest.mark.campaign("a whole diagnosis: what spills and where it arrives is held in every run")
 def test_an_overflow_into_the_next_tank_is_named_with_its_share(tmp_path):
     runs = {f"r{k}__csv": _tanks(k, SHARE) for k in range(2)}
     toml = HEAD + _parameters(off=1.03) + RUNS

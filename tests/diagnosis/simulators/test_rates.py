@@ -101,6 +101,7 @@ def test_forces_of_a_velocity_have_a_place_where_the_position_is_recorded_in_tim
 OTHER = pytest.mark.campaign("a position without noise, and one in steps: a noisy one holds in every run")
 
 
+@pytest.mark.campaign("a whole diagnosis: that friction has its place beside a position is held in every run")
 @pytest.mark.parametrize(
     "how", [{"noise": 0.1}, *(pytest.param(how, marks=OTHER) for how in ({}, {"step": 0.5}))]
 )

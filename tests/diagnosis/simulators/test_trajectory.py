@@ -1,14 +1,20 @@
 """All rows at once: the exact motion, from a guess that knows nothing of it; what turns is marched along."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
+from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.case import Run
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.simulators import ode
+from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import RTOL
 from toolkit.diagnosis.simulators.marching import march
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
-from toolkit.diagnosis.simulators.trajectory import Path, recursion, trajectories
+from toolkit.diagnosis.simulators.trajectory import Guesses, Path, recursion, trajectories
 
 T = np.linspace(0.0, 10.0, 201)
 NONE = Forces((), 0)
@@ -34,6 +40,10 @@ def wide(t, x, u, p):
 
 def driven(t, x, u, p):
     return u["u"][None] * p["k"]
+
+
+def shaken(t, x, u, p):
+    return (p["k"] * np.cos(p["k"] * t))[None]
 
 
 def explosive(t, x, u, p):
@@ -97,6 +107,14 @@ def test_a_set_that_runs_off_is_said_and_the_others_are_as_alone():
     np.testing.assert_allclose(path.x[0, 0], 1 / (1 - 0.05 * T), rtol=1e-5)
 
 
+def test_a_set_that_asks_for_too_short_steps_is_not_waited_for():
+    # x' = k cos(k t) from 0: sin(k t), eighty turns of it from row to row
+    flow = flow_of(shaken, [run_of(T)], {"k": np.array([1.0, 1e4])}, states=1)
+    path, reached = solved(flow, np.zeros((1, 2, 1)))
+    assert reached.tolist() == [True, False]
+    np.testing.assert_allclose(path.x[0, 0], np.sin(T), atol=1e-6)
+
+
 def test_marching_and_a_guess_lead_to_the_same_motion():
     k = np.array([1.0, 30.0])
     flow = flow_of(swinging, [run_of(T)], {"k": k})
@@ -117,3 +135,59 @@ def test_a_recursion_in_blocks_is_the_recursion(sets):
         d = np.stack([slopes[k, min(s, sets - 1)] @ d[:, s] for s in range(3)], axis=1) + added[:, :, k]
         rows.append(d)
     np.testing.assert_allclose(recursion(slopes, added), np.stack(rows, axis=2), rtol=1e-9)
+
+
+RELAXING = """
+def rhs(t, x, u, p):
+    return [(u["F"] - x[0]) / p["tau"]]
+def outputs(x, u, p):
+    return {"X": x[0]}
+def initial(p):
+    return [0.0]
+"""
+
+
+def test_parameters_that_make_an_equation_stiff_do_not_slow_all_that_come_after(tmp_path, monkeypatch):
+    text = case_text(
+        "ode", states=["x"], force_terms={"x": "N/s"}, parameters={"tau": (1.0, "s", 0.1)},
+        inputs={"F": "N"}, outputs={"X": "N"}, runs=1,
+    )  # fmt: skip
+    t = np.arange(0.0, 20.0, 0.1)
+    frame = pd.DataFrame({"t": t, "F": np.sin(t), "X": np.sin(t)})
+    case = read_case(write_case(tmp_path, text, simulator=RELAXING, r0__csv=frame))
+    model, row_by_row = model_of(case, None), []
+
+    def integrate(*arguments):
+        row_by_row.append(arguments)
+        return ode_integrate(*arguments)
+
+    ode_integrate = ode.integrate
+    monkeypatch.setattr(ode, "integrate", integrate)
+    for i in range(4):
+        model.simulate(case.runs[0], {"tau": 1e-7 * (1 + i)}, ())  # steps of a thousandth of a row
+    assert row_by_row
+    for i in range(30):
+        row_by_row.clear()
+        model.simulate(case.runs[0], {"tau": 1.0 + 0.01 * i}, ())
+    assert not row_by_row
+
+
+def test_terms_that_miss_wait_ever_longer_and_others_do_not():
+    guesses, tried = Guesses(), []
+    for _ in range(64):
+        tried.append(guesses.are_tried(("corner",)))
+        if tried[-1]:
+            guesses.led(("corner",), on=False)
+    assert [i for i, each in enumerate(tried) if each] == [0, 1, 2, 11, 28, 61]
+    assert guesses.are_tried(("smooth",))
+    guesses.led(("smooth",), on=True)
+    assert guesses.are_tried(("smooth",))
+
+
+def test_what_the_bare_equation_missed_its_terms_are_tried_once():
+    guesses = Guesses()
+    for _ in range(3):
+        guesses.led((), on=False)
+    assert guesses.are_tried(("term",))
+    guesses.led(("term",), on=False)
+    assert not guesses.are_tried(("term",))

@@ -20,7 +20,7 @@ from toolkit.report.deliver import content_hash
 from toolkit.report.figures import draw, draw_svg
 from toolkit.report.test.content import REPORT, build_content
 from toolkit.report.test.models import model_plots, model_rows
-from toolkit.report.word.fill import fill, needed_figures
+from toolkit.report.word.fill import fill, survey
 from toolkit.report.word.package import read_template
 from toolkit.tires.comparison import Comparison
 
@@ -119,7 +119,7 @@ def again(template: Path, models: list[str]) -> str:
     options = Options(template=opened, resolve=resolve.resolve_test, models=tuple(models))
     one, comparison = _compared(Path("any"), options.resolve(Path("any")), options.models)
     content = _job(Path("any"), one, Path("out"), options, comparison).content
-    pictures = {name: draw(content.plots[name]) for name in needed_figures(opened, content)}
+    pictures = {name: draw(content.plots[name]) for name in survey(opened, content).figures}
     return content_hash(fill(opened, content, pictures, allow_missing=True), opened)
 
 

@@ -176,7 +176,7 @@ def test_hostile_metadata_stays_text(tmp_path: Path, text: str) -> None:
     assert f"{plain}|2019-06-04" in texts(result.docx)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(min_size=1, max_size=60).filter(str.strip))
 def test_any_text_fills_and_verifies(tmp_path: Path, text: str) -> None:
     filled(tmp_path, p("{{tk:test.special}}", sdt("tk:test.special", run("x"))), content(special=text))

@@ -30,7 +30,7 @@ TIRES = {
 OFFSETS = {"SH": 0.004, "SV": 0.02, "SM": 1e-3}
 NAMES = tuple(TIRES)
 ALL = pytest.mark.parametrize("name", NAMES)
-LONG = pytest.mark.campaign("the two slowest fits: both describe a published tire in every run")
+LONG = pytest.mark.campaign("the slowest fits: each model describes a published tire in every run")
 # The M-15's own plan: 13 slip angles [deg], five loads [N].
 ANGLES = (0, 1, -1, -2, 2, 4, -4, -6, 6, 8, -8, -10, 10)
 LOADS = (1112.0, 2522.0, 3705.0, 4898.0, 6103.0)
@@ -181,7 +181,7 @@ def test_every_parameter_acts(name):
         assert change > 1e-6 * F0, one.name
 
 
-@ALL
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[LONG] * (name == "lugre")) for name in NAMES])
 def test_a_model_finds_its_own_curves_again_without_start_values(name):
     fitted = fit_global(find(name), table(name, OFFSETS), predict=False)
     for channel in ("FY", "MZ"):
@@ -195,7 +195,8 @@ def test_a_model_finds_its_own_curves_again_without_start_values(name):
 
 
 @pytest.mark.parametrize(
-    ("truth", "name"), [("treadsim", "brush"), ("brush", "tmeasy"), ("lugre", "treadsim")]
+    ("truth", "name"),
+    [("treadsim", "brush"), ("brush", "tmeasy"), pytest.param("lugre", "treadsim", marks=LONG)],
 )
 def test_a_model_comes_near_the_curves_of_another(truth, name):
     fitted = fit_global(find(name), table(truth), predict=False)
@@ -219,7 +220,8 @@ def test_a_published_passenger_tire_is_described(name):
 
 @pytest.mark.skipif(not SHARED_DATA.is_dir(), reason="no shared data")
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=LONG) if name in ("treadsim", "tmeasy") else name for name in NAMES]
+    "name",
+    [pytest.param(name, marks=LONG) if name in ("treadsim", "tmeasy", "lugre") else name for name in NAMES],
 )
 def test_a_real_cornering_run_is_described(name):
     d = np.genfromtxt(SHARED_DATA / "ttc_cornering" / "cornering_IA0_P83kPa.csv", delimiter=",", names=True)

@@ -13,34 +13,28 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.apply import apply_record
-from toolkit.calibration.records.record import from_bytes
-from toolkit.calibration.registry.registry import load_checked, load_many
+from toolkit.calibration.records.record import CalibrationRecord, Zero, from_bytes
+from toolkit.calibration.registry.ledger import Ledger
+from toolkit.calibration.registry.registry import Registry, load_checked, load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
 from toolkit.calibration.session.statements import entries_of
+from toolkit.calibration.session.table import Table
 from toolkit.errors import ToolkitError, UnitError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
 from toolkit.inputs import read_regular
 from toolkit.units import si_scale
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord, Zero
-    from toolkit.calibration.registry.ledger import Ledger
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.session.table import Table
-
 # Errors of a session's rows by a record that was not fitted to them.
 
 
-def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[str, NDArray[np.float64]] | str:
+def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[str, Array] | str:
     """Return fitted minus reference (rows,) of each load that both have, in the table's unit.
 
     ``zero`` is the session's. A text tells why the record cannot be held against these rows: another

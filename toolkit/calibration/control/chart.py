@@ -11,10 +11,11 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.control.as_found import (
     Approvals,
     approvals_of,
@@ -22,20 +23,15 @@ from toolkit.calibration.control.as_found import (
     in_use_before,
     phase_of,
 )
-from toolkit.calibration.registry.registry import load_many
+from toolkit.calibration.records.record import CalibrationRecord
+from toolkit.calibration.registry.ledger import Ledger
+from toolkit.calibration.registry.registry import Registry, load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check
 from toolkit.declared import Entry, derived
 from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 from toolkit.units import si_scale
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.ledger import Ledger
-    from toolkit.calibration.registry.registry import Registry
 
 __all__ = ["LEAST_BASELINE", "Chart", "ChartPoint", "CheckLoad", "Series", "chart_findings", "control_chart"]
 
@@ -52,7 +48,7 @@ class RunRule:
     number: int
     text: str
     length: int
-    test: Callable[[NDArray[np.float64]], bool]
+    test: Callable[[Array], bool]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +59,7 @@ class Break:
     index: int
 
 
-def broken_rules(z: NDArray[np.float64]) -> tuple[Break, ...]:
+def broken_rules(z: Array) -> tuple[Break, ...]:
     """Return every rule that a stretch of points breaks, at the last point of the stretch, in their order.
 
     >>> [(one.rule.number, one.index) for one in broken_rules(np.array([0.0, 0.5, 3.5]))]
@@ -77,9 +73,9 @@ def broken_rules(z: NDArray[np.float64]) -> tuple[Break, ...]:
     )
 
 
-def _beyond(limit: float, least: int) -> Callable[[NDArray[np.float64]], bool]:
+def _beyond(limit: float, least: int) -> Callable[[Array], bool]:
     # The last point itself must be out: else a point back in the middle would be told as breaking the rule.
-    def test(z: NDArray[np.float64]) -> bool:
+    def test(z: Array) -> bool:
         return any(
             side * z[-1] > limit and int(np.count_nonzero(side * z > limit)) >= least for side in (1, -1)
         )
@@ -87,25 +83,25 @@ def _beyond(limit: float, least: int) -> Callable[[NDArray[np.float64]], bool]:
     return test
 
 
-def _one_side(z: NDArray[np.float64]) -> bool:
+def _one_side(z: Array) -> bool:
     return bool((z > 0).all() or (z < 0).all())
 
 
-def _steady(z: NDArray[np.float64]) -> bool:
+def _steady(z: Array) -> bool:
     step = np.diff(z)
     return bool((step > 0).all() or (step < 0).all())
 
 
-def _alternating(z: NDArray[np.float64]) -> bool:
+def _alternating(z: Array) -> bool:
     step = np.diff(z)
     return bool((step[:-1] * step[1:] < 0).all())
 
 
-def _quiet(z: NDArray[np.float64]) -> bool:
+def _quiet(z: Array) -> bool:
     return bool((np.abs(z) <= 1).all())
 
 
-def _none_in_the_middle(z: NDArray[np.float64]) -> bool:
+def _none_in_the_middle(z: Array) -> bool:
     return bool((np.abs(z) > 1).all() and (z > 0).any() and (z < 0).any())
 
 
@@ -145,7 +141,7 @@ class ControlLimits:
         return self.points < SETTLED
 
 
-def limits_of(values: NDArray[np.float64]) -> ControlLimits | None:
+def limits_of(values: Array) -> ControlLimits | None:
     """Return the limits of a baseline (points,); None where it is too short or does not scatter at all."""
     if len(values) < LEAST_BASELINE:
         return None
@@ -165,7 +161,7 @@ def limits_of(values: NDArray[np.float64]) -> ControlLimits | None:
     )
 
 
-def breaks_of(values: NDArray[np.float64], limits: ControlLimits) -> tuple[Break, ...]:
+def breaks_of(values: Array, limits: ControlLimits) -> tuple[Break, ...]:
     """Return the run rules that the points (points,) break against these limits."""
     return broken_rules((values - limits.centre) / limits.sigma)
 
@@ -235,8 +231,8 @@ class _Session:
     record: CalibrationRecord
     before: str
     names: tuple[str, ...]
-    references: NDArray[np.float64]
-    errors: NDArray[np.float64]
+    references: Array
+    errors: Array
 
     def scale(self, load: str) -> float:
         """Return the factor from a load's unit to SI."""

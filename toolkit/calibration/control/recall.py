@@ -14,16 +14,13 @@ from __future__ import annotations
 
 import datetime as dt
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from toolkit.calibration.control.as_found import as_found_history
+from toolkit.calibration.control.as_found import AsFound, as_found_history
+from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import due_date
 from toolkit.declared import Entry, derived
 from toolkit.findings import Finding
-
-if TYPE_CHECKING:
-    from toolkit.calibration.control.as_found import AsFound
-    from toolkit.calibration.registry.registry import Registry
 
 SHARE = 0.8
 LEAST_RESULTS = 2

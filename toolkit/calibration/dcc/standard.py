@@ -17,10 +17,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from lxml import etree
 
+from toolkit.arrays import Array
 from toolkit.calibration.dcc.quantities import Point, points_of
 from toolkit.calibration.dcc.structure import DCC, check_structure
 from toolkit.channels import load_dimension
@@ -30,10 +31,6 @@ from toolkit.trust.seal.check import SealCheck
 from toolkit.trust.seal.x509 import Trust
 from toolkit.trust.seal.xml import check_xml
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 _SPACES = {"dcc": DCC}
 _CORE = "dcc:administrativeData/dcc:coreData"
@@ -156,7 +153,7 @@ class Columns(Protocol):
     def unit(self, name: str) -> str:
         """Return a column's unit."""
 
-    def column(self, name: str) -> NDArray[np.float64]:
+    def column(self, name: str) -> Array:
         """Return a column (rows,)."""
 
 

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.errors import ConfigError, SessionError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.session.read import Session
 
 # Which terms the loads tell, and which only the noise of the cells (regression dilution).
@@ -29,9 +28,7 @@ _CURVE = 3
 _SAME = 1e-6
 
 
-def noise_shares(
-    terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
-) -> dict[str, float]:
+def noise_shares(terms: Sequence[str], columns: Mapping[str, Array], loads: Array) -> dict[str, float]:
     """Return how much of the part that tells each nonlinear term is noise, as a share of its size.
 
     Parameters
@@ -59,9 +56,7 @@ def noise_shares(
     return {terms[i]: share for i, share in zip(higher, shares.tolist(), strict=True)}
 
 
-def noise_terms(
-    terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
-) -> dict[str, float]:
+def noise_terms(terms: Sequence[str], columns: Mapping[str, Array], loads: Array) -> dict[str, float]:
     """Return terms without which the loads tell all others, the last first, each with its `noise_shares`."""
     remaining, shares = list(terms), {}
     while noisy := {t: s for t, s in noise_shares(remaining, columns, loads).items() if s > NOISE_SHARE}:
@@ -72,9 +67,7 @@ def noise_terms(
     return shares
 
 
-def _clean(
-    columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def _clean(columns: Mapping[str, Array], loads: Array) -> dict[str, Array]:
     """Return the indications by the reference loads alone: each cell's curve over each load."""
     rows, axes = loads.shape
     size = np.abs(loads).max(axis=0)
@@ -104,7 +97,7 @@ class Adequacy:
     vif: tuple[float, ...]
 
 
-def condition_number(matrix: NDArray[np.float64]) -> float:
+def condition_number(matrix: Array) -> float:
     """Return the 2-norm condition number of columns centred and scaled to unit length, no constant.
 
     >>> condition_number(np.array([[0.0, 1.0], [1.0, 0.0], [2.0, 1.0]])).__round__(6)
@@ -113,7 +106,7 @@ def condition_number(matrix: NDArray[np.float64]) -> float:
     return _condition(matrix - matrix.mean(axis=0))[0]
 
 
-def terms_condition_number(matrix: NDArray[np.float64]) -> float:
+def terms_condition_number(matrix: Array) -> float:
     """Return the condition number of the full term matrix, each column scaled to unit length."""
     return _condition(matrix)[0]
 
@@ -228,7 +221,7 @@ def check_levels(session: Session) -> None:
     )  # fmt: skip
 
 
-def _condition(matrix: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+def _condition(matrix: Array) -> tuple[float, Array]:
     """Return the condition number of columns at unit length, and their products (columns, columns)."""
     products, length = _products(matrix)
     squares = np.linalg.eigvalsh(products)
@@ -239,7 +232,7 @@ def _condition(matrix: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]
     return (float(np.inf) if values[-1] == 0 else float(values[0] / values[-1])), products
 
 
-def _products(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _products(matrix: Array) -> tuple[Array, Array]:
     """Return the products of columns at unit length (columns, columns), and their lengths, 1 where 0."""
     products = matrix.T @ matrix
     length = np.sqrt(np.diag(products))
@@ -247,20 +240,20 @@ def _products(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
     return products / np.outer(length, length), length
 
 
-def _scaled(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _scaled(matrix: Array) -> Array:
     centred = matrix - matrix.mean(axis=0)
-    scaled: NDArray[np.float64] = centred / _products(centred)[1]
+    scaled: Array = centred / _products(centred)[1]
     return scaled
 
 
-def _scaled_terms(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _scaled_terms(matrix: Array) -> Array:
     # Centred where there is a constant to take the means up: the solver works on these columns.
     if np.ptp(matrix[:, -1]) != 0:
         return matrix
     return np.column_stack([_scaled(matrix[:, :-1]), matrix[:, -1]])
 
 
-def _tied(matrix: NDArray[np.float64], names: Sequence[str]) -> list[str]:
+def _tied(matrix: Array, names: Sequence[str]) -> list[str]:
     _, _, right = np.linalg.svd(_scaled(matrix), full_matrices=False)
     return [name for name, part in zip(names, np.abs(right[-1]), strict=True) if part > 0.3]
 

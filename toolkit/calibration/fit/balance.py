@@ -12,16 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix, term_slopes
 from toolkit.errors import SessionError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 TOLERANCE = 1e-10
 MAX_STEPS = 100
@@ -39,29 +36,29 @@ class BalanceForm:
     responses: tuple[str, ...]
     loads: tuple[str, ...]
     terms: tuple[str, ...]
-    coefficients: NDArray[np.float64]
+    coefficients: Array
     fits: tuple[TermFit, ...]
-    full_scale: NDArray[np.float64]
+    full_scale: Array
     not_excited: tuple[str, ...]
 
     @property
-    def linear(self) -> NDArray[np.float64]:
+    def linear(self) -> Array:
         """C1 (responses, loads)."""
         return self.coefficients[:, : len(self.loads)]
 
-    def predict(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    def predict(self, loads: Array) -> Array:
         """Return the responses (rows, responses) to loads (rows, loads)."""
-        responses: NDArray[np.float64] = (
+        responses: Array = (
             term_matrix(self.terms, dict(zip(self.loads, loads.T, strict=True))) @ self.coefficients.T
         )
         return responses
 
-    def slopes(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slopes(self, loads: Array) -> Array:
         """Return dR/dF (rows, responses, loads) at loads (rows, loads)."""
         columns, zero = dict(zip(self.loads, loads.T, strict=True)), np.zeros(len(loads))
         slopes = [term_slopes([name], [1.0], columns, zero).values() for name in self.terms]
         by_term = np.stack([np.stack(list(by_load), axis=1) for by_load in slopes], axis=1)
-        responses: NDArray[np.float64] = np.einsum("jt,rtl->rjl", self.coefficients, by_term)
+        responses: Array = np.einsum("jt,rtl->rjl", self.coefficients, by_term)
         return responses
 
 
@@ -69,15 +66,12 @@ class BalanceForm:
 class Solved:
     """Loads (rows, loads) found from responses, and the steps that it took."""
 
-    loads: NDArray[np.float64]
+    loads: Array
     steps: int
 
 
 def fit_balance(
-    *,
-    loads: Mapping[str, NDArray[np.float64]],
-    responses: Mapping[str, NDArray[np.float64]],
-    zero: Mapping[str, float] | None = None,
+    *, loads: Mapping[str, Array], responses: Mapping[str, Array], zero: Mapping[str, float] | None = None
 ) -> BalanceForm:
     """Fit the response equations on the loads (rows,) applied, through the natural zeros where given.
 
@@ -121,7 +115,7 @@ def fit_balance(
     )
 
 
-def loads_by_iteration(form: BalanceForm, responses: NDArray[np.float64]) -> Solved:
+def loads_by_iteration(form: BalanceForm, responses: Array) -> Solved:
     """Return the loads of responses (rows, responses) by the load iteration of R-091.
 
     It ends where no load changes by more than `TOLERANCE` of its full scale. With more responses than
@@ -154,7 +148,7 @@ def loads_by_iteration(form: BalanceForm, responses: NDArray[np.float64]) -> Sol
     )  # fmt: skip
 
 
-def loads_by_newton(form: BalanceForm, responses: NDArray[np.float64]) -> Solved:
+def loads_by_newton(form: BalanceForm, responses: Array) -> Solved:
     """Return the same loads by Newton's method (Gauss-Newton with more responses than loads).
 
     The two agree to `TOLERANCE` where there are as many responses as loads. Raises as the iteration does.
@@ -176,9 +170,7 @@ def loads_by_newton(form: BalanceForm, responses: NDArray[np.float64]) -> Solved
     )  # fmt: skip
 
 
-def _excited(
-    terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]], *, constant: bool
-) -> tuple[str, ...]:
+def _excited(terms: Sequence[str], columns: Mapping[str, Array], *, constant: bool) -> tuple[str, ...]:
     """Return the terms that the data tell apart, the first of dependent ones kept."""
     matrix = term_matrix(terms, columns)
     basis = [np.full(len(matrix), 1 / np.sqrt(len(matrix)))] if constant else []
@@ -223,8 +215,8 @@ class Tares:
     """
 
     runs: tuple[int, ...]
-    values: NDArray[np.float64]
-    standard_errors: NDArray[np.float64]
+    values: Array
+    standard_errors: Array
     form: BalanceForm
     steps: int
     relative: bool
@@ -232,9 +224,9 @@ class Tares:
 
 def estimate_tares(
     *,
-    loads: Mapping[str, NDArray[np.float64]],
-    responses: Mapping[str, NDArray[np.float64]],
-    run: NDArray[np.float64],
+    loads: Mapping[str, Array],
+    responses: Mapping[str, Array],
+    run: Array,
     natural_zero: Mapping[str, float] | None = None,
 ) -> Tares:
     """Return tares and coefficients that belong together.
@@ -289,12 +281,8 @@ def estimate_tares(
 
 
 def _move(
-    form: BalanceForm,
-    total: NDArray[np.float64],
-    measured: NDArray[np.float64],
-    member: NDArray[np.float64],
-    absolute: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    form: BalanceForm, total: Array, measured: Array, member: Array, absolute: bool
+) -> tuple[Array, Array]:
     """Return the tares' step (free runs, loads), and its covariance."""
     terms = [t for t in form.terms if not (absolute and t == INTERCEPT)]
     design = term_matrix(terms, dict(zip(form.loads, total.T, strict=True)))
@@ -324,10 +312,10 @@ def _move(
 
 
 def _tares(
-    numbers: NDArray[np.float64],
-    to_runs: NDArray[np.float64],
-    moves: NDArray[np.float64],
-    covariance: NDArray[np.float64],
+    numbers: Array,
+    to_runs: Array,
+    moves: Array,
+    covariance: Array,
     form: BalanceForm,
     steps: int,
     zero: Mapping[str, float] | None,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.balance import (
     BalanceForm,
     Tares,
@@ -23,8 +24,6 @@ from toolkit.errors import SessionError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.fit.session_fit import SessionFit
 
 
@@ -134,11 +133,11 @@ def balance_findings(fit: SessionFit) -> list[Finding]:
     return findings
 
 
-def _check(fit: SessionFit, form: BalanceForm, full: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _check(fit: SessionFit, form: BalanceForm, full: Array) -> Array | None:
     check = fit.session.check
     if check is None:
         return None
     solved = loads_by_iteration(form, check.matrix(fit.session.indications))
     reference = check.matrix([load.name for load in fit.session.loads])
-    off: NDArray[np.float64] = 100 * np.abs(solved.loads - reference).max(axis=0) / full
+    off: Array = 100 * np.abs(solved.loads - reference).max(axis=0) / full
     return off

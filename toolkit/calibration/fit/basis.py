@@ -11,14 +11,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.terms import INTERCEPT, Term, parse_term, term_matrix
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,15 +31,15 @@ class Basis:
     """
 
     terms: tuple[str, ...]
-    design: NDArray[np.float64]
-    back: NDArray[np.float64]
+    design: Array
+    back: Array
     back_exact: tuple[tuple[Fraction, ...], ...]
     centre: Mapping[str, float] | None
     half: Mapping[str, float] | None
-    middle: NDArray[np.float64]
-    length: NDArray[np.float64]
+    middle: Array
+    length: Array
 
-    def at(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    def at(self, columns: Mapping[str, Array]) -> Array:
         """Return the design's columns at other indications (rows, terms)."""
         if self.centre is not None and self.half is not None:
             columns = {n: (x - self.centre[n]) / self.half[n] for n, x in columns.items()}
@@ -62,8 +61,8 @@ class Basis:
 
 
 def free_zero(
-    terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
-) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
+    terms: Sequence[str], columns: Mapping[str, Array]
+) -> tuple[dict[str, float], dict[str, Array]]:
     """Return a zero of every indication, and the indications less it (rows,), without rounding.
 
     Where the terms are the same model about any zero, that is one near the mean, so that what is added to an
@@ -74,7 +73,7 @@ def free_zero(
     return zero, {name: x - zero[name] for name, x in columns.items()}
 
 
-def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]) -> Basis:
+def build_basis(terms: Sequence[str], columns: Mapping[str, Array]) -> Basis:
     """Return the solving basis of a list of terms (the intercept, where there is one, last).
 
     Centres lie on a grid of a power of two and scales are powers of two, so that neither rounds: a
@@ -126,7 +125,7 @@ def _mapped(
     return tuple(a * factor if a else a for a, factor in zip(shifted, scale, strict=True))
 
 
-def _anchor(values: NDArray[np.float64]) -> float:
+def _anchor(values: Array) -> float:
     # Near the mean, to 2^-12 of the spread: few digits, so that the difference to a value is exact.
     middle, spread = float(values.mean()), float(np.ptp(values))
     if not (spread > 0 and math.isfinite(spread)):

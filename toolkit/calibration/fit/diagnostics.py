@@ -12,17 +12,13 @@ of fit against a model of higher degree.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.basis import inner
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.fit.regression import TermFit
-
+from toolkit.calibration.fit.regression import TermFit
 
 OUTLIER_RISK = 0.01
 GAP = 2e-4
@@ -40,10 +36,10 @@ class Diagnostics:
     ``outliers`` are rows from 1.
     """
 
-    internal: NDArray[np.float64]
-    external: NDArray[np.float64]
-    apart: NDArray[np.float64]
-    cook: NDArray[np.float64]
+    internal: Array
+    external: Array
+    apart: Array
+    cook: Array
     press: float
     outliers: tuple[int, ...]
     reversibility: float | None
@@ -54,8 +50,8 @@ class Diagnostics:
 def diagnose(
     fit: TermFit,
     *,
-    cells: NDArray[np.float64],
-    load: NDArray[np.float64],
+    cells: Array,
+    load: Array,
     up: NDArray[np.bool_] | None,
     replicates: NDArray[np.intp] | None = None,
 ) -> Diagnostics:
@@ -99,7 +95,7 @@ def diagnose(
     )
 
 
-def replicate_groups(rows: NDArray[np.float64]) -> NDArray[np.intp]:
+def replicate_groups(rows: Array) -> NDArray[np.intp]:
     """Return the number of each row's group of equal rows (rows,), groups counted from 0."""
     # Sorting rows is slow, sorting one mixed key a row is not. Equal rows have equal keys, so that rows
     # with a key of their own are alone; only the others are compared in full.
@@ -126,7 +122,7 @@ def replicate_groups(rows: NDArray[np.float64]) -> NDArray[np.intp]:
     return groups
 
 
-def _outliers(external: NDArray[np.float64], dof: int) -> tuple[int, ...]:
+def _outliers(external: Array, dof: int) -> tuple[int, ...]:
     # Bonferroni: the risk that any row of a clean session is named is OUTLIER_RISK.
     from scipy.special import stdtrit
 
@@ -134,7 +130,7 @@ def _outliers(external: NDArray[np.float64], dof: int) -> tuple[int, ...]:
     return tuple(int(i) + 1 for i in np.flatnonzero(np.abs(external) > limit))
 
 
-def _reversibility(residuals: NDArray[np.float64], up: NDArray[np.bool_] | None) -> float | None:
+def _reversibility(residuals: Array, up: NDArray[np.bool_] | None) -> float | None:
     ups = 0 if up is None else int(np.count_nonzero(up))
     if up is None or ups in (0, len(up)):
         return None
@@ -143,10 +139,7 @@ def _reversibility(residuals: NDArray[np.float64], up: NDArray[np.bool_] | None)
 
 
 def _lack_of_fit(
-    fit: TermFit,
-    cells: NDArray[np.float64],
-    load: NDArray[np.float64],
-    replicates: NDArray[np.intp] | None,
+    fit: TermFit, cells: Array, load: Array, replicates: NDArray[np.intp] | None
 ) -> tuple[float, float] | None:
     if fit.weights is not None:
         return None
@@ -165,7 +158,7 @@ def _lack_of_fit(
     return ratio, float(fdtrc(lack_dof, pure_dof, max(ratio, 0.0)))
 
 
-def _breusch_pagan(e: NDArray[np.float64], load: NDArray[np.float64]) -> float:
+def _breusch_pagan(e: Array, load: Array) -> float:
     from scipy.special import chdtrc
 
     g = e**2
@@ -204,7 +197,7 @@ class Reversal:
     percent_fs: float
 
 
-def load_levels(loads: NDArray[np.float64]) -> NDArray[np.int64] | None:
+def load_levels(loads: Array) -> NDArray[np.int64] | None:
     """Return each row's level (rows,) from loads (rows, loads); None where no level holds two rows."""
     rows = len(loads)
     identity = np.empty(loads.shape, dtype=np.int64)
@@ -225,7 +218,7 @@ def load_levels(loads: NDArray[np.float64]) -> NDArray[np.int64] | None:
 
 
 def loadings(
-    level: NDArray[np.int64] | None, run: NDArray[np.float64] | None, up: NDArray[np.bool_] | None
+    level: NDArray[np.int64] | None, run: Array | None, up: NDArray[np.bool_] | None
 ) -> NDArray[np.int64] | None:
     """Return which loading each row was read at (rows,): rows behind each other of one level, run, direction.
 
@@ -280,11 +273,11 @@ def lack_of_fit(
 
 def reversals(
     *,
-    residuals: NDArray[np.float64],
-    load: NDArray[np.float64],
+    residuals: Array,
+    load: Array,
     level: NDArray[np.int64] | None,
     up: NDArray[np.bool_] | None,
-    run: NDArray[np.float64] | None,
+    run: Array | None,
 ) -> tuple[Reversal, ...]:
     """Return down minus up of the indicated load at each level that has both, by run.
 

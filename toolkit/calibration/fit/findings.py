@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
 from toolkit.calibration.fit.balance_report import balance_findings
 from toolkit.calibration.fit.basis import build_basis
@@ -25,7 +26,7 @@ from toolkit.calibration.fit.scatter_findings import (
     scatter_findings,
     stated_findings,
 )
-from toolkit.calibration.fit.session_fit import fit_session, session_statements
+from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, fit_session, session_statements
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.fit.statement_findings import statement_findings
 from toolkit.calibration.session.known_errors import undeclared_standard
@@ -37,9 +38,6 @@ from toolkit.recording.hidden import hidden_findings
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
     from toolkit.calibration.session.read import Session
     from toolkit.calibration.session.table import Table
 
@@ -131,7 +129,7 @@ def _without(fit: SessionFit, rows: set[int]) -> SessionFit:
         return fit  # the others alone determine no equation
 
 
-def _repeated(rows: NDArray[np.float64], where: str) -> list[Finding]:
+def _repeated(rows: Array, where: str) -> list[Finding]:
     """Return which rows repeat another one: a finding where they are many, else a note."""
     groups = replicate_groups(rows)
     _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)

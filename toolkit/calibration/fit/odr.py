@@ -14,16 +14,13 @@ Reference: Boggs, Byrd, Schnabel, SIAM J. Sci. Stat. Comput. 8 (1987) 1052; ODRP
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.basis import build_basis, free_zero
 from toolkit.calibration.fit.regression import Factor, TermFit, covariance_of, fit_terms, raw_coefficients
 from toolkit.calibration.terms import term_slopes
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _STEPS = 100
 _SETTLED = 4e-15
@@ -31,12 +28,7 @@ _ITERATIONS = 500
 
 
 def fit_odr(
-    *,
-    terms: Sequence[str],
-    columns: Mapping[str, NDArray[np.float64]],
-    load: NDArray[np.float64],
-    u: NDArray[np.float64],
-    u_cells: NDArray[np.float64],
+    *, terms: Sequence[str], columns: Mapping[str, Array], load: Array, u: Array, u_cells: Array
 ) -> TermFit:
     """Fit load = sum of c_i term_i with standard uncertainties of the loads (rows,) and indications.
 
@@ -58,11 +50,11 @@ def fit_odr(
     start = fit_terms(terms=terms, columns=columns, load=load, u=u)
     beta = np.linalg.solve(basis.back, np.asarray(start.coefficients))
 
-    def slopes(at: NDArray[np.float64], beta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slopes(at: Array, beta: Array) -> Array:
         gradients = term_slopes(terms, basis.back @ beta, dict(zip(names, at, strict=True)))
         return np.array([np.broadcast_to(gradients[name], load.shape) for name in names])
 
-    def design(at: NDArray[np.float64]) -> NDArray[np.float64]:
+    def design(at: Array) -> Array:
         return basis.at(dict(zip(names, at, strict=True)))
 
     single = len(names) == 1

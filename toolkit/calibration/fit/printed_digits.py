@@ -8,20 +8,15 @@ loads that were copied from rows of the fit agree with them in every digit often
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
+from toolkit.calibration.fit.regression import TermFit
 from toolkit.calibration.terms import term_matrix
 from toolkit.recording.digits import FULL_DIGITS, half_last_places
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.fit.regression import TermFit
 
 _CHANCE = 0.01  # that check loads which were measured anew are taken for copies
 _FITTED = 2.0  # a row's own rounding, and that of the rows which drew the equation
@@ -32,9 +27,7 @@ _JOINT = 1e-3
 _SIX_DIGITS = 5e-7  # of a value whose digits a conversion has hidden
 
 
-def rounding_alone(
-    fit: TermFit, columns: Mapping[str, NDArray[np.float64]], load: NDArray[np.float64], tolerance: float
-) -> bool:
+def rounding_alone(fit: TermFit, columns: Mapping[str, Array], load: Array, tolerance: float) -> bool:
     """Tell whether every row lies as near to the equation as its printed digits can tell.
 
     Loads of up to three digits, such as those of weights, are nominal and count as exact, and so do those
@@ -74,7 +67,7 @@ def own_scatter(
     return [min((sd / abs(c[name]) for c, sd in moved if c.get(name)), default=0.0) for name in indications]
 
 
-def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Sequence[float]) -> dict[int, int]:
+def copies(check: Array, rows: Array, scatter: Sequence[float]) -> dict[int, int]:
     """Return which rows of a check (from 0) repeat a row of the fit (from 0) within their printed digits.
 
     ``check`` and ``rows`` (rows, columns) have the same columns; ``scatter`` is the standard deviation of
@@ -111,9 +104,7 @@ def copies(check: NDArray[np.float64], rows: NDArray[np.float64], scatter: Seque
     return _nearest(check, rows, sd) | equal_rows
 
 
-def _nearest(
-    check: NDArray[np.float64], rows: NDArray[np.float64], sd: NDArray[np.float64]
-) -> dict[int, int]:
+def _nearest(check: Array, rows: Array, sd: Array) -> dict[int, int]:
     """Return check loads (from 0) that lie far nearer to a row of the fit (from 0) than its replicates do.
 
     Among k rows of one loading and a reading taken apart, the reading is the one with the nearest neighbour

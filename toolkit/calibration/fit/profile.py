@@ -12,12 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from toolkit.arrays import Array
 
 _RISK = 0.01
 _LEAST = 0.01  # of the root mean square: what few small residuals may make of a point
@@ -37,9 +35,7 @@ class Profile:
     least: float
 
     @classmethod
-    def of(
-        cls, columns: Mapping[str, NDArray[np.float64]], squares: NDArray[np.float64], least: float
-    ) -> Profile:
+    def of(cls, columns: Mapping[str, Array], squares: Array, least: float) -> Profile:
         """Return the profile of squares (rows,) over indications (rows,)."""
         from scipy.optimize import nnls
 
@@ -62,16 +58,14 @@ class Profile:
             square=tuple((parts[count + 1 :] / size**2).tolist()), least=least,
         )  # fmt: skip
 
-    def at(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    def at(self, columns: Mapping[str, Array]) -> Array:
         """Return the variance at indications (points,)."""
         x = np.abs(np.column_stack([columns[name] for name in self.names]))
         total = self.constant + x @ np.array(self.linear) + x**2 @ np.array(self.square)
         return np.asarray(np.maximum(total, self.least), dtype=np.float64)
 
 
-def shown_profile(
-    columns: Mapping[str, NDArray[np.float64]], residuals: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def shown_profile(columns: Mapping[str, Array], residuals: Array) -> Array | None:
     """Return each row's standard deviation (rows,) where residuals show that it grows; else None.
 
     They show it where their squares follow the indications beyond chance: n R^2 of that regression by

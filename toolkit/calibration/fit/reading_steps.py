@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.printed_digits import own_scatter
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.fit.regression import TermFit
     from toolkit.calibration.session.read import Session
 
@@ -34,7 +33,7 @@ _FINER, _FINE = 4, 200  # times as many steps as there are different readings, o
 _FINEST = 1e-6  # of the largest reading: what printing leaves of any instrument
 
 
-def reading_step(readings: NDArray[np.float64], run: NDArray[np.float64] | None) -> float | None:
+def reading_step(readings: Array, run: Array | None) -> float | None:
     """Return the largest step of which readings (rows,) of a run are whole numbers apart; None without one.
 
     >>> levels = np.array([0.0, 0.35, 0.71, 1.04, 1.42, 1.77, 2.13, 2.46, 2.81, 3.2])

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.session.readings import (
     SHUNT_TOLERANCE_PERCENT,
     CreepEntry,
@@ -365,7 +366,7 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
     return tuple(reversals)
 
 
-def _levels(values: NDArray[np.float64], within: float) -> NDArray[np.int64]:
+def _levels(values: Array, within: float) -> NDArray[np.int64]:
     """Return which level each load belongs to: loads nearer than ``within`` are one, unless they chain."""
     order = np.argsort(values, kind="stable")
     steps = np.cumsum(np.diff(values[order], prepend=values[order[0]]) > within)
@@ -378,6 +379,6 @@ def _levels(values: NDArray[np.float64], within: float) -> NDArray[np.int64]:
     return numbers
 
 
-def _equation(load: LoadFit, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    value: NDArray[np.float64] = term_matrix(load.terms, columns) @ np.asarray(load.coefficients)
+def _equation(load: LoadFit, columns: dict[str, Array]) -> Array:
+    value: Array = term_matrix(load.terms, columns) @ np.asarray(load.coefficients)
     return value

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from toolkit.calibration.fit.findings import COARSE, session_findings
-from toolkit.calibration.fit.readings import readings_of
+from toolkit.calibration.fit.readings import SessionReadings, ShuntCheck, readings_of
+from toolkit.calibration.fit.session_fit import SessionFit
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.findings import Finding, Level
-
-if TYPE_CHECKING:
-    from toolkit.calibration.fit.readings import SessionReadings, ShuntCheck
-    from toolkit.calibration.fit.session_fit import SessionFit
-    from toolkit.calibration.records.record import CalibrationRecord
 
 TEMPERATURE_C = (18.0, 28.0)  # ISO 376
 OPERATING_C = (-40.0, 85.0)  # strain-gauge cells beyond their compensated range, OIML R 60: -10 to 40

@@ -20,14 +20,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.adequacy import NOISE_SHARE, RANK, noise_shares, terms_condition_number
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.profile import shown_profile
 from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.fit.regression import TermFit
     from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
     from toolkit.calibration.session.read import Session
@@ -269,7 +268,7 @@ def _sound(
     return models_kept
 
 
-def _robust(narrow: NDArray[np.float64], wide: NDArray[np.float64], load: NDArray[np.float64]) -> float:
+def _robust(narrow: Array, wide: Array, load: Array) -> float:
     """Return the probability of a wide design's further coefficients where rows scatter each by its own."""
     from scipy.special import fdtrc
 
@@ -314,10 +313,7 @@ def _two_sided(t: float, fit: TermFit) -> float:
 
 
 def _refit(
-    fit: SessionFit,
-    loads: Sequence[LoadResult],
-    terms: tuple[str, ...],
-    columns: Mapping[str, NDArray[np.float64]],
+    fit: SessionFit, loads: Sequence[LoadResult], terms: tuple[str, ...], columns: Mapping[str, Array]
 ) -> list[_Sum]:
     """Return what other terms leave over of each load; the coefficients themselves are not wanted."""
     table, design = fit.session.table, build_basis(terms, columns).design
@@ -333,7 +329,7 @@ def _refit(
     ]
 
 
-def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[_Sum]:
+def _left_over(design: Array, loads: Array) -> list[_Sum]:
     """Return what a design (rows, terms) leaves over of loads (rows, loads)."""
     n, p = design.shape
     # Of a triangle of both, what stands below the design's rows is as long as the residuals.
@@ -341,7 +337,7 @@ def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[
     return [_Sum(squares=float(residual @ residual), rows=n, dof=n - p) for residual in below.T]
 
 
-def _root(fit: SessionFit, load: LoadResult) -> NDArray[np.float64] | None:
+def _root(fit: SessionFit, load: LoadResult) -> Array | None:
     """Return by what rows weigh in comparisons (rows,): as stated, or by the scatter that they show.
 
     Where the scatter grows with the indications, the rows that scatter most would pass for a curve.
@@ -353,9 +349,7 @@ def _root(fit: SessionFit, load: LoadResult) -> NDArray[np.float64] | None:
     return None if sd is None else float(np.sqrt(np.mean(sd**2))) / sd
 
 
-def _determined(
-    terms: tuple[str, ...], columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
-) -> bool:
+def _determined(terms: tuple[str, ...], columns: Mapping[str, Array], loads: Array) -> bool:
     matrix = term_matrix(terms, columns)
     if len(matrix) - len(terms) < 3:
         return False

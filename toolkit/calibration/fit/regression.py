@@ -12,14 +12,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.basis import Basis, build_basis, inner
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # Products of tall matrices without their rounding: matrices cut into parts whose products are exact.
 
@@ -36,7 +35,7 @@ def exact_bits(rows: int) -> int:
     return (_MANTISSA - max(rows - 1, 1).bit_length()) // 2
 
 
-def leading(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
+def leading(values: Array, bits: int) -> Array:
     """Return the leading bits of each line of (lines, rows), on a grid of 2^-bits of its largest value.
 
     What is left, ``values`` minus the result, is exact.
@@ -44,7 +43,7 @@ def leading(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
     _, exponent = np.frexp(_largest(values))
     # Added to a number of this size, a value is rounded to the grid; taken away again, it stands there.
     size = np.ldexp(1.5, exponent + (_MANTISSA - 1 - bits))[:, None]
-    moved: NDArray[np.float64] = values + size
+    moved: Array = values + size
     moved -= size
     return moved
 
@@ -53,11 +52,11 @@ def leading(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
 class Residuals:
     """``high`` + ``low`` (loads, rows), the first cut to the bits that exact products allow."""
 
-    high: NDArray[np.float64]
-    low: NDArray[np.float64]
+    high: Array
+    low: Array
 
     @classmethod
-    def of(cls, values: NDArray[np.float64], bits: int) -> Residuals:
+    def of(cls, values: Array, bits: int) -> Residuals:
         """Cut residuals (loads, rows)."""
         high = leading(values, bits)
         return cls(high=high, low=values - high)
@@ -67,18 +66,18 @@ class Residuals:
 class CutDesign:
     """A design in two parts (terms, rows), ``high`` + ``low``, exactly."""
 
-    high: NDArray[np.float64]
-    low: NDArray[np.float64]
+    high: Array
+    low: Array
     bits: int
 
     @classmethod
-    def of(cls, design: NDArray[np.float64]) -> CutDesign:
+    def of(cls, design: Array) -> CutDesign:
         """Cut a design (terms, rows)."""
         bits = exact_bits(design.shape[1])
         high = leading(design, bits)
         return cls(high=high, low=design - high, bits=bits)
 
-    def residuals(self, loads: NDArray[np.float64], solution: NDArray[np.longdouble]) -> Residuals:
+    def residuals(self, loads: Array, solution: NDArray[np.longdouble]) -> Residuals:
         """Return loads (loads, rows) minus solution (loads, terms) times design, to 70 bits or so."""
         x = np.asarray(solution, dtype=np.float64)
         _, of_terms = np.frexp(_largest(self.high))
@@ -106,7 +105,7 @@ class CutDesign:
         return np.asarray(exact, dtype=np.longdouble) + projected
 
 
-def _largest(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _largest(values: Array) -> Array:
     return np.asarray(np.maximum(values.max(axis=1), -values.min(axis=1)), dtype=np.float64)
 
 
@@ -127,27 +126,23 @@ class TermFit:
 
     terms: tuple[str, ...]
     coefficients: tuple[float, ...]
-    covariance: NDArray[np.float64]
+    covariance: Array
     residual_sd: float
     dof: int
-    residuals: NDArray[np.float64]
-    leverage: NDArray[np.float64]
-    weights: NDArray[np.float64] | None
-    scaled: NDArray[np.float64]
+    residuals: Array
+    leverage: Array
+    weights: Array | None
+    scaled: Array
     chi2: float | None = None
 
     @property
-    def standard_errors(self) -> NDArray[np.float64]:
+    def standard_errors(self) -> Array:
         """Standard errors of the coefficients (terms,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
 def fit_terms(
-    *,
-    terms: Sequence[str],
-    columns: Mapping[str, NDArray[np.float64]],
-    load: NDArray[np.float64],
-    u: NDArray[np.float64] | None = None,
+    *, terms: Sequence[str], columns: Mapping[str, Array], load: Array, u: Array | None = None
 ) -> TermFit:
     """Fit load = sum of c_i term_i by ordinary least squares, or weighted by known uncertainties.
 
@@ -165,11 +160,7 @@ def fit_terms(
 
 
 def fit_loads(
-    *,
-    terms: Sequence[str],
-    columns: Mapping[str, NDArray[np.float64]],
-    loads: Sequence[NDArray[np.float64]],
-    u: NDArray[np.float64] | None = None,
+    *, terms: Sequence[str], columns: Mapping[str, Array], loads: Sequence[Array], u: Array | None = None
 ) -> tuple[TermFit, ...]:
     """Fit several loads on the same rows and weights: one decomposition serves them all (see `fit_terms`)."""
     basis = build_basis(terms, columns)
@@ -206,15 +197,15 @@ class Factor:
     normal matrix, ``leverage`` (rows,).
     """
 
-    design: NDArray[np.float64]
-    root: NDArray[np.float64] | None
-    q: NDArray[np.float64]
-    r: NDArray[np.float64]
-    inverse: NDArray[np.float64]
-    leverage: NDArray[np.float64]
+    design: Array
+    root: Array | None
+    q: Array
+    r: Array
+    inverse: Array
+    leverage: Array
 
     @classmethod
-    def of(cls, design: NDArray[np.float64], root: NDArray[np.float64] | None) -> Factor:
+    def of(cls, design: Array, root: Array | None) -> Factor:
         """Decompose; LinAlgError where the columns are dependent, or not finite."""
         from scipy.linalg import qr
 
@@ -236,7 +227,7 @@ class Factor:
             leverage=np.einsum("ij,ij->i", q, q),
         )
 
-    def solve(self, loads: NDArray[np.float64]) -> tuple[NDArray[np.longdouble], NDArray[np.float64]]:
+    def solve(self, loads: Array) -> tuple[NDArray[np.longdouble], Array]:
         """Return the solutions (loads, terms) in extended precision and the residuals, of (loads, rows)."""
         cut = CutDesign.of(np.ascontiguousarray(self.design.T))
         square = None if self.root is None else self.root**2
@@ -258,7 +249,7 @@ class Factor:
                 break
         return solution, residuals.high + residuals.low
 
-    def _first(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _first(self, loads: Array) -> Array:
         """Return statsmodels' solution by QR (loads, terms).
 
         It is given the triangle R and Q'y with the length of what is left over, in place of all rows: an
@@ -284,7 +275,7 @@ def raw_coefficients(basis: Basis, solution: NDArray[Any]) -> tuple[float, ...]:
     )
 
 
-def covariance_of(basis: Basis, inverse: NDArray[np.float64], scale: float = 1.0) -> NDArray[np.float64]:
+def covariance_of(basis: Basis, inverse: Array, scale: float = 1.0) -> Array:
     """Return the covariance in the raw terms, symmetric to the last bit."""
     covariance = basis.back @ inverse @ basis.back.T * scale
     return np.asarray((covariance + covariance.T) / 2, dtype=np.float64)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.diagnostics import (
     LackOfFit,
     Reversal,
@@ -85,8 +86,8 @@ class FitReport:
     unit: str
     full_scale: float
     coefficients: tuple[Coefficient, ...]
-    covariance: NDArray[np.float64]
-    correlation: NDArray[np.float64]
+    covariance: Array
+    correlation: Array
     n: int
     dof: int
     residual_sd: float
@@ -94,14 +95,14 @@ class FitReport:
     condition_number: float
     condition_number_terms: float
     vif: tuple[tuple[str, float], ...]
-    reference: NDArray[np.float64]
-    fitted: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    leverage: NDArray[np.float64]
-    internal: NDArray[np.float64]
-    external: NDArray[np.float64]
-    cook: NDArray[np.float64]
-    robust_weight: NDArray[np.float64] | None
+    reference: Array
+    fitted: Array
+    residuals: Array
+    leverage: Array
+    internal: Array
+    external: Array
+    cook: Array
+    robust_weight: Array | None
     outliers: tuple[int, ...]
     direction: tuple[str, ...] | None
     press: float
@@ -112,17 +113,15 @@ class FitReport:
     levels: int
     replicated_rows: int
     prediction_half_width: float
-    check_reference: NDArray[np.float64] | None
-    check_percent_fs: NDArray[np.float64] | None
+    check_reference: Array | None
+    check_percent_fs: Array | None
     tolerance_percent_fs: float
     reversals: tuple[Reversal, ...]
     reversibility_percent_fs: float | None
     noise_free: bool
 
 
-def report_session(
-    fit: SessionFit, covariances: Mapping[str, NDArray[np.float64]] | None = None
-) -> tuple[FitReport, ...]:
+def report_session(fit: SessionFit, covariances: Mapping[str, Array] | None = None) -> tuple[FitReport, ...]:
     """Return the report of every load of a fitted session.
 
     ``covariances`` of the coefficients by load hold, beside the fit's own, what the session states
@@ -140,9 +139,7 @@ def report_session(
     return tuple(_report(fit, load, level, loading) for load in loads)
 
 
-def prediction_half_width(
-    fit: TermFit, columns: Mapping[str, NDArray[np.float64]], *, coverage: float = COVERAGE
-) -> NDArray[np.float64]:
+def prediction_half_width(fit: TermFit, columns: Mapping[str, Array], *, coverage: float = COVERAGE) -> Array:
     """Return the half width of the prediction interval at indications (points,), in the load's unit.
 
     t(coverage, dof) sqrt(s^2 + x' V x) with V the coefficients' covariance: where one further reading at
@@ -158,11 +155,11 @@ def prediction_half_width(
     else:
         scatter, factor = float(np.mean(1 / fit.weights)), float(ndtri(share))
     variance = np.einsum("ij,jk,ik->i", x, fit.covariance, x)
-    half: NDArray[np.float64] = factor * np.sqrt(scatter + np.maximum(variance, 0.0))
+    half: Array = factor * np.sqrt(scatter + np.maximum(variance, 0.0))
     return half
 
 
-def coefficient_rows(fit: TermFit, extent: NDArray[np.float64], full_scale: float) -> tuple[Coefficient, ...]:
+def coefficient_rows(fit: TermFit, extent: Array, full_scale: float) -> tuple[Coefficient, ...]:
     """Return the coefficients with what is known of each; ``extent`` is max|term| (terms,)."""
     from scipy.special import ndtr, stdtr
 
@@ -245,7 +242,7 @@ def _report(
     )
 
 
-def _sums(fit: TermFit, load: NDArray[np.float64], *, weighted: bool) -> tuple[float, float, float]:
+def _sums(fit: TermFit, load: Array, *, weighted: bool) -> tuple[float, float, float]:
     """Return the squares of the load about its mean, of the residuals, and of those left out."""
     w = fit.weights if weighted and fit.weights is not None else np.ones(len(load))
     # Without a constant the origin is the model's own zero.
@@ -258,7 +255,7 @@ def _sums(fit: TermFit, load: NDArray[np.float64], *, weighted: bool) -> tuple[f
     )
 
 
-def _normality(internal: NDArray[np.float64]) -> tuple[float, float] | None:
+def _normality(internal: Array) -> tuple[float, float] | None:
     if not 8 <= len(internal) <= _SHAPIRO_ROWS:
         return None
     from scipy.stats import shapiro

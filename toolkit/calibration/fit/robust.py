@@ -25,18 +25,14 @@ Simonoff, Journal of the American Statistical Association 88 (1993), for the ord
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.basis import build_basis, inner
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from toolkit.calibration.fit.regression import TermFit
+from toolkit.calibration.fit.regression import TermFit
 
 # Both have 95 % efficiency on normal data.
 _HUBER, _TUNING = 1.345, 4.685
@@ -45,9 +41,7 @@ _STEPS = 50
 _SETTLED = 1e-6  # of the scale: no weight moves by more than some 1e-6
 
 
-def robust_weights(
-    fit: TermFit, *, columns: Mapping[str, NDArray[np.float64]], load: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def robust_weights(fit: TermFit, *, columns: Mapping[str, Array], load: Array) -> Array | None:
     """Return the biweight of each row (rows,), 1 in the middle and 0 for a row that is cast out.
 
     None where the scatter is rounding, or too few rows are left to judge by (fewer than 3 a term). The
@@ -68,7 +62,7 @@ def robust_weights(
     design = design if w is None else design * w[:, None]
     q = np.ascontiguousarray(np.linalg.qr(design)[0].T)
     reach = math.sqrt(float(np.einsum("ij,ij->j", q, q).max()))
-    stages: tuple[Callable[[NDArray[np.float64]], NDArray[np.float64]], ...] = (_huber, _biweight)
+    stages: tuple[Callable[[Array], Array], ...] = (_huber, _biweight)
     if wrong := contradicting(design, y):
         sound = np.delete(np.arange(n), np.array(wrong) - 1)
         residuals = y - np.linalg.lstsq(q.T[sound], y[sound], rcond=None)[0] @ q
@@ -82,12 +76,8 @@ def robust_weights(
 
 
 def _reweighted(
-    q: NDArray[np.float64],
-    residuals: NDArray[np.float64],
-    weights_of: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    reach: float,
-    floor: float,
-) -> NDArray[np.float64]:
+    q: Array, residuals: Array, weights_of: Callable[[Array], Array], reach: float, floor: float
+) -> Array:
     """Return the residuals (rows,) of an M-estimate by iteratively reweighted least squares.
 
     ``q`` (terms, rows) is an orthonormal basis of the design, ``rest`` the residuals to begin with, ``reach``
@@ -109,15 +99,15 @@ def _reweighted(
     return residuals
 
 
-def _mad(residuals: NDArray[np.float64]) -> float:
+def _mad(residuals: Array) -> float:
     return float(np.median(np.abs(residuals))) / _NORMAL_MEDIAN
 
 
-def _huber(z: NDArray[np.float64]) -> NDArray[np.float64]:
+def _huber(z: Array) -> Array:
     return np.asarray(_HUBER / np.maximum(np.abs(z), _HUBER), dtype=np.float64)
 
 
-def _biweight(z: NDArray[np.float64]) -> NDArray[np.float64]:
+def _biweight(z: Array) -> Array:
     inside = np.maximum(1 - np.square(z / _TUNING), 0.0)
     return np.asarray(inside * inside, dtype=np.float64)
 
@@ -132,7 +122,7 @@ _UNTOLD = 1e-13  # of the squares of all rows
 _SHARE = 100  # rows are added singly up to this many, then by the hundredth part
 
 
-def contradicting(design: NDArray[np.float64], load: NDArray[np.float64]) -> tuple[int, ...]:
+def contradicting(design: Array, load: Array) -> tuple[int, ...]:
     """Return the rows (from 1) of a design (rows, terms) and a load (rows,) that contradict the others.
 
     None are named where the rows are under 3 a term, or more than half agree to rounding.
@@ -155,9 +145,7 @@ def contradicting(design: NDArray[np.float64], load: NDArray[np.float64]) -> tup
     return ()
 
 
-def deviating(
-    design: NDArray[np.float64], load: NDArray[np.float64], wrong: Sequence[int]
-) -> tuple[int, ...]:
+def deviating(design: Array, load: Array, wrong: Sequence[int]) -> tuple[int, ...]:
     """Return those of the ``wrong`` rows (from 1) that contradict the other rows on this design too."""
     other_rows = np.delete(np.arange(len(load)), np.array(wrong) - 1)
     if len(other_rows) - design.shape[1] < 1:
@@ -166,9 +154,7 @@ def deviating(
     return () if judged is None else tuple(row for row in wrong if judged[0][row - 1] >= judged[1])
 
 
-def _judged(
-    q: NDArray[np.float64], load: NDArray[np.float64], rows: NDArray[np.intp]
-) -> tuple[NDArray[np.float64], float] | None:
+def _judged(q: Array, load: Array, rows: NDArray[np.intp]) -> tuple[Array, float] | None:
     """Return each row's deviation (rows,) from the equation of some, in its own standard deviations.
 
     And the least that contradicts them; None where those rows agree to rounding. ``q`` (rows, terms) is an
@@ -192,9 +178,7 @@ def _judged(
     return deviation, float(stdtrit(dof, 1 - RISK / (2 * (len(rows) + 1))))
 
 
-def _best(
-    q: NDArray[np.float64], load: NDArray[np.float64], starts: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _best(q: Array, load: Array, starts: Array) -> Array:
     """Return the best of some equations (equations, terms), as a sample of long sessions ranks them."""
     if len(load) > _RANKED_BY:
         sample = np.random.default_rng(1).choice(len(load), _RANKED_BY, replace=False)
@@ -215,15 +199,13 @@ def _best(
     return starts[np.argsort(sums, kind="stable")[:_REFINED]]
 
 
-def _trimmed(
-    q: NDArray[np.float64], load: NDArray[np.float64], solutions: NDArray[np.float64], half: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _trimmed(q: Array, load: Array, solutions: Array, half: int) -> tuple[Array, Array]:
     """Return each equation's absolute residuals (equations, rows), and the squares of its nearest half."""
     residuals = np.asarray(np.abs(load - solutions @ q.T), dtype=np.float64)
     return residuals, np.sum(np.square(np.partition(residuals, half - 1, axis=1)[:, :half]), axis=1)
 
 
-def _best_half(q: NDArray[np.float64], load: NDArray[np.float64]) -> NDArray[np.intp]:
+def _best_half(q: Array, load: Array) -> NDArray[np.intp]:
     """Return the rows of the smallest sum of squares about one equation, just over half of them.
 
     ``q`` (rows, terms) is an orthonormal basis of the design. Equations through as many rows as terms, drawn

@@ -22,14 +22,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.statements import statements_of
+from toolkit.arrays import Array
+from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.calibration.terms import term_slopes
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.session.statements import Statements
     from toolkit.calibration.session.table import Table
 
 
@@ -42,14 +40,14 @@ class Rounding:
 
     terms: Sequence[str]
     coefficients: Sequence[float]
-    columns: Mapping[str, NDArray[np.float64]]
+    columns: Mapping[str, Array]
     resolutions: Mapping[str, float]
 
     @classmethod
     def of(
         cls,
         statements: Statements,
-        columns: Mapping[str, NDArray[np.float64]],
+        columns: Mapping[str, Array],
         *,
         terms: Sequence[str],
         coefficients: Sequence[float],
@@ -60,7 +58,7 @@ class Rounding:
             return None
         return cls(terms=terms, coefficients=coefficients, columns=columns, resolutions=resolutions)
 
-    def covariance(self, operator: NDArray[np.float64]) -> NDArray[np.float64]:
+    def covariance(self, operator: Array) -> Array:
         """Return the covariance of coefficients (terms, terms) that ``operator`` (terms, rows) makes."""
         slopes = term_slopes(self.terms, self.coefficients, self.columns)
         total = np.zeros((len(operator), len(operator)))

@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.records.scatter import WEIGHTED, Rows, RunScatter, chi2_limit, rows_of
-from toolkit.calibration.session.known_errors import known_errors, row_uncertainty
+from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.terms import term_matrix, term_slopes
 
 if TYPE_CHECKING:
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.fit.rounding import Rounding
-    from toolkit.calibration.session.known_errors import KnownErrors
     from toolkit.calibration.session.statements import Statements
     from toolkit.calibration.session.table import Table
 
@@ -46,13 +46,13 @@ class RowNoise:
     ``proportional`` tells how a group's error acts, ``u_shared`` its size in the load's unit.
     """
 
-    u: NDArray[np.float64]
+    u: Array
     stated: bool
-    v: NDArray[np.float64]
+    v: Array
     group: NDArray[np.intp]
     u_shared: float
     proportional: bool
-    design: NDArray[np.float64]
+    design: Array
 
     @property
     def size(self) -> float:
@@ -60,31 +60,31 @@ class RowNoise:
         return math.sqrt(float(self.u @ self.u) / len(self.u))
 
     @property
-    def profile(self) -> NDArray[np.float64]:
+    def profile(self) -> Array:
         """Each row's u by their root mean square (rows,)."""
         return self.u / self.size
 
-    def white(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def white(self, values: Array) -> Array:
         """Return rows (rows,) or (rows, columns) brought to independence and unit spread."""
         return self._freed((values.T / self.u).T)
 
-    def chi2(self, residuals: NDArray[np.float64]) -> float:
+    def chi2(self, residuals: Array) -> float:
         """Return the weighted sum of squares of residuals (rows,)."""
         white = self.white(residuals)
         return float(white @ white)
 
-    def shown(self, residuals: NDArray[np.float64], dof: int) -> float:
+    def shown(self, residuals: Array, dof: int) -> float:
         """Return the scatter that residuals show, as `size` is stated, in the load's unit."""
         return self.size * math.sqrt(self.chi2(residuals) / dof)
 
-    def scaled(self, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+    def scaled(self, residuals: Array) -> Array:
         """Return residuals (rows,) as `diagnostics` judges them: V^-1 r by the root of its diagonal."""
         total = self._sums(self._a * self._a)
         pull = residuals / self.u
         pull = (pull - self._a * self._sums(self._a * pull) / (1 + total)) / self.u
         return pull / np.sqrt((1 - self._a**2 / (1 + total)) / self.u**2)
 
-    def operator(self) -> NDArray[np.float64]:
+    def operator(self) -> Array:
         """Return what makes coefficients of loads (terms, rows)."""
         length = np.sqrt(np.einsum("ij,ij->j", self.design, self.design))
         length = np.where(length > 0, length, 1.0)
@@ -93,13 +93,13 @@ class RowNoise:
         return np.asarray(np.linalg.solve(r, (self._freed(q).T / self.u)) / length[:, None])
 
     @property
-    def _a(self) -> NDArray[np.float64]:
+    def _a(self) -> Array:
         return self.v / self.u
 
-    def _sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _sums(self, values: Array) -> Array:
         return np.asarray(np.bincount(self.group, weights=values)[self.group], dtype=np.float64)
 
-    def _freed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _freed(self, values: Array) -> Array:
         """Return (I + a a')^-1/2 of values in each group."""
         if not self.v.any():
             return values
@@ -164,9 +164,9 @@ def _adjusted(
     errors: KnownErrors,
     terms: Sequence[str],
     coefficients: Sequence[float],
-    columns: dict[str, NDArray[np.float64]],
-    load: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    columns: dict[str, Array],
+    load: Array,
+) -> tuple[Array, Array]:
     """Return the effective uncertainties (rows,) and the terms at the adjusted indications (rows, terms)."""
     u = np.ones(len(load)) if errors.u is None else errors.u
     x, u_x, c = np.array(list(columns.values())), errors.u_cells[:, None], np.asarray(coefficients)
@@ -186,11 +186,11 @@ def _adjusted(
 
 
 def weighed_rows(
-    design: NDArray[np.float64],
-    load: NDArray[np.float64],
+    design: Array,
+    load: Array,
     group: NDArray[np.int64],
     noise: RowNoise | None,
-    operator: NDArray[np.float64] | None = None,
+    operator: Array | None = None,
     rounding: Rounding | None = None,
 ) -> Rows:
     """Return how scatter reaches the coefficients of a load (rows,) on a design (rows, terms).
@@ -217,9 +217,7 @@ def weighed_rows(
     )  # fmt: skip
 
 
-def scatter_of_one(
-    noise: RowNoise, residuals: NDArray[np.float64], factor: str, dof: int
-) -> RunScatter | None:
+def scatter_of_one(noise: RowNoise, residuals: Array, factor: str, dof: int) -> RunScatter | None:
     """Return the scatter of rows whose runs tell nothing; None where what is stated of them holds it."""
     within = noise.shown(residuals, dof)
     if (within / noise.size) ** 2 <= chi2_limit(dof) / dof:

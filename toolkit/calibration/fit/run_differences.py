@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.profile import shown_profile
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
@@ -208,35 +209,35 @@ def _rows(session: Session, load: LoadResult) -> SessionRows | None:
     return rows if rows.groups > 1 and len(rows.load) == len(reference) else None
 
 
-def _of_groups(group: NDArray[np.int64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def _of_groups(group: NDArray[np.int64], columns: Array) -> Array:
     """Return columns (rows, k) for each group by itself (rows, k x groups)."""
     member = group[:, None] == np.arange(int(group.max()) + 1)
     return np.asarray((columns[:, :, None] * member[:, None, :]).reshape(len(group), -1), dtype=np.float64)
 
 
-def _squares_left(design: NDArray[np.float64], load: NDArray[np.float64]) -> tuple[float, int]:
+def _squares_left(design: Array, load: Array) -> tuple[float, int]:
     """Return the squares that a design leaves of loads, and its rank."""
     q = _orthonormal(design)
     residual = load - q @ (q.T @ load)
     return float(residual @ residual), q.shape[1]
 
 
-def _residual(design: NDArray[np.float64], load: NDArray[np.float64]) -> NDArray[np.float64]:
+def _residual(design: Array, load: Array) -> Array:
     q = _orthonormal(design)
     return np.asarray(load - q @ (q.T @ load))
 
 
-def _orthonormal(design: NDArray[np.float64]) -> NDArray[np.float64]:
+def _orthonormal(design: Array) -> Array:
     length = np.linalg.norm(design, axis=0)
     q, values, _ = np.linalg.svd(design[:, length > 0] / length[length > 0], full_matrices=False)
     return np.asarray(q[:, values > 1e-8 * values[0]])
 
 
-def _rms(design: NDArray[np.float64], load: NDArray[np.float64]) -> float:
+def _rms(design: Array, load: Array) -> float:
     return float(np.sqrt(_squares_left(design, load)[0] / (len(load) - design.shape[1])))
 
 
-def _leverage(design: NDArray[np.float64], at: NDArray[np.float64]) -> float:
+def _leverage(design: Array, at: Array) -> float:
     """Return the mean variance of what the rows of a design foretell at other rows, by that of a row."""
     length = np.linalg.norm(design, axis=0)
     if not length.all():
@@ -248,11 +249,7 @@ def _leverage(design: NDArray[np.float64], at: NDArray[np.float64]) -> float:
 
 
 def _pairs(
-    applied: NDArray[np.float64],
-    group: NDArray[np.int64],
-    up: NDArray[np.bool_] | None,
-    first: int,
-    second: int,
+    applied: Array, group: NDArray[np.int64], up: NDArray[np.bool_] | None, first: int, second: int
 ) -> NDArray[np.int64]:
     """Return the rows of two runs that have one load, direction and place among such rows (pairs, 2)."""
     side = np.zeros(len(group)) if up is None else up.astype(np.float64)
@@ -271,21 +268,14 @@ def _pairs(
     )
 
 
-def _noise_of_pairs(
-    x: NDArray[np.float64], applied: NDArray[np.float64], pairs: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _noise_of_pairs(x: Array, applied: Array, pairs: NDArray[np.int64]) -> Array:
     """Return the noise of one reading of each indication, by what two runs differ in (indications,)."""
     apart = x[pairs[:, 0]] - x[pairs[:, 1]]
     columns = [np.ones(len(pairs)), *applied[pairs[:, 0]].T, *(applied[pairs[:, 0]] - applied[pairs[:, 1]]).T]
     return np.asarray(_sd(np.column_stack(columns), apart) / np.sqrt(2))
 
 
-def _within(
-    x: NDArray[np.float64],
-    applied: NDArray[np.float64],
-    group: NDArray[np.int64],
-    up: NDArray[np.bool_] | None,
-) -> NDArray[np.float64]:
+def _within(x: Array, applied: Array, group: NDArray[np.int64], up: NDArray[np.bool_] | None) -> Array:
     """Return the noise of one reading of each indication, by rows of one run at one load (indications,).
 
     What loading and unloading do apart, a parabola over each load, is taken off.
@@ -305,13 +295,13 @@ def _within(
     return _sd(centred[0], centred[1], lost=spare)
 
 
-def _means(values: NDArray[np.float64], place: NDArray[np.int64]) -> NDArray[np.float64]:
+def _means(values: Array, place: NDArray[np.int64]) -> Array:
     sums = np.stack([np.bincount(place, weights=column) for column in values.T], axis=1)
-    means: NDArray[np.float64] = (sums / np.bincount(place)[:, None])[place]
+    means: Array = (sums / np.bincount(place)[:, None])[place]
     return means
 
 
-def _sd(design: NDArray[np.float64], values: NDArray[np.float64], lost: int = 0) -> NDArray[np.float64]:
+def _sd(design: Array, values: Array, lost: int = 0) -> Array:
     """Return the standard deviation that a design leaves of values (rows, k); ``lost`` degrees of freedom."""
     length = np.linalg.norm(design, axis=0)
     design = design[:, length > 0] / length[length > 0]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.units import ratio_of_units
@@ -74,9 +75,7 @@ def run_scales(session: Session, load: LoadResult) -> tuple[RunScale, ...]:
     )
 
 
-def _scales(
-    design: NDArray[np.float64], load: NDArray[np.float64], group: NDArray[np.int64]
-) -> NDArray[np.float64] | None:
+def _scales(design: Array, load: Array, group: NDArray[np.int64]) -> Array | None:
     """Return each run's factor against the first (runs,): load = scale x design c; None: not told apart."""
     # A run counts by the size of its own indications, which may be those in another unit.
     moved = design[:, np.ptp(design, axis=0) > 0]
@@ -97,7 +96,7 @@ def _scales(
     return np.asarray(np.concatenate([[1.0], 1 / inverse]), dtype=np.float64)
 
 
-def _rms(design: NDArray[np.float64], load: NDArray[np.float64]) -> float:
+def _rms(design: Array, load: Array) -> float:
     """Return what an equation leaves of loads, by their size."""
     residual = load - design @ np.linalg.lstsq(design, load, rcond=None)[0]
     return float(np.linalg.norm(residual) / np.linalg.norm(load))

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.records.scatter import MODEL, UNTOLD, WEIGHTED, RunScatter
 
 if TYPE_CHECKING:
@@ -80,9 +81,7 @@ def stated_scatter(
     )
 
 
-def untold_scatter(
-    factor: str, relative: NDArray[np.float64], residuals: NDArray[np.float64], *, within: float, dof: int
-) -> RunScatter:
+def untold_scatter(factor: str, relative: Array, residuals: Array, *, within: float, dof: int) -> RunScatter:
     """Return the scatter of runs of so few rows that nothing tells their zeros and gains from noise.
 
     What cannot be told apart is taken whole for each: all of the scatter is noise, and zero^2 + gain^2
@@ -121,7 +120,7 @@ def is_lowest(rows: SessionRows, scatter: RunScatter) -> bool:
     )
 
 
-def spread(rows: SessionRows, scatter: RunScatter) -> NDArray[np.float64]:
+def spread(rows: SessionRows, scatter: RunScatter) -> Array:
     """Return the covariance (4, 4) of the estimates of within^2, zero^2, gain^2 and the correlation."""
     thin = max(math.ceil(len(rows.group) / _DENSE), 1)
     order = np.argsort(rows.group, kind="stable")[::thin]
@@ -174,22 +173,17 @@ class _Problem:
     whitened rows: A of rows with themselves, B with the row before, C of the rows before.
     """
 
-    first: NDArray[np.float64]
-    own: NDArray[np.float64]
-    crossed: NDArray[np.float64]
-    before: NDArray[np.float64]
+    first: Array
+    own: Array
+    crossed: Array
+    before: Array
     counts: NDArray[np.int64]
     rows: int
     columns: int
 
     @classmethod
     def of(
-        cls,
-        mean: NDArray[np.float64],
-        constant: NDArray[np.float64],
-        relative: NDArray[np.float64],
-        load: NDArray[np.float64],
-        group: NDArray[np.int64],
+        cls, mean: Array, constant: Array, relative: Array, load: Array, group: NDArray[np.int64]
     ) -> _Problem:
         order = np.argsort(group, kind="stable")
         # Orthonormal columns of unit mean square: products of one size.
@@ -212,7 +206,7 @@ class _Problem:
             columns=mean.shape[1],
         )
 
-    def deviance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def deviance(self, points: Array) -> tuple[Array, Array]:
         """Return the restricted deviance (points,) and within^2 (points,) of a number of points at once.
 
         ``points`` (points, 3) are zero and gain by within, and the correlation.
@@ -263,11 +257,11 @@ def _search(
     low, high = np.array(bounds).T
     top = np.append(np.log1p(high[:2]), high[2])
 
-    def ratios(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ratios(values: Array) -> Array:
         clipped = np.clip(values, low, top)
         return np.column_stack([np.expm1(clipped[:, :2]), clipped[:, 2]])
 
-    def slope(values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def slope(values: Array) -> tuple[float, Array]:
         # Inwards at an upper end: beyond it nothing is computed.
         step = np.where(values + _STEP <= top, _STEP, -_STEP)
         near = problem.deviance(ratios(values + np.vstack([np.zeros((1, 3)), np.diag(step)])))[0]
@@ -304,7 +298,7 @@ def _search(
     return (zero, gain, correlation), lowest
 
 
-def _neighbours(ratios: NDArray[np.float64], bounds: list[tuple[float, float]]) -> NDArray[np.float64]:
+def _neighbours(ratios: Array, bounds: list[tuple[float, float]]) -> Array:
     """Return a point and those a hundredth beside it within the bounds (7, 3)."""
     low, high = np.array(bounds).T
     steps = _NEIGHBOUR * np.maximum(ratios, 1.0) * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])

@@ -8,13 +8,12 @@ import numpy as np
 
 from toolkit.calibration.fit.run_differences import CellGains, cell_gains, copied_runs, odd_run
 from toolkit.calibration.fit.run_scatter import FEWEST_DOF
-from toolkit.calibration.fit.session_fit import session_statements
+from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, session_statements
 from toolkit.calibration.fit.session_rows import are_untold, groups_of
 from toolkit.calibration.records.scatter import chi2_limit
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
     from toolkit.calibration.session.read import Session
 
 _RISK = 0.01

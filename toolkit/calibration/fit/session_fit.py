@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.adequacy import check_adequate
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups
@@ -43,11 +44,7 @@ if TYPE_CHECKING:
 
 
 def fit_gls(
-    *,
-    terms: Sequence[str],
-    columns: Mapping[str, NDArray[np.float64]],
-    load: NDArray[np.float64],
-    errors: KnownErrors,
+    *, terms: Sequence[str], columns: Mapping[str, Array], load: Array, errors: KnownErrors
 ) -> TermFit:
     """Fit load = sum of c_i term_i where rows of one group share an error.
 
@@ -77,7 +74,7 @@ def fit_gls(
     root = np.sqrt(1 + total)
     shrink = 1 / (root * (1 + root))
 
-    def shared(x: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shared(x: Array, by: Array) -> Array:
         # (I - by a a') x within each group
         return np.asarray(x - by * a * np.bincount(group, weights=a * x)[group], dtype=np.float64)
 
@@ -127,13 +124,13 @@ class LoadResult:
     fit: TermFit
     scatter: RunScatter | None
     rounding: str | None
-    of_runs: NDArray[np.float64]
+    of_runs: Array
     exact: bool
     chi2_within: float | None
     stated: float | None
     diagnostics: Diagnostics
     llf: float
-    check_residuals: NDArray[np.float64] | None
+    check_residuals: Array | None
     check_max_percent_fs: float | None
 
 
@@ -175,7 +172,7 @@ def fit_session(session: Session) -> SessionFit:
     )
 
 
-def residual_correlation(fit: SessionFit) -> NDArray[np.float64]:
+def residual_correlation(fit: SessionFit) -> Array:
     """Return the correlation of the loads' residuals (loads, loads): one cell's noise feeds all of them.
 
     Loads without scatter, or one load alone, have none: the identity.
@@ -184,12 +181,12 @@ def residual_correlation(fit: SessionFit) -> NDArray[np.float64]:
     products = np.einsum("ij,kj->ik", residuals, residuals)
     length = np.sqrt(np.diag(products))
     safe = np.where(length > 0, length, 1.0)
-    correlation: NDArray[np.float64] = products / np.outer(safe, safe)
+    correlation: Array = products / np.outer(safe, safe)
     np.fill_diagonal(correlation, 1.0)
     return correlation
 
 
-def _solved(session: Session, columns: dict[str, NDArray[np.float64]]) -> tuple[TermFit, ...]:
+def _solved(session: Session, columns: dict[str, Array]) -> tuple[TermFit, ...]:
     loads = [session.table.column(setting.name) for setting in session.loads]
     if session.method == "ols":
         return fit_loads(terms=session.terms, columns=columns, loads=loads)
@@ -215,11 +212,7 @@ def _solved(session: Session, columns: dict[str, NDArray[np.float64]]) -> tuple[
 
 
 def _result(
-    session: Session,
-    setting: LoadSetting,
-    fit: TermFit,
-    cells: NDArray[np.float64],
-    groups: NDArray[np.intp],
+    session: Session, setting: LoadSetting, fit: TermFit, cells: Array, groups: NDArray[np.intp]
 ) -> LoadResult:
     table = session.table
     load = table.column(setting.name)
@@ -270,7 +263,7 @@ def _result(
     )
 
 
-def within_runs(fit: TermFit, of_runs: NDArray[np.float64], noise: RowNoise | None) -> TermFit:
+def within_runs(fit: TermFit, of_runs: Array, noise: RowNoise | None) -> TermFit:
     """Return a fit with the residuals that it has within its runs."""
     if not of_runs.any():
         return fit
@@ -287,11 +280,11 @@ def within_runs(fit: TermFit, of_runs: NDArray[np.float64], noise: RowNoise | No
 
 def _diagnosed(
     fit: TermFit,
-    of_runs: NDArray[np.float64],
+    of_runs: Array,
     noise: RowNoise | None,
     *,
-    cells: NDArray[np.float64],
-    load: NDArray[np.float64],
+    cells: Array,
+    load: Array,
     up: NDArray[np.bool_] | None,
     groups: NDArray[np.intp],
     exact: bool,
@@ -310,7 +303,7 @@ def _diagnosed(
     )
 
 
-def load_uncertainty(session: Session, setting: LoadSetting) -> NDArray[np.float64] | None:
+def load_uncertainty(session: Session, setting: LoadSetting) -> Array | None:
     """Return the standard uncertainties that weigh the rows, in the load's unit; None for plain OLS."""
     return row_uncertainty(session.table, setting.name) if session.method == "wls" else None
 

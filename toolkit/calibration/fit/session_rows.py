@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -35,7 +37,7 @@ _DEPENDENT = 1e-9
 class Mean:
     """Orthonormal columns of the mean (rows, columns): the terms', then ``misfit``, then ``direction``."""
 
-    columns: NDArray[np.float64]
+    columns: Array
     misfit: slice
     direction: slice
 
@@ -52,24 +54,24 @@ class SessionRows:
     ``noise`` (rows,) is the size of each row's scatter by their root mean square, None where they are alike.
     """
 
-    load: NDArray[np.float64]
-    relative: NDArray[np.float64]
+    load: Array
+    relative: Array
     mean: Mean
     factor: str
     group: NDArray[np.int64]
     own_zeros: bool
     stride: int = 1
-    noise: NDArray[np.float64] | None = None
+    noise: Array | None = None
 
     @classmethod
     def of(
         cls,
-        design: NDArray[np.float64],
-        load: NDArray[np.float64],
+        design: Array,
+        load: Array,
         table: Table,
         zero: str,
         *,
-        noise: NDArray[np.float64] | None = None,
+        noise: Array | None = None,
         every: bool = False,
     ) -> SessionRows:
         """Return the rows of a load (rows,) with the terms of its equation (rows, terms).
@@ -151,7 +153,7 @@ def are_untold(table: Table, zero: str) -> bool:
     return bool(groups_of(table, zero, every=True)[1].any()) and not groups_of(table, zero)[1].any()
 
 
-def mean_of(design: NDArray[np.float64], relative: NDArray[np.float64], up: NDArray[np.bool_] | None) -> Mean:
+def mean_of(design: Array, relative: Array, up: NDArray[np.bool_] | None) -> Mean:
     """Return the columns of the mean for a design (rows, terms) and relative loads (rows,)."""
     n = len(relative)
     misfit, direction = np.empty((n, 0)), np.empty((n, 0))
@@ -180,7 +182,7 @@ def _sample(group: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     return np.sort(order[place % stride == 0]), stride
 
 
-def _basis(blocks: list[NDArray[np.float64]]) -> tuple[NDArray[np.float64], list[int]]:
+def _basis(blocks: list[Array]) -> tuple[Array, list[int]]:
     """Return an orthonormal basis of columns in their order (rows, columns), and how many each block gave.
 
     A column that those before it make up gives none.

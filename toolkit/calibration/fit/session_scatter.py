@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.row_noise import scatter_of_one
+from toolkit.arrays import Array
+from toolkit.calibration.fit.row_noise import RowNoise, scatter_of_one
 from toolkit.calibration.fit.run_scatter import estimate, is_lowest, stated_scatter, untold_scatter
 from toolkit.calibration.fit.session_rows import SessionRows, are_untold, groups_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.fit.row_noise import RowNoise
     from toolkit.calibration.records.scatter import RunScatter
     from toolkit.calibration.session.statements import BetweenRuns
     from toolkit.calibration.session.table import Table
@@ -34,12 +32,12 @@ class FittedRows:
     runs, which counts where its rows cannot tell them.
     """
 
-    design: NDArray[np.float64]
-    load: NDArray[np.float64]
+    design: Array
+    load: Array
     table: Table
     zero: str
     noise: RowNoise | None
-    residuals: NDArray[np.float64]
+    residuals: Array
     residual_sd: float
     dof: int
     between: BetweenRuns | None

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.printed_digits import own_scatter
-from toolkit.calibration.fit.session_fit import session_statements
+from toolkit.calibration.fit.session_fit import SessionFit, session_statements
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.fit.session_fit import SessionFit
     from toolkit.calibration.session.read import CellSetting
     from toolkit.calibration.session.table import Table
 
@@ -133,9 +133,7 @@ def _found_step(cell: CellSetting) -> Finding:
     )  # fmt: skip
 
 
-def _off_steps(
-    readings: NDArray[np.float64], run: NDArray[np.float64] | None, step: float
-) -> NDArray[np.bool_]:
+def _off_steps(readings: Array, run: Array | None, step: float) -> NDArray[np.bool_]:
     """Return which readings are no whole number of steps from the first of their run, those left out."""
     group = np.zeros(len(readings)) if run is None else run
     _, first, inverse = np.unique(group, return_index=True, return_inverse=True)

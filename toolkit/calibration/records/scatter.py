@@ -20,17 +20,14 @@ does (Particle Data Group, Review of Particle Physics, section 5.2.2).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.estimate import coverage_factor
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 MODEL = "run-effects-1"
 WEIGHTED = "weighted-run-effects-1"  # rows of unlike stated uncertainty, and what is stated as a floor
@@ -62,7 +59,7 @@ class RunScatter:
     model: str = MODEL
 
     @property
-    def variances(self) -> NDArray[np.float64]:
+    def variances(self) -> Array:
         """within^2, zero^2, gain^2 (3,)."""
         return np.array([self.within, self.zero, self.gain]) ** 2
 
@@ -78,15 +75,15 @@ class Rows:
     resolution of indications, None where none is stated.
     """
 
-    operator: NDArray[np.float64]
-    relative: NDArray[np.float64]
+    operator: Array
+    relative: Array
     group: NDArray[np.int64]
-    noise: NDArray[np.float64] | None = None
+    noise: Array | None = None
     stated: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    shared: NDArray[np.float64] | None = None
-    rounded: NDArray[np.float64] | None = None
+    shared: Array | None = None
+    rounded: Array | None = None
 
-    def parts(self, correlation: float) -> NDArray[np.float64]:
+    def parts(self, correlation: float) -> Array:
         """Return A V_k A^T of a unit of within^2, zero^2 and gain^2 (3, terms, terms)."""
         order = np.argsort(self.group, kind="stable")
         A, group, relative = self.operator[:, order], self.group[order], self.relative[order]
@@ -96,7 +93,7 @@ class Rows:
         noisy = A if self.noise is None else A * self.noise[order]
         return np.stack([_within(noisy, group, correlation), zero @ zero.T, gain @ gain.T])
 
-    def covariance(self, scatter: RunScatter) -> NDArray[np.float64]:
+    def covariance(self, scatter: RunScatter) -> Array:
         """Return the covariance of the coefficients (terms, terms) that a normal interval may be built on.
 
         A component on nu degrees of freedom enters (t_nu / t_inf)^2 times as large, t at 95 %: who is handed
@@ -115,7 +112,7 @@ class Rows:
         widening = [_expansion(dof) for dof in (within, between, between)]
         return self._total(scatter, self.parts(scatter.correlation), widening)
 
-    def estimated(self, scatter: RunScatter) -> NDArray[np.float64]:
+    def estimated(self, scatter: RunScatter) -> Array:
         """Return the covariance of the coefficients (terms, terms) by the components as estimated."""
         return self._total(scatter, self.parts(scatter.correlation))
 
@@ -125,15 +122,13 @@ class Rows:
         limits = stated * np.array([chi2_limit(scatter.dof) / scatter.dof, 1.0, 1.0])
         return np.asarray((stated == 0) | (scatter.variances > limits))
 
-    def _total(
-        self, scatter: RunScatter, parts: NDArray[np.float64], widening: Sequence[float] = (1.0, 1.0, 1.0)
-    ) -> NDArray[np.float64]:
+    def _total(self, scatter: RunScatter, parts: Array, widening: Sequence[float] = (1.0, 1.0, 1.0)) -> Array:
         shown = scatter.variances * np.array(widening)
         total = np.einsum("k,kij->ij", np.where(self.shows_more(scatter), shown, self.stated), parts)
         total = total + sum((part for part in (self.shared, self.rounded) if part is not None), start=0.0)
         return np.asarray((total + total.T) / 2)
 
-    def of_runs(self, scatter: RunScatter, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_runs(self, scatter: RunScatter, residuals: Array) -> Array:
         """Return what of the residuals (rows,) the zeros and gains of the runs make, as best predicted.
 
         Henderson's predictor G Z^T V^-1 e of rows taken for uncorrelated: a run that lies off does not make
@@ -155,7 +150,7 @@ class Rows:
         effects = solved[self.group]
         return np.asarray(effects[:, 0] + effects[:, 1] * self.relative)
 
-    def variance(self, scatter: RunScatter, J: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def variance(self, scatter: RunScatter, J: Array) -> tuple[float, Array]:
         """Return J C J^T, unexpanded, of one vector J (terms,), and its gradient (4,).
 
         The gradient is by within^2, zero^2, gain^2 and the correlation.
@@ -174,12 +169,7 @@ class Rows:
         return float(variances @ share) + shared, np.append(estimated, turned)
 
 
-def rows_of(
-    design: NDArray[np.float64],
-    load: NDArray[np.float64],
-    group: NDArray[np.int64],
-    operator: NDArray[np.float64] | None = None,
-) -> Rows:
+def rows_of(design: Array, load: Array, group: NDArray[np.int64], operator: Array | None = None) -> Rows:
     """Return the rows of a plain least-squares fit of a load (rows,) on a design (rows, terms).
 
     ``operator`` (terms, rows) is what makes the coefficients, where it is known.
@@ -194,7 +184,7 @@ def rows_of(
     return Rows(operator=operator, relative=relative, group=group)
 
 
-def _within(A: NDArray[np.float64], group: NDArray[np.int64], correlation: float) -> NDArray[np.float64]:
+def _within(A: Array, group: NDArray[np.int64], correlation: float) -> Array:
     """Return A R A^T with R_ij = correlation^|i - j| inside a run; rows of a run stand together."""
     product = A @ A.T
     if correlation <= 0:

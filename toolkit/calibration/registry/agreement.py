@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.legacy import read_legacy
 from toolkit.calibration.session.settings import (
     Settings,
@@ -21,11 +21,8 @@ from toolkit.calibration.session.settings import (
     parse_session,
     settings_of,
 )
+from toolkit.calibration.session.table import Table
 from toolkit.errors import RecordError, ToolkitError
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.session.table import Table
 
 _RESTORE = "restore the record from a backup; a correction is a new record, made by a new session"
 

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import datetime as dt
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry import gates
 from toolkit.calibration.registry.clock import now, today
 from toolkit.calibration.registry.judgement import judge_stored, machine_of, read_polarity_file
+from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.life import check_line, refusal
 from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.calibration.registry.status import RecordStatus, parse_interval
@@ -21,12 +23,6 @@ from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 from toolkit.inputs import read_regular
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.ledger import Ledger
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

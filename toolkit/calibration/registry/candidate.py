@@ -55,7 +55,7 @@ from toolkit.calibration.registry.refit import check_reproduces, polarity, refer
 from toolkit.calibration.registry.registry import ID, Registry, load_checked
 from toolkit.calibration.registry.status import discarded_before, is_discarded
 from toolkit.calibration.registry.store import Change
-from toolkit.calibration.session.read import Session, read_session
+from toolkit.calibration.session.read import LoadSetting, Session, read_session
 from toolkit.calibration.terms import issued_value, term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
@@ -68,7 +68,6 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from toolkit.calibration.dcc.standard import Standards
-    from toolkit.calibration.session.read import LoadSetting
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,9 +12,9 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
-from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.gates import unverifiable
 from toolkit.calibration.registry.history import NO_HISTORY, History, history_of
 from toolkit.calibration.registry.judgement import evidence_of, judge, machine_of
@@ -25,11 +25,6 @@ from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.inputs import read_regular
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from toolkit.calibration.records.record import CalibrationRecord
 
 _MOST = 4096  # approvals whose gates a process remembers
 _PLACES = 4  # of failed gates that are named

@@ -11,11 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from toolkit.calibration.fit.printed_digits import copies, own_scatter
+from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
 from toolkit.calibration.registry.response import (
     Response,
     largest_load,
@@ -25,12 +26,9 @@ from toolkit.calibration.registry.response import (
     same_unit,
     tolerance,
 )
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.findings import Finding, Level
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
-    from toolkit.calibration.session.table import Table
 
 SPAN = 0.02
 VERIFIED = 5.0

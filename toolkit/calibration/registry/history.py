@@ -11,24 +11,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from datetime import date
+from pathlib import Path
+from typing import Protocol
 
 from toolkit.calibration.fit.printed_digits import copies, own_scatter
-from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.gates import GateResult, layout, sign_and_span
+from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.response import main_indications, response, same_dimension
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
+from toolkit.calibration.session.table import Table
 from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
-
-if TYPE_CHECKING:
-    from datetime import date
-    from pathlib import Path
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.ledger import Ledger
-    from toolkit.calibration.session.table import Table
 
 # Another cell for the same loads may be of another capacity; ten times the output is a slip of a unit.
 REPLACED_SPAN = 10.0

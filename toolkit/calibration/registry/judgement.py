@@ -10,13 +10,14 @@ import datetime as dt
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from toolkit.calibration.apply import apply_record
 from toolkit.calibration.fit.readings_findings import all_findings
 from toolkit.calibration.fit.session_fit import fit_session
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.gates import GateResult, check_loads, refusals
 from toolkit.calibration.registry.history import (
     NO_HISTORY,
@@ -27,6 +28,7 @@ from toolkit.calibration.registry.history import (
     history_of,
     read_before,
 )
+from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.plausible import coarse, plausible, tare_claim
 from toolkit.calibration.registry.response import (
     largest_load,
@@ -40,20 +42,14 @@ from toolkit.calibration.registry.stored import stored_check, stored_loads, stor
 from toolkit.calibration.session.readings import PolarityReading, polarity_readings
 from toolkit.calibration.session.session_file import StatedEntries
 from toolkit.calibration.session.statements import entries_of, statements_of
+from toolkit.calibration.session.table import Table
 from toolkit.declared import build
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, parse_toml, reads_as_number
 from toolkit.inputs import SETTINGS_FILE, read_input
 from toolkit.machine import load_machine, machine_names
+from toolkit.machine.definition import Machine
 from toolkit.units import si_scale
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.ledger import Ledger
-    from toolkit.calibration.session.table import Table
-    from toolkit.machine.definition import Machine
 
 # Polarity: the signs that a record must have, whatever was there before it.
 

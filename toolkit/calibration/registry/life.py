@@ -13,16 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, date, datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.clock import begun, check_begun, moment, untimely
 from toolkit.calibration.registry.ledger import Entry, Ledger
 from toolkit.calibration.registry.status import parse_interval, status_of
 from toolkit.errors import RegistryError
 from toolkit.trust.people import name_key
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
 
 _LATEST_ZONE = timedelta(hours=12)  # UTC-12, Baker Island: where a day ends last
 _SECONDS = len("2026-11-22T10:11:12Z")

@@ -9,23 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.response import largest_load, response, same_dimension, tolerance
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.calibration.uncertainty.budget import calibration_budget
 from toolkit.calibration.uncertainty.scatter import scatter_of
+from toolkit.machine.definition import Machine
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
-    from toolkit.calibration.session.table import Table
-    from toolkit.machine.definition import Machine
 
 # Between a session that stays at a twentieth of the range, which calibrates nothing, and a twentyfold
 # overload, which no cell survives; the common slips are 9.81 (kgf), 304.8 (mm for ft) and 1000.
@@ -233,7 +230,7 @@ def _limit(load: LoadFit) -> float:
 
 
 def _offsets(
-    record: CalibrationRecord, table: Table, zeros: NDArray[np.float64], noise: Sequence[float]
+    record: CalibrationRecord, table: Table, zeros: Array, noise: Sequence[float]
 ) -> list[GateResult]:
     """Return each cell's worst offset at zero load, judged in the load that it moves most.
 

@@ -15,14 +15,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.rounding import rounding_of
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.fit.session_scatter import FittedRows, is_of_rows
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
@@ -30,15 +31,10 @@ from toolkit.calibration.terms import INTERCEPT, issued_value, term_matrix, term
 from toolkit.errors import RecordError
 from toolkit.units import unit
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-
 # The load-time refit of records with shared errors, or errors in both variables: numpy alone.
 
 
-Whitener = Callable[["NDArray[np.float64]"], "NDArray[np.float64]"]
+Whitener = Callable[["Array"], "Array"]
 _ITERATIONS = 400
 
 
@@ -49,9 +45,9 @@ class Linearised:
     ``load`` (rows,) is carried to the adjusted indications.
     """
 
-    terms: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    load: NDArray[np.float64]
+    terms: Array
+    weights: Array
+    load: Array
 
 
 def errors_of(record: CalibrationRecord, load: str, table: Table) -> KnownErrors:
@@ -59,7 +55,7 @@ def errors_of(record: CalibrationRecord, load: str, table: Table) -> KnownErrors
     return known_errors(record.load(load).method, statements_of(record), table, load, record.id)
 
 
-def whitener(terms: NDArray[np.float64], load: NDArray[np.float64], errors: KnownErrors) -> Whitener:
+def whitener(terms: Array, load: Array, errors: KnownErrors) -> Whitener:
     """Return the map that makes rows (rows, ...) independent and of unit spread."""
     ordinary = _weighted(terms, load, np.ones(len(load)))
     fitted = terms @ ordinary
@@ -73,7 +69,7 @@ def whitener(terms: NDArray[np.float64], load: NDArray[np.float64], errors: Know
     bounds = np.flatnonzero(np.diff(errors.group[order])) + 1
     blocks = np.split(order, bounds)
 
-    def whiten(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def whiten(values: Array) -> Array:
         scaled = (values.T / u).T
         out = np.empty_like(scaled)
         for block in blocks:
@@ -91,10 +87,7 @@ def whitener(terms: NDArray[np.float64], load: NDArray[np.float64], errors: Know
 
 
 def linearise(
-    terms: Sequence[str],
-    columns: Mapping[str, NDArray[np.float64]],
-    load: NDArray[np.float64],
-    errors: KnownErrors,
+    terms: Sequence[str], columns: Mapping[str, Array], load: Array, errors: KnownErrors
 ) -> Linearised:
     """Return the weighted problem whose solution is that with errors in both variables."""
     u = np.ones(len(load)) if errors.u is None else errors.u
@@ -124,9 +117,7 @@ def linearise(
     return Linearised(terms=matrix, weights=weights, load=carried)
 
 
-def _weighted(
-    matrix: NDArray[np.float64], load: NDArray[np.float64], weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _weighted(matrix: Array, load: Array, weights: Array) -> Array:
     length = np.abs(matrix).max(axis=0)
     design = matrix / length * weights[:, None]
     basis, values, right = np.linalg.svd(design, full_matrices=False)
@@ -188,7 +179,7 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
 
 
 def _known_errors_solver(
-    record: CalibrationRecord, load: LoadFit, table: Table, points: dict[str, NDArray[np.float64]]
+    record: CalibrationRecord, load: LoadFit, table: Table, points: dict[str, Array]
 ) -> _Solver:
     columns, loads = table.columns(record.indications), table.column(load.load)
     terms, golden = term_matrix(load.terms, columns), term_matrix(load.terms, points)
@@ -223,12 +214,12 @@ def reference_u(table: Table, load: str, load_unit: str, method: str) -> float |
     return float(table.column(name).max()) * (unit(table.unit(name)).factor / unit(load_unit).factor)
 
 
-def _weights(load: LoadFit, table: Table) -> NDArray[np.float64] | None:
+def _weights(load: LoadFit, table: Table) -> Array | None:
     if load.method != "wls":
         return None
     name = f"u_{load.load}"
     u = table.column(name) * (unit(table.unit(name)).factor / unit(load.unit).factor)
-    weights: NDArray[np.float64] = 1.0 / u
+    weights: Array = 1.0 / u
     return weights
 
 
@@ -287,9 +278,7 @@ def _check_load(record: CalibrationRecord, at: int, load: LoadFit, solver: _Solv
             )  # fmt: skip
 
 
-def _covariance(
-    record: CalibrationRecord, load: LoadFit, solver: _Solver, table: Table
-) -> NDArray[np.float64]:
+def _covariance(record: CalibrationRecord, load: LoadFit, solver: _Solver, table: Table) -> Array:
     """Return the covariance by the model that the record names (terms, terms)."""
     if load.scatter is None:
         # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
@@ -314,8 +303,8 @@ def _covariance(
 
 
 def scatter_covariance(
-    record: CalibrationRecord, fit: LoadFit, operator: NDArray[np.float64] | None, table: Table
-) -> NDArray[np.float64] | None:
+    record: CalibrationRecord, fit: LoadFit, operator: Array | None, table: Table
+) -> Array | None:
     """Return the covariance (terms, terms) that a record's scatter makes; None where it is not its rows'.
 
     ``operator`` (terms, rows) is what made the coefficients of the loads, where it is known.
@@ -353,19 +342,19 @@ class _Solver:
     where rows share errors; ``solved`` is the answer where another iteration found it.
     """
 
-    design: NDArray[np.float64]
-    weights: NDArray[np.float64] | None
-    left: NDArray[np.float64]
-    pseudo: NDArray[np.float64]
-    back: NDArray[np.float64]
-    inverse: NDArray[np.float64]
+    design: Array
+    weights: Array | None
+    left: Array
+    pseudo: Array
+    back: Array
+    inverse: Array
     condition: float
-    golden: NDArray[np.float64]
-    golden_design: NDArray[np.float64]
-    reach: NDArray[np.float64]
+    golden: Array
+    golden_design: Array
+    reach: Array
     extent: list[float]
     whiten: Whitener | None = None
-    solved: tuple[NDArray[np.float64], float] | None = None
+    solved: tuple[Array, float] | None = None
 
     @property
     def known(self) -> bool:
@@ -373,14 +362,14 @@ class _Solver:
         return self.weights is not None or self.whiten is not None
 
     @property
-    def operator(self) -> NDArray[np.float64] | None:
+    def operator(self) -> Array | None:
         """What makes coefficients of loads (terms, rows); None where rows share errors."""
         if self.whiten is not None:
             return None
         operator = self.back @ self.pseudo @ self.left.T
         return operator if self.weights is None else operator * self.weights
 
-    def solve(self, loads: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    def solve(self, loads: Array) -> tuple[Array, float]:
         """Return the solution in the design's columns, and the residual standard deviation."""
         if self.solved is not None:
             return self.solved
@@ -395,11 +384,7 @@ class _Solver:
 
 
 def _solver(
-    terms: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    has_constant: bool,
-    golden: NDArray[np.float64],
-    whiten: Whitener | None = None,
+    terms: Array, weights: Array | None, has_constant: bool, golden: Array, whiten: Whitener | None = None
 ) -> _Solver:
     n, p = terms.shape
     k = p - 1 if has_constant else p

@@ -18,7 +18,7 @@ from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
 from toolkit.calibration.registry.clock import in_future, today
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.judgement import judge_stored, machine_of
-from toolkit.calibration.registry.status import parse_interval
+from toolkit.calibration.registry.status import RecordStatus, parse_interval
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.status import RecordStatus
     from toolkit.machine.definition import Machine
 
 _PLACES = 4  # of a failed gate that are named

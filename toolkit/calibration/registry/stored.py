@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.session.indications import (
     Bridge,
     bridges_of,
@@ -28,9 +28,6 @@ from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import real_path
 from toolkit.inputs import RECORD_FILE, read_input
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
 
 
 def stored_loads(registry: Path, record: CalibrationRecord) -> Table | None:

@@ -10,12 +10,12 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.registry.people_log import FOLDER
-from toolkit.calibration.registry.registry import ID, load_many
+from toolkit.calibration.registry.registry import ID, Registry, load_many
 from toolkit.calibration.registry.settled import is_passing
 from toolkit.calibration.registry.witnessed import attested
 from toolkit.declared import Entry
@@ -23,9 +23,6 @@ from toolkit.errors import ToolkitError
 from toolkit.inputs import read_regular
 from toolkit.system import can_fork, processors
 from toolkit.trust.people import FILE
-
-if TYPE_CHECKING:
-    from toolkit.calibration.registry.registry import Registry
 
 _FOLDER_KEEPERS = (".gitkeep", ".gitignore")
 # Starting the processes takes as long as some hundred records.

@@ -32,14 +32,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.session_file import Amount
+from toolkit.arrays import Array
+from toolkit.calibration.session.session_file import Amount, CellEntries, Stated, StatedEntries
 from toolkit.errors import SessionError
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.session.session_file import CellEntries, Stated, StatedEntries
     from toolkit.calibration.session.table import Table
 
 
@@ -213,16 +213,16 @@ def _runs(table: Table) -> NDArray[np.int64]:
     return np.asarray(np.unique(run, return_inverse=True)[1].ravel(), dtype=np.int64)
 
 
-def _means(values: NDArray[np.float64], run: NDArray[np.int64]) -> NDArray[np.float64]:
+def _means(values: Array, run: NDArray[np.int64]) -> Array:
     count = np.bincount(run)[:, None]
     return np.stack([np.bincount(run, weights=column) for column in values.T], axis=1) / count
 
 
-def _off_means(values: NDArray[np.float64], run: NDArray[np.int64]) -> NDArray[np.float64]:
+def _off_means(values: Array, run: NDArray[np.int64]) -> Array:
     return np.asarray(values - _means(values, run)[run])
 
 
-def _less(table: Table, names: Sequence[str], zeros: NDArray[np.float64]) -> Table:
+def _less(table: Table, names: Sequence[str], zeros: Array) -> Table:
     values = table.values.copy()
     values[:, [table.names.index(name) for name in names]] -= zeros
     return dataclasses.replace(table, values=values)

@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.session.settings import wrong
 from toolkit.spelling import nearest
 from toolkit.units import unit
@@ -54,11 +55,11 @@ class KnownErrors:
     error and ``proportional`` tells how it acts; ``u_cells`` (indications,) in the indications' units.
     """
 
-    u: NDArray[np.float64] | None
+    u: Array | None
     group: NDArray[np.intp]
     u_shared: float
     proportional: bool
-    u_cells: NDArray[np.float64]
+    u_cells: Array
 
 
 def group_column(reference: Mapping[str, Any]) -> tuple[str, ...]:
@@ -73,7 +74,7 @@ def row_columns(loads: Sequence[str], labels: Sequence[str] = ()) -> list[str]:
     return [*(f"u_{load}" for load in loads), *labels]
 
 
-def row_uncertainty(table: Table, load: str) -> NDArray[np.float64] | None:
+def row_uncertainty(table: Table, load: str) -> Array | None:
     """Return the column ``u_<LOAD>`` (rows,) in the load's unit; None where the data have none."""
     name = f"u_{load}"
     if not table.has(name):

@@ -30,27 +30,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from toolkit.calibration.session.indications import RATIO, RATIO_DIMENSION, Bridge, bridges_of
-from toolkit.calibration.session.session_file import Amount
+from toolkit.calibration.session.session_file import (
+    Amount,
+    CellEntries,
+    Creep,
+    Polarity,
+    Reading,
+    Stated,
+    StatedEntries,
+)
 from toolkit.calibration.session.settings import wrong
 from toolkit.declared import Quantity
 from toolkit.errors import UnitError
 from toolkit.files import check_keys
 from toolkit.units import unit
 
-if TYPE_CHECKING:
-    from toolkit.calibration.session.session_file import (
-        CellEntries,
-        Creep,
-        Polarity,
-        Reading,
-        Stated,
-        StatedEntries,
-    )
-
-    Readings = Mapping[str, Stated] | tuple[Stated, ...] | Stated
+Readings = Mapping[str, Stated] | tuple[Stated, ...] | Stated
 
 SHUNT_TOLERANCE_PERCENT = 0.1
 

@@ -18,14 +18,19 @@ from toolkit.calibration.session.readings import (
     shunt_entry,
     zero_entries,
 )
-from toolkit.calibration.session.session_file import Amount, TemperatureCoefficient
+from toolkit.calibration.session.session_file import (
+    Amount,
+    CellEntries,
+    SessionFile,
+    Stated,
+    TemperatureCoefficient,
+)
 from toolkit.calibration.session.settings import wrong
 from toolkit.channels import load_dimension
 from toolkit.errors import SessionError, UnitError
 from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:
-    from toolkit.calibration.session.session_file import CellEntries, SessionFile, Stated
     from toolkit.calibration.session.table import Table
 
 _PER_KELVIN = re.compile(r"\s*/\s*(K|degC|°C)\s*\Z")

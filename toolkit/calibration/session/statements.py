@@ -13,10 +13,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.session.readings import (
     CreepEntry,
     Scope,
@@ -25,23 +28,17 @@ from toolkit.calibration.session.readings import (
     scope_of_entries,
     zero_entries,
 )
+from toolkit.calibration.session.session_file import BetweenRuns as BetweenEntries
+from toolkit.calibration.session.session_file import (
+    CellEntries,
+    Stated,
+    StatedEntries,
+    Uncertainty,
+    stated_entries,
+)
 from toolkit.calibration.session.session_file import Reference as ReferenceEntries
-from toolkit.calibration.session.session_file import stated_entries
 from toolkit.calibration.session.statement_checks import temperature_effect
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.session.session_file import BetweenRuns as BetweenEntries
-    from toolkit.calibration.session.session_file import (
-        CellEntries,
-        Stated,
-        StatedEntries,
-        Uncertainty,
-    )
-
 
 _NONE: Mapping[str, float] = MappingProxyType({})
 
@@ -64,7 +61,7 @@ class ReferenceUncertainty:
         """Standard uncertainty in the load's unit; of a relative one, that at the largest load."""
         return self.U / self.k
 
-    def u_at(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+    def u_at(self, value: Array) -> Array:
         """Return the standard uncertainty at applied loads; both in the load's unit, of one shape."""
         if self.relative is None:
             return np.full_like(value, self.u, dtype=np.float64)
@@ -130,7 +127,7 @@ class Reference:
         stated = self.of(load)
         return None if stated is None else stated.u
 
-    def u_at(self, load: str, value: ArrayLike) -> NDArray[np.float64] | None:
+    def u_at(self, load: str, value: ArrayLike) -> Array | None:
         """Return the standard uncertainty at applied loads (any shape) in their unit; None: not stated."""
         stated = self.of(load)
         return None if stated is None else stated.u_at(np.asarray(value, dtype=np.float64))

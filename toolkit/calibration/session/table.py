@@ -13,10 +13,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.session.cells import Cells, is_empty, read_cells
 from toolkit.calibration.session.header import (
     COMMENT,
@@ -29,9 +31,6 @@ from toolkit.calibration.session.header import (
 )
 from toolkit.errors import RecordingError, SessionError
 from toolkit.units import si_scale, unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
 _POINT_AND_COMMA = (
@@ -59,10 +58,10 @@ class Table:
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    values: NDArray[np.float64]
-    run: NDArray[np.float64] | None
+    values: Array
+    run: Array | None
     up: NDArray[np.bool_] | None
-    rotation: NDArray[np.float64] | None
+    rotation: Array | None
     labels: tuple[tuple[str, tuple[str, ...]], ...] = ()
     lines: Sequence[int] = ()
     hidden: tuple[int, ...] = ()
@@ -81,7 +80,7 @@ class Table:
         """Tell whether the file has a numeric column."""
         return name in self.names
 
-    def column(self, name: str) -> NDArray[np.float64]:
+    def column(self, name: str) -> Array:
         """Return a column (rows,) in the unit of the file."""
         return self.values[:, self.names.index(name)]
 
@@ -89,7 +88,7 @@ class Table:
         """Return a column's unit."""
         return self.units[self.names.index(name)]
 
-    def columns(self, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    def columns(self, names: Sequence[str]) -> dict[str, Array]:
         """Return columns by name."""
         return {name: self.column(name) for name in names}
 
@@ -130,7 +129,7 @@ class Table:
             lines=[self.lines[row] for row in at] if len(self.lines) else (),
         )
 
-    def matrix(self, names: Sequence[str]) -> NDArray[np.float64]:
+    def matrix(self, names: Sequence[str]) -> Array:
         """Return columns side by side (rows, names)."""
         # Column by column in memory, as every computation reads it.
         return np.array([self.column(name) for name in names]).T
@@ -227,9 +226,7 @@ def _refuse_cells(faults: Sequence[tuple[int, int, SessionError]]) -> None:
     raise first
 
 
-def _numbers(
-    cells: Cells, at: Sequence[int], faults: list[tuple[int, int, SessionError]]
-) -> NDArray[np.float64]:
+def _numbers(cells: Cells, at: Sequence[int], faults: list[tuple[int, int, SessionError]]) -> Array:
     """Return the numbers of columns (columns, rows), NaN with a fault in place of what is none."""
     columns = [cells.columns[index] for index in at]
     if cells.separator == ",":

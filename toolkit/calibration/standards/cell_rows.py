@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import SessionError
 from toolkit.units import unit
 
@@ -53,10 +54,10 @@ class CellRun:
 
     number: int
     rotation_deg: float | None
-    force: NDArray[np.float64]
-    deflection: NDArray[np.float64]
+    force: Array
+    deflection: Array
     up: NDArray[np.bool_]
-    u: NDArray[np.float64] | None
+    u: Array | None
     zero_before: float | None
     zero_after: float | None
 
@@ -156,7 +157,7 @@ def _run(
     table: Table,
     load: str,
     rows: NDArray[np.intp],
-    reading: NDArray[np.float64],
+    reading: Array,
     number: int,
     before: float | None,
     after: float | None,

@@ -16,15 +16,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.errors import SessionError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # ASTM E74, annex: the degree of the polynomial that fits best.
 
@@ -59,9 +57,7 @@ def degree_factor(n: int, m: int) -> float:
     return math.sqrt(1 + (quantile - 1) / (n - m))
 
 
-def best_degree(
-    *, force: NDArray[np.float64], indication: NDArray[np.float64]
-) -> tuple[int, tuple[DegreeStep, ...]]:
+def best_degree(*, force: Array, indication: Array) -> tuple[int, tuple[DegreeStep, ...]]:
     """Return the degree of best fit of averaged indications (n,) at n forces, and each comparison made."""
     n = len(force)
     top = min(HIGHEST, n - 2)
@@ -77,7 +73,7 @@ def best_degree(
     return 1, tuple(steps)
 
 
-def _spread(force: NDArray[np.float64], indication: NDArray[np.float64], m: int) -> float:
+def _spread(force: Array, indication: Array, m: int) -> float:
     terms = ("F", *(f"F^{power}" for power in range(2, m + 1)), "intercept")
     return fit_terms(terms=terms, columns={"F": force}, load=indication).residual_sd
 
@@ -162,8 +158,8 @@ class E74Result:
 
 def evaluate_e74(
     *,
-    force: NDArray[np.float64],
-    indication: NDArray[np.float64],
+    force: Array,
+    indication: Array,
     run: NDArray[np.int64] | None = None,
     resolution: float | None = None,
     degree: int | None = None,
@@ -225,15 +221,13 @@ def evaluate_e74(
     )
 
 
-def fit_curve(*, force: NDArray[np.float64], indication: NDArray[np.float64], degree: int) -> TermFit:
+def fit_curve(*, force: Array, indication: Array, degree: int) -> TermFit:
     """Fit the indication on the force by a polynomial; coefficients from the first power, constant last."""
     terms = ("F", *(f"F^{power}" for power in range(2, degree + 1)), "intercept")
     return fit_terms(terms=terms, columns={"F": force}, load=indication)
 
 
-def _curve(
-    f: NDArray[np.float64], d: NDArray[np.float64], m: int, ratio: float, at: NDArray[np.int64], levels: int
-) -> E74Curve:
+def _curve(f: Array, d: Array, m: int, ratio: float, at: NDArray[np.int64], levels: int) -> E74Curve:
     fit = fit_curve(force=f, indication=d, degree=m)
     return E74Curve(
         degree=m,
@@ -245,9 +239,7 @@ def _curve(
     )
 
 
-def _lack_of_fit(
-    fit: TermFit, d: NDArray[np.float64], at: NDArray[np.int64], levels: int
-) -> LackOfFit | None:
+def _lack_of_fit(fit: TermFit, d: Array, at: NDArray[np.int64], levels: int) -> LackOfFit | None:
     from scipy.special import fdtrc
 
     counts = np.bincount(at, minlength=levels)
@@ -266,7 +258,7 @@ def _lack_of_fit(
 
 
 def _class(
-    name: str, k: float, llf: float, resolution: float | None, forces: NDArray[np.float64], runs: int | None
+    name: str, k: float, llf: float, resolution: float | None, forces: Array, runs: int | None
 ) -> E74Class:
     smallest, largest = float(forces.min()), float(forces.max())
     lower = max(k * llf, smallest)
@@ -286,8 +278,8 @@ def _class(
 
 
 def _checked(
-    force: NDArray[np.float64],
-    indication: NDArray[np.float64],
+    force: Array,
+    indication: Array,
     run: NDArray[np.int64] | None,
     resolution: float | None,
     degree: int | None,

@@ -28,16 +28,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.standards import iso376_input
 from toolkit.calibration.standards.e74 import fit_curve
 from toolkit.calibration.standards.iso376_input import Iso376Run
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 __all__ = ["LIMITS", "Iso376Force", "Iso376Limits", "Iso376Result", "Iso376Run", "evaluate_iso376"]
 
@@ -132,9 +129,9 @@ class Iso376Result:
 
 def evaluate_iso376(
     *,
-    force: NDArray[np.float64],
+    force: Array,
     runs: Sequence[Iso376Run],
-    force_uncertainty: float | NDArray[np.float64] | None,
+    force_uncertainty: float | Array | None,
     resolution: float | None,
     creep: tuple[float, float] | None = None,
     preloads: int | None = MIN_PRELOADS,
@@ -229,14 +226,14 @@ def evaluate_iso376(
     )
 
 
-def _repeatability(runs: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
+def _repeatability(runs: Sequence[Iso376Run]) -> Array | None:
     if not iso376_input.repeated(runs):
         return None
     first, second = (np.array(run.up) for run in runs[:2])
     return np.asarray(100 * np.abs(second - first) / np.abs((first + second) / 2))
 
 
-def _reversibility(rotated: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
+def _reversibility(rotated: Sequence[Iso376Run]) -> Array | None:
     # The standard takes it at the turned mountings; the first one stands in where it is alone.
     pairs = [(np.array(run.up), np.array(run.down)) for run in rotated[1:] if run.down is not None]
     if not pairs and rotated[0].down is not None:
@@ -246,7 +243,7 @@ def _reversibility(rotated: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
     return np.asarray(100 * np.mean([np.abs(down - up) / np.abs(up) for up, down in pairs], axis=0))
 
 
-def _at(values: NDArray[np.float64] | None, i: int) -> float | None:
+def _at(values: Array | None, i: int) -> float | None:
     return None if values is None else float(values[i])
 
 
@@ -299,7 +296,7 @@ def _ranges(rows: Sequence[Iso376Force]) -> tuple[Iso376Range, ...]:
 
 
 def _procedure(
-    forces: NDArray[np.float64],
+    forces: Array,
     runs: Sequence[Iso376Run],
     rotated: Sequence[Iso376Run],
     preloads: int | None,

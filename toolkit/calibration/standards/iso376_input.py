@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import SessionError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.session.statements import ReferenceUncertainty
     from toolkit.calibration.standards.cell_rows import CellRun
 
@@ -49,9 +48,9 @@ def repeated(runs: Sequence[Iso376Run]) -> bool:
 
 
 def check(
-    force: NDArray[np.float64],
+    force: Array,
     runs: Sequence[Iso376Run],
-    force_uncertainty: float | NDArray[np.float64] | None,
+    force_uncertainty: float | Array | None,
     resolution: float | None,
     creep: tuple[float, float] | None,
     degree: int,
@@ -123,9 +122,9 @@ class Iso376Data:
     ``reasons`` tell what of the session is not used, and what was not stated.
     """
 
-    force: NDArray[np.float64]
+    force: Array
     runs: tuple[Iso376Run, ...]
-    force_uncertainty: NDArray[np.float64] | None
+    force_uncertainty: Array | None
     reasons: tuple[str, ...]
 
 
@@ -173,7 +172,7 @@ def iso376_runs(runs: Sequence[CellRun], *, stated: ReferenceUncertainty | None)
     )
 
 
-def _levels(force: NDArray[np.float64]) -> list[float]:
+def _levels(force: Array) -> list[float]:
     levels: list[float] = []
     for value in sorted(force.tolist()):
         if not levels or value - levels[-1] > _SAME * value:
@@ -181,9 +180,7 @@ def _levels(force: NDArray[np.float64]) -> list[float]:
     return levels
 
 
-def _at(
-    levels: NDArray[np.float64], force: NDArray[np.float64], deflection: NDArray[np.float64]
-) -> tuple[float | None, ...]:
+def _at(levels: Array, force: Array, deflection: Array) -> tuple[float | None, ...]:
     zeros: list[float | None] = []
     for level in levels:
         near = np.abs(force - level) <= _SAME * level

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
@@ -28,8 +29,6 @@ from toolkit.errors import SessionError
 from toolkit.estimate import coverage_factor, effective_dof
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.table import Table
 
@@ -123,11 +122,7 @@ def predict(
 
 
 def budgets_of_rows(
-    record: CalibrationRecord,
-    loads: Table,
-    check: Table | None,
-    load: str,
-    indications: NDArray[np.float64],
+    record: CalibrationRecord, loads: Table, check: Table | None, load: str, indications: Array
 ) -> tuple[Budget | None, ...]:
     """Return the budget of a load at every row of indications (rows, indications) [the record's units].
 
@@ -157,7 +152,7 @@ def budgets_of_rows(
     return tuple(budgets[key] for key in keys)
 
 
-def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: float) -> NDArray[np.float64]:
+def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: float) -> Array:
     """Return the indications (indications,) that a load makes by itself: a plane through the session's rows.
 
     The plane is indications on loads; it only sets the point at which sensitivities are taken.
@@ -167,7 +162,7 @@ def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: 
     scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
     plane = np.linalg.lstsq(design / scale, loads.matrix(record.indications), rcond=None)[0]
     place = np.array([at if name == load else 0.0 for name in names] + [1.0])
-    point: NDArray[np.float64] = (place / scale) @ plane
+    point: Array = (place / scale) @ plane
     return point
 
 
@@ -187,7 +182,7 @@ def _budget(
     check: Table | None,
     load: LoadFit,
     value: float,
-    point: NDArray[np.float64],
+    point: Array,
     temperature: Temperature | None,
     probability: float,
     scatter: Scatter | None = None,

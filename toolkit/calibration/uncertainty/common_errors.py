@@ -31,19 +31,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.statements import statements_of
+from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.session.statements import Statements
-
 
 _STEP = 1e-5
 
@@ -76,7 +70,7 @@ def indication_errors(record: CalibrationRecord, statements: Statements) -> tupl
     )
 
 
-def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[float]) -> NDArray[np.float64]:
+def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[float]) -> Array:
     """Return d load / d indication (indications,) at a point, by central differences."""
     steps = np.array(
         [_STEP * _extent(cell.minimum, cell.maximum, x) for cell, x in zip(record.cells, point, strict=True)]
@@ -86,7 +80,7 @@ def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[floa
     values = term_matrix(load.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
         load.coefficients
     )
-    slopes: NDArray[np.float64] = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
+    slopes: Array = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
     return slopes
 
 
@@ -157,7 +151,7 @@ def _extent(low: float | None, high: float | None, x: float) -> float:
     return max(abs(low or 0.0), abs(high or 0.0), abs(x)) or 1.0
 
 
-def record_covariance(record: CalibrationRecord) -> dict[str, NDArray[np.float64]]:
+def record_covariance(record: CalibrationRecord) -> dict[str, Array]:
     """Return load -> covariance of its coefficients (terms, terms), with what the session stated.
 
     A legacy record, which has no covariance, gives none; a session that states nothing gives the fit's own.
@@ -198,7 +192,7 @@ def offset_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -
     return math.hypot(tared, float(np.linalg.norm(slope * np.asarray(stated))), moved)
 
 
-def _covariance(record: CalibrationRecord, load: LoadFit, statements: Statements) -> NDArray[np.float64]:
+def _covariance(record: CalibrationRecord, load: LoadFit, statements: Statements) -> Array:
     total = np.array(load.covariance)
     scale = scale_u(record, load, statements)
     if scale > 0:

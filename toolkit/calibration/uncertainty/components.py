@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.records.scatter import UNTOLD
 from toolkit.calibration.session.known_errors import row_uncertainty
 from toolkit.calibration.terms import term_matrix
@@ -22,8 +23,6 @@ from toolkit.calibration.uncertainty.model import Component, Distribution, Evalu
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.statements import Statements
     from toolkit.calibration.session.table import Table
@@ -40,7 +39,7 @@ def components_of(
     load: LoadFit,
     *,
     value: float,
-    point: NDArray[np.float64],
+    point: Array,
     temperature: Temperature | None,
     scatter: Scatter | None = None,
 ) -> tuple[tuple[Component, ...], float]:
@@ -80,11 +79,11 @@ class _Variance:
     """A variance [unit of the load, squared] and its gradient (4,) by the scatter's components."""
 
     variance: float
-    gradient: NDArray[np.float64]
+    gradient: Array
     dof: float
 
 
-def _curve(record: CalibrationRecord, load: LoadFit, s: Scatter, point: NDArray[np.float64]) -> _Variance:
+def _curve(record: CalibrationRecord, load: LoadFit, s: Scatter, point: Array) -> _Variance:
     """Return the variance of the curve at a point, J C J^T (JCGM 100 eq. 13, H.3.4)."""
     J = term_matrix(load.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
     stored = max(float(J @ np.asarray(load.covariance) @ J), 0.0)
@@ -152,7 +151,7 @@ def _of_rows_around(loads: Table, load: LoadFit, value: float) -> float:
     return float(np.interp(abs(value), level, largest))
 
 
-def _fit(record: CalibrationRecord, load: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:
+def _fit(record: CalibrationRecord, load: LoadFit, point: Array, curve: _Variance) -> Component:
     from_stated = _from_stated(load, curve)
     text = f"J V J^T of the {len(load.terms)} coefficients at {_point(record, point)}"
     return _part(
@@ -224,7 +223,7 @@ def _reversibility(s: Scatter) -> Component:
     return _part("reversibility", text, "A", "rectangular", s.reversal / ROOT3, s.reversal_dof, "data")
 
 
-def _resolution(record: CalibrationRecord, statements: Statements, slope: NDArray[np.float64]) -> Component:
+def _resolution(record: CalibrationRecord, statements: Statements, slope: Array) -> Component:
     errors = indication_errors(record, statements)
     silent = [cell.name for cell in statements.cells if cell.resolution is None]
     if len(silent) == len(errors):
@@ -238,7 +237,7 @@ def _resolution(record: CalibrationRecord, statements: Statements, slope: NDArra
     return _part("resolution", text, "B", "rectangular", u, math.inf, "session")
 
 
-def _cells(record: CalibrationRecord, statements: Statements, slope: NDArray[np.float64]) -> Component:
+def _cells(record: CalibrationRecord, statements: Statements, slope: Array) -> Component:
     silent = [cell.name for cell in statements.cells if cell.u is None]
     if len(silent) == len(statements.cells):
         return _absent("indication", "no indication's standard uncertainty is stated", "session")
@@ -248,7 +247,7 @@ def _cells(record: CalibrationRecord, statements: Statements, slope: NDArray[np.
     return _part("indication", text, "B", "normal", u, math.inf, "session")
 
 
-def _zero(record: CalibrationRecord, load: LoadFit, slope: NDArray[np.float64]) -> Component:
+def _zero(record: CalibrationRecord, load: LoadFit, slope: Array) -> Component:
     drift, intercept = zero_drift(record), left_at_zero(record, load)
     if isinstance(drift, str) and not intercept:
         return _absent("zero", drift, "session")
@@ -273,11 +272,7 @@ def _creep(record: CalibrationRecord, load: LoadFit, value: float) -> Component:
 
 
 def _temperature(
-    statements: Statements,
-    temperature: Temperature | None,
-    slope: NDArray[np.float64],
-    point: NDArray[np.float64],
-    value: float,
+    statements: Statements, temperature: Temperature | None, slope: Array, point: Array, value: float
 ) -> Component:
     """Return what a temperature that differs from the session's does: one difference for all cells."""
     at = statements.temperature_C
@@ -332,5 +327,5 @@ def _without(silent: list[str]) -> str:
     return f"; nothing is stated of {', '.join(silent)}" if silent else ""
 
 
-def _point(record: CalibrationRecord, point: NDArray[np.float64]) -> str:
+def _point(record: CalibrationRecord, point: Array) -> str:
     return ", ".join(f"{n} = {x:.4g}" for n, x in zip(record.indications, point.tolist(), strict=True))

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.common_errors import indication_errors
@@ -31,15 +32,13 @@ from toolkit.estimate import last_place
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.session.table import Table
     from toolkit.calibration.uncertainty.common_errors import IndicationError
     from toolkit.calibration.uncertainty.model import Budget, Component
 
-    Draw = Callable[[np.random.Generator, int], NDArray[np.float64]]
-    Refit = Callable[[np.random.Generator, int, NDArray[np.float64]], NDArray[np.float64]]
+    Draw = Callable[[np.random.Generator, int], Array]
+    Refit = Callable[[np.random.Generator, int, Array], Array]
 
 BATCH = 20_000
 MOST_BATCHES = 500
@@ -135,7 +134,7 @@ def monte_carlo(
     )  # fmt: skip
 
 
-def coverage_interval(values: NDArray[np.float64], probability: float) -> tuple[float, float]:
+def coverage_interval(values: Array, probability: float) -> tuple[float, float]:
     """Return the probabilistically symmetric coverage interval of trials (JCGM 101, 7.7.2).
 
     >>> coverage_interval(np.arange(1.0, 101.0), 0.9)
@@ -162,12 +161,12 @@ def _model(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
     apart = [part for part in budget.components if not part.joint and part.name not in _AT_SOURCE]
     amounts = [part for part in apart if part.u > 0]
 
-    def draw(generator: np.random.Generator, size: int) -> NDArray[np.float64]:
+    def draw(generator: np.random.Generator, size: int) -> Array:
         # What one estimate from the rows gives is drawn by one scale (6.4.9.4).
         scale = _scale(generator, size, budget.scatter_dof)
         c = refit(generator, size, scale)
         if exact:
-            total: NDArray[np.float64] = c @ row
+            total: Array = c @ row
         else:
             cells = {
                 name: x + _misread(generator, size, e)
@@ -197,29 +196,27 @@ def _refits(record: CalibrationRecord, loads: Table, budget: Budget) -> Refit:
         scatter.rows.estimated(scatter.runs) if part.joint and estimated else np.asarray(fitted.covariance)
     )
 
-    def refit(generator: np.random.Generator, size: int, scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    def refit(generator: np.random.Generator, size: int, scale: Array) -> Array:
         moved = generator.standard_normal((size, len(coefficients))) @ root.T
-        coefficients_drawn: NDArray[np.float64] = coefficients + (
-            moved * scale[:, None] if part.joint else moved
-        )
+        coefficients_drawn: Array = coefficients + (moved * scale[:, None] if part.joint else moved)
         return coefficients_drawn
 
     return refit
 
 
-def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _root(covariance: Array) -> Array:
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
-    root: NDArray[np.float64] = sd[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    root: Array = sd[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     return root
 
 
-def _scale(generator: np.random.Generator, size: int, dof: float) -> NDArray[np.float64]:
+def _scale(generator: np.random.Generator, size: int, dof: float) -> Array:
     """Return what makes normal draws those of Student's t with ``dof`` degrees of freedom (6.4.9.4)."""
     return np.ones(size) if math.isinf(dof) else np.sqrt(dof / generator.chisquare(dof, size))
 
 
-def _amount(generator: np.random.Generator, size: int, part: Component) -> NDArray[np.float64]:
+def _amount(generator: np.random.Generator, size: int, part: Component) -> Array:
     if part.distribution == "rectangular":
         half = part.u * math.sqrt(3.0)
         return generator.uniform(-half, half, size)
@@ -227,7 +224,7 @@ def _amount(generator: np.random.Generator, size: int, part: Component) -> NDArr
     return drawn * _scale(generator, size, part.dof) if part.distribution == "student" else drawn
 
 
-def _misread(generator: np.random.Generator, size: int, error: IndicationError) -> NDArray[np.float64]:
+def _misread(generator: np.random.Generator, size: int, error: IndicationError) -> Array:
     total = generator.normal(0.0, error.u, size) if error.u else np.zeros(size)
     for _ in range(error.readings if error.half_width else 0):
         total = total + generator.uniform(-error.half_width, error.half_width, size)
@@ -236,9 +233,9 @@ def _misread(generator: np.random.Generator, size: int, error: IndicationError) 
 
 def _until_settled(
     draw: Draw, generator: np.random.Generator, tolerance: float, probability: float
-) -> tuple[NDArray[np.float64], bool]:
+) -> tuple[Array, bool]:
     """Draw batches until the four results have settled (JCGM 101, 7.9.4); False where they never did."""
-    batches: list[NDArray[np.float64]] = []
+    batches: list[Array] = []
     results: list[tuple[float, float, float, float]] = []
     while len(batches) < MOST_BATCHES:
         values = draw(generator, BATCH)

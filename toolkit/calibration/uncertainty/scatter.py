@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.fit.profile import Profile
 from toolkit.calibration.fit.rounding import rounding_of
-from toolkit.calibration.fit.row_noise import noise_of, weighed_rows
+from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.run_scatter import estimate, spread
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.records.scatter import UNTOLD, UNTOLD_DOF, Rows, RunScatter
@@ -26,9 +27,6 @@ from toolkit.calibration.terms import term_matrix
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.fit.row_noise import RowNoise
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.table import Table
 
@@ -46,7 +44,7 @@ class Scatter:
     """
 
     runs: RunScatter
-    spread: NDArray[np.float64]
+    spread: Array
     rows: Rows
     profile: Profile | None
     reversal: float
@@ -54,13 +52,13 @@ class Scatter:
     misfit: float
     misfit_dof: int
 
-    def reading(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    def reading(self, columns: Mapping[str, Array]) -> Array:
         """Return the variance of a reading at indications (points,), in units of ``runs.within``^2."""
         if self.profile is None:
             return np.ones(len(next(iter(columns.values()))))
         return self.profile.at(columns)
 
-    def dof(self, gradient: NDArray[np.float64], variance: float) -> float:
+    def dof(self, gradient: Array, variance: float) -> float:
         """Return Satterthwaite's degrees of freedom of a variance, 2 u^4 / Var(u^2), one at least.
 
         ``gradient`` (4,) is d u^2 by within^2, zero^2, gain^2 and the correlation. Two runs differ in one

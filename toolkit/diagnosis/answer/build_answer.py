@@ -37,7 +37,7 @@ from toolkit.diagnosis.search.channel_factors import factor_of, is_ratio
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG
 from toolkit.diagnosis.search.search import Search
-from toolkit.diagnosis.search.unexplained import TOO_LARGE, StructureFound, strongest_line
+from toolkit.diagnosis.search.unexplained import StructureFound, strongest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.effects.unit_ratios import near_ratio
@@ -116,7 +116,7 @@ _UNTESTED = ((LARGE,), (LONG,))
 
 def _dependence(structure: StructureFound) -> Dependence:
     """Return on what structure depends; a sentence that stands in place of variables is its reason."""
-    if structure.variables in (*_UNTESTED, TOO_LARGE):
+    if structure.variables in _UNTESTED or structure.is_too_large:
         return Dependence(channel=structure.output, variables=(), reason=structure.variables[0])
     return Dependence(channel=structure.output, variables=structure.variables)
 
@@ -268,8 +268,8 @@ def _parameters(
         if half is not None:
             ci = (value - half, value + half)
         # What is smaller than the equation can tell acts as if it were as large as that.
-        least = active.values.get(f"least_{parameter.name}", 0.0)
-        if active.searched and value < least:
+        least = active.values.get(f"least_{parameter.name}")
+        if active.searched and least is not None and value < least:
             ci = (parameter.bounds[0], least if ci is None else max(ci[1], least))
         turned = parameter.sign_in(problem.case.axes)
         if turned < 0:

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.diagnosis.answer.answer import HeldOutChannel
 from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts
-from toolkit.diagnosis.fit.structure import groups
+from toolkit.diagnosis.fit.structure import RUNS, groups
 from toolkit.diagnosis.law.trial import bracketed
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.parameter_units import reduced
@@ -70,28 +70,33 @@ def judged_noise(search: Search, name: str) -> ChannelNoise:
 def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) -> tuple[HeldOutChannel, ...]:
     """Return held-out errors with those that the laws leave beside them; an event tells nothing there.
 
-    What laws leave is no measure of them: beside them the noise is the sensor's own, where that is less.
+    What effects or laws leave is no measure of them: where it is not shown to be noise, the noise is the
+    sensor's own, if that is less. Zeros that differ from run to run say nothing of the noise within.
     """
-    if not any(law.predicts for law in laws.listed):
-        return errors
-    problem = search.problem
+    problem, predicts = search.problem, any(law.predicts for law in laws.listed)
     told = []
     for output in errors:
-        name = output.channel
-        away = problem.judged(name, problem.observed[name] - laws.held_out.simulated[name])
-        rmse = math.sqrt(float(np.mean(away**2)))
-        stated = problem.stated_sd(output.channel) is not None
-        sensor = math.inf if output.sensor_sd is None else output.sensor_sd
-        floor = output.noise_floor if stated else min(output.noise_floor, rmse, sensor)
-        told.append(replace(output, with_laws_rmse=rmse, noise_floor=floor))
+        name, rmse = output.channel, math.inf
+        if predicts:
+            away = problem.judged(name, problem.observed[name] - laws.held_out.simulated[name])
+            rmse = math.sqrt(float(np.mean(away**2)))
+        stays = any(part.output == name and part.variables != RUNS for part in search.structure)
+        floor = output.noise_floor
+        if (predicts or stays) and problem.stated_sd(name) is None:
+            sensor = math.inf if output.sensor_sd is None else output.sensor_sd
+            floor = min(floor, rmse, sensor)
+        told.append(replace(output, with_laws_rmse=rmse if predicts else None, noise_floor=floor))
     return tuple(told)
 
 
 def _floor(search: Search, name: str, sd: float | None) -> float:
-    """Return an output's noise: as stated, else what is left when smooth structure is taken out too."""
+    """Return an output's noise: as stated or as repeats differ, else what is left beside smooth structure."""
     problem, residual = search.problem, search.augmented.residual[name]
     if sd is not None:
         return problem.judged_sd(name, sd)
+    known = judged_noise(search, name)
+    if known.how == "repeats":
+        return known.sensor_sd
     noise = math.sqrt(float(np.mean(problem.judged(name, residual) ** 2)))
     if name in problem.rates:
         return noise

@@ -8,9 +8,11 @@ every run but a little off in one.
 Here a held-out run's residual has a zero and a gain of its own beside its noise, both normal over the runs.
 How much they scatter, and how much larger the noise is than on the training rows, is what makes all held-out
 runs together most likely (empirical Bayes). Each hypothesis has its own scatter: one that leaves the same
-zero in every run pays for it.
+zero in every run pays for it. Runs may be louder than others too: by the noise of quiet ones a loud run is
+all but impossible, the more so the better the simulation of the quiet ones.
 
-Source: Laird and Ware, Biometrics 38 (1982) 963, random effects with a variance of their own.
+Sources: Laird and Ware, Biometrics 38 (1982) 963, random effects with a variance of their own; Lange, Little and
+Taylor, J. Am. Stat. Assoc. 84 (1989) 881, Student's distribution for rows of unequal variance.
 """
 
 from __future__ import annotations
@@ -254,28 +256,62 @@ def scattered_scores(runs: Sequence[UnseenRun], *, by_run: bool) -> tuple[float,
     """
     if not runs:
         return ()
-    best = (0.0, 0.0)
-    if by_run and len(runs) >= SCATTER.fewest:
-        best = likeliest_sizes(runs, lambda zero, gain: sum(_scores(runs, zero, gain)))
-    return _scores(runs, *best)
+    even = math.inf
+    if not by_run or len(runs) < SCATTER.fewest:
+        return _scores(runs, 0.0, 0.0, even)
+
+    def likeliest(freedom: float) -> tuple[float, float]:
+        return likeliest_sizes(runs, lambda zero, gain: sum(_scores(runs, zero, gain, freedom)))
+
+    sizes = likeliest(even)
+    freedom = max((even, *SCATTER.loudness), key=lambda each: sum(_scores(runs, *sizes, each)))
+    if freedom < even:
+        sizes = likeliest(freedom)
+    return _scores(runs, *sizes, freedom)
 
 
-def _scores(runs: Sequence[UnseenRun], zero: float, gain: float) -> tuple[float, ...]:
+def _scores(
+    runs: Sequence[UnseenRun], zero: float, gain: float, freedom: float = math.inf
+) -> tuple[float, ...]:
     """Return the score of every run under a scatter, the noise as large as it then is most likely.
 
-    The scatter is in units of that noise: then its likeliest size has a closed form.
+    The scatter is in units of that noise: then its likeliest size has a closed form. Where runs are not
+    equally loud, the square of each run's noise is drawn from a scaled inverse chi-squared distribution of
+    some degrees of ``freedom``, beside which a run's values are of Student's multivariate distribution.
     """
     scale = np.array([zero, gain])
-    squares, halves = [], []
+    n, squares, halves = np.array([run.n for run in runs], dtype=float), [], []
     for run in runs:
         # Woodbury: of the covariance 1 + X S X' only a matrix of two rows is left.
         middle = np.eye(2) + scale[:, None] * run.inner * scale[None, :]
         scaled = scale * run.outer
         squares.append(max(run.rest - float(scaled @ np.linalg.solve(middle, scaled)), 0.0))
         halves.append(0.5 * math.log(max(float(np.linalg.det(middle)), 1.0)))
-    n = sum(run.n for run in runs)
-    noise = math.sqrt(max(sum(squares) / n, 1.0))  # no rows are quieter for not having been seen
-    return tuple(
-        run.constant - run.n * math.log(noise) - 0.5 * square / noise**2 - half
-        for run, square, half in zip(runs, squares, halves, strict=True)
+    before = np.array([run.constant for run in runs]) - halves
+    return tuple((before + _densities(n, np.array(squares), freedom)).tolist())
+
+
+def _densities(n: Array, squares: Array, freedom: float) -> Array:
+    """Return the log density of runs of (n,) values by their sums of squares, but for its constant.
+
+    The noise's own square is the likeliest, at least that of the training rows: no rows are quieter for not
+    having been seen.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import gammaln
+
+    if freedom == math.inf:
+        square = max(float(squares.sum() / n.sum()), 1.0)
+        return np.asarray(-0.5 * n * math.log(square) - 0.5 * squares / square)
+
+    def slope(square: float) -> float:
+        return float(np.sum((freedom + n) * squares / (freedom * square + squares)) - n.sum())
+
+    square = brentq(slope, 1.0, float((squares / n).max())) if slope(1.0) > 0 else 1.0
+    spread = freedom * square
+    return np.asarray(
+        gammaln((freedom + n) / 2)
+        - gammaln(freedom / 2)
+        - 0.5 * n * math.log(spread / 2)
+        - 0.5 * (freedom + n) * np.log1p(squares / spread)
     )

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from toolkit.declared import OrNan
+from toolkit.diagnosis.fit.noise import fit_noise
 from toolkit.diagnosis.policy import NOISE
 
 if TYPE_CHECKING:
@@ -70,16 +71,19 @@ def _sensor(problem: Problem, fit: Fit, name: str) -> tuple[float, Evidence]:
     stated = problem.stated_sd(name)
     if stated is not None:
         return stated, "stated"
-    repeated = _by_repeats(problem, fit, name)
+    repeated = noise_of_repeats(problem, fit, name)
     if repeated is not None:
-        return repeated, "repeats"
+        return repeated[0], "repeats"
     return _by_differences(problem, fit, name), "differences"
 
 
-def _by_repeats(problem: Problem, fit: Fit, name: str) -> float | None:
-    """Return the noise of runs that repeat another row by row, its zero apart; None without such runs."""
+def noise_of_repeats(problem: Problem, fit: Fit, name: str) -> tuple[float, float, int] | None:
+    """Return the noise of runs that repeat another row by row, its zero apart; None without such runs.
+
+    Beside it the independent values that its colour leaves of every row, and of how many rows it is known.
+    """
     places = dict(zip((run.name for run in problem.runs), problem.slices, strict=True))
-    squares, dof = 0.0, 0
+    squares, rows, dof = 0.0, 0, 0.0
     for run in problem.runs:
         first = places.get(run.conditions.get("repeat_of", ""))
         again = places[run.name]
@@ -90,9 +94,14 @@ def _by_repeats(problem: Problem, fit: Fit, name: str) -> float | None:
             continue
         # Of the residuals, not of the outputs: the inputs of a repeat are never quite the same.
         apart = (fit.residual[name][first] - fit.residual[name][again])[counting]
-        squares += float(np.sum((apart - apart.mean()) ** 2)) / 2
-        dof += int(counting.sum()) - 1
-    return math.sqrt(squares / dof) if dof else None
+        apart -= apart.mean()
+        squares += float(np.sum(apart**2)) / 2
+        rows += len(apart) - 1
+        there = np.zeros(problem.rows, dtype=bool)
+        there[again] = counting
+        noise = fit_noise(apart, problem.layout(name, there), floor=problem.floor[name])
+        dof += (len(apart) - 1) / noise.correlation_rows
+    return (math.sqrt(squares / rows), dof / rows, rows) if rows else None
 
 
 def shows_sensor(problem: Problem, fit: Fit, name: str) -> bool:

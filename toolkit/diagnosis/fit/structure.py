@@ -45,9 +45,9 @@ def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
     for output in problem.names:
         n = int(problem.kept[output].sum())
         listed: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
-        own_spline = _spline(base.simulated[output])
-        for name, x in [*variables, (output, base.simulated[output])]:
-            columns = own_spline if name == output else _spline(x)
+        most = int(n / STRUCTURE.rows_per_column)
+        for name, x in [*variables, (output, filled(base.simulated[output]))]:
+            columns = _spline(x, most)
             if columns is not None:
                 listed.append(((name,), columns))
             if name in _ANGLES or name.lower() in ("tire_angle", "drum_angle"):
@@ -63,6 +63,16 @@ def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
             if columns.shape[1] * STRUCTURE.rows_per_column <= n:
                 dependences.append(SmoothDependence(output=output, variables=names, columns=columns))
     return dependences
+
+
+def filled(simulated: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a simulated output with a value in every row, the mean where it has none.
+
+    What acts on recorded readings leaves a simulation open where these were not recorded: rows that no
+    output has either.
+    """
+    known = np.isfinite(simulated)
+    return simulated if known.all() else np.where(known, simulated, np.mean(simulated[known]))
 
 
 def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
@@ -87,16 +97,20 @@ def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
     return [*variables, *rates]
 
 
-def _spline(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return natural splines over quantiles, centred; powers where few values occur."""
+def _spline(x: NDArray[np.float64], most: int) -> NDArray[np.float64] | None:
+    """Return natural splines over quantiles, centred; powers where few values occur.
+
+    There are at most so many columns: a short recording has fewer knots, and is asked all the same.
+    """
     values = np.unique(x[np.isfinite(x)])
     if len(values) < 2 or np.ptp(values) <= 1e-9 * np.abs(values).max():
         return None
     scaled = (x - values[0]) / np.ptp(values)
+    most = max(most, 1)
     if len(values) <= STRUCTURE.knots + 1:
-        columns = np.stack([scaled**k for k in range(1, min(len(values), 4))], axis=1)
+        columns = np.stack([scaled**k for k in range(1, min(len(values), 4, most + 1))], axis=1)
     else:
-        knots = np.unique(np.quantile(scaled, np.linspace(0, 1, STRUCTURE.knots)))
+        knots = np.unique(np.quantile(scaled, np.linspace(0, 1, min(STRUCTURE.knots, most + 1))))
         columns = np.stack([scaled, *[np.abs(scaled - knot) ** 3 for knot in knots[1:-1]]], axis=1)
     return np.asarray(columns - columns.mean(axis=0))
 

@@ -9,7 +9,7 @@ than it leaves there is compared with what the same laws take of noise of the re
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.ranking import all_responses
 from toolkit.diagnosis.law.terms import terms_of
 from toolkit.diagnosis.law.trial import trials_of
-from toolkit.diagnosis.policy import EVEN, STRUCTURE
+from toolkit.diagnosis.policy import EVEN, LAWS, STRUCTURE
 from toolkit.diagnosis.search.homogeneity import about_own, uneven
 from toolkit.diagnosis.search.unexplained import StructureFound
 
@@ -101,24 +101,39 @@ def _foretold(
         """Return what columns are within the runs: their zeros and gains are as few values as runs."""
         return about_own(problem, base, name, columns)[where.index]
 
+    # What was met once foretells nothing, and what acts on another output is nothing here.
+    asked = [
+        trial
+        for trial in trials
+        if trial.form != "event" and (trial.acts == "enters" or trial.applied.channel == name)
+    ]
+
     def laws() -> Iterator[tuple[Trial, Array]]:
-        for trial, directions in zip(trials, all_responses(problem, base, trials), strict=True):
-            # What was met once foretells nothing.
-            if directions is not None and trial.form != "event" and np.any(directions[name]):
-                yield trial, np.column_stack([nominal, within(directions[name])])
+        for trial, directions in zip(asked, all_responses(problem, base, asked), strict=True):
+            if directions is not None and np.any(directions[name]):
+                yield trial, within(directions[name])
 
     held = [mask[where.index] for mask in folds.held]
-    nominal, rest = within(nominal), within(base.residual[name][:, None])
-    before = _left(nominal, rest, held)
-    shares = [(float((1 - _left(each, rest, held) / before)[0]), trial) for trial, each in laws()]
+    nominal = within(nominal)
+    left = _left_of(within(base.residual[name][:, None]), held)
+    before = left(nominal)
+    short = len(asked) * where.n < LAWS.columns  # all may be held for the second look
+    listed = list(laws()) if short else None
+    shares = [
+        (float((1 - left(np.column_stack([nominal, columns])) / before)[0]), trial)
+        for trial, columns in listed or laws()
+    ]
     share, best = max(shares, key=lambda pair: pair[0], default=(0.0, None))
     if best is None or share < EVEN.foretold:
         return None
     none = np.zeros((problem.rows, drawn.shape[1]))
     none[where.index] = drawn
-    drawn = within(none)
-    of_none = _left(nominal, drawn, held)
-    if any(1 - share > EVEN.clear * (_left(each, drawn, held) / of_none).min() for _, each in laws()):
+    left_of_noise = _left_of(within(none), held)
+    of_none = left_of_noise(nominal)
+    if any(
+        1 - share > EVEN.clear * (left_of_noise(np.column_stack([nominal, columns])) / of_none).min()
+        for _, columns in listed or laws()
+    ):
         return None
     variables = tuple(dict.fromkeys(signal.name for signal in best.signals))
     gain = -where.n * math.log(max(1 - share, 1e-300)) / noise.correlation_rows
@@ -126,22 +141,31 @@ def _foretold(
     return StructureFound(output=name, variables=variables, gain=gain, p_value=p, noise_sd=sensor_sd)
 
 
-def _left(columns: Array, series: Array, held: Sequence[NDArray[np.bool_]]) -> Array:
-    """Return what is left of the square of every series by columns that were fitted to other runs, (k,).
+def _left_of(series: Array, held: Sequence[NDArray[np.bool_]]) -> Callable[[Array], Array]:
+    """Return what is left of the square of every series by columns that were fitted to other runs.
 
-    Never more than the series have: nobody keeps a law that adds to them.
+    A function of the columns, (n, m), to (k,). Never more than the series have: nobody keeps a law that adds
+    to them.
+
+    Parameters
+    ----------
+    series : (n, k)
+    held : rows of every fold, which are all rows together
     """
     there = np.maximum(np.sum(series**2, axis=0), 1e-300)
-    if not columns.shape[1]:
-        return np.asarray(there)
-    left = np.zeros(series.shape[1])
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    scaled = columns / np.where(size > 0, size, 1.0)
-    whole, products = scaled.T @ scaled, scaled.T @ series
-    for mask in held:
-        apart = scaled[mask]
-        own, of_own = apart.T @ apart, apart.T @ series[mask]
-        slopes = np.linalg.lstsq(whole - own, products - of_own, rcond=1e-10)[0]
-        squares = np.sum(series[mask] ** 2, axis=0)
-        left += squares - 2 * np.sum(slopes * of_own, axis=0) + np.sum(slopes * (own @ slopes), axis=0)
-    return np.asarray(np.minimum(left, there))
+    parts = [series[mask] for mask in held]
+
+    def left(columns: Array) -> Array:
+        if not columns.shape[1]:
+            return np.asarray(there)
+        size = np.sqrt(np.sum(columns**2, axis=0))
+        scaled = columns / np.where(size > 0, size, 1.0)
+        apart = [scaled[mask] for mask in held]
+        own = np.stack([rows.T @ rows for rows in apart])
+        products = np.stack([rows.T @ part for rows, part in zip(apart, parts, strict=True)])
+        others = np.linalg.pinv(own.sum(axis=0) - own, rcond=1e-10, hermitian=True)
+        slopes = others @ (products.sum(axis=0) - products)
+        change = np.sum(slopes * (own @ slopes - 2 * products), axis=(0, 1))
+        return np.asarray(np.minimum(there + change, there))
+
+    return left

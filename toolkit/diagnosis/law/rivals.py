@@ -37,9 +37,9 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
 
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
     stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
-    there rings, coloured noise takes it up, and no structure shows. What has a name keeps it against a
-    formula that says the same, and loses it where all that is named has another size beside the laws, or
-    where it leaves more than the sensor's noise and they do not.
+    there rings, coloured noise takes it up, and no structure shows. What takes nearly all that the laws take
+    keeps its name, whatever they make of the rest. Any other loses it where all that is named has another size
+    beside the laws, or where it leaves more than the sensor's noise and they do not.
     """
     predicting = any(law.predicts for law in laws.listed)
     is_asked = predicting or _leaves_process_noise(search)
@@ -53,6 +53,8 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     alone = learned(bare, withdrawn=False, budget=budget)
     if not any(law.predicts for law in alone.listed):
         return search, laws if alone.complete else replace(laws, complete=False)
+    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
+        return search, laws
     if bare.problem.shown_sd and _leaves_process_noise(search) and not _process_noise(search, alone.fit):
         return bare, alone
     if any(_holds_beside(laws, step) for step in search.steps):
@@ -60,8 +62,6 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
             return search, laws
         beside_laws = laws.held_out if predicting else search.held_augmented
         if alone.held_out.total - beside_laws.total < -STEP.least_gain:
-            return search, laws
-        if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
             return search, laws
     elif alone.held_out.total - search.held_augmented.total < STEP.least_gain:
         return search, laws
@@ -167,7 +167,7 @@ def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> 
         tuple(_error(problem, without, name) - _error(problem, each, name) for each in (named, laws))
         for name in outputs
     ]
-    return all(by_effects >= LAWS.same * by_laws for by_effects, by_laws in taken)
+    return all(by_effects >= VERDICT.nearly * by_laws for by_effects, by_laws in taken)
 
 
 def _parameters(fit: Fit) -> int:

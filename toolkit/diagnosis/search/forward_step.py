@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,11 +53,24 @@ class Joint:
     fit: Fit
     score: float
     past: float = 0.0
+    _held_out: list[HeldOut | None] = field(default_factory=list, repr=False)
 
     @property
     def compared(self) -> float:
         """What is compared between candidates."""
         return self.score + self.past
+
+    def held_out(self, problem: Problem, folds: Folds) -> HeldOut | None:
+        """Return it on rows that it has not seen, None where the simulation does not run without some.
+
+        Of one problem and its folds, computed once: it is asked for beside other candidates again.
+        """
+        if not self._held_out:
+            scores = None
+            with contextlib.suppress(FitError):
+                scores = hold_out(problem, folds, self.fit.active, self.fit)
+            self._held_out.append(scores)
+        return self._held_out[0]
 
 
 def step_groups(
@@ -158,16 +172,16 @@ def best_step(
             standing[0][0].fit.log_posterior - base.log_posterior
         ):
             continue
-        if drifts_faster(problem, base, made):
+        # What its own fit tells comes first: unseen rows take a fit for each fold.
+        if trial.score - base.log_posterior < STEP.least_gain or drifts_faster(problem, base, made):
             continue
-        try:
-            scores = hold_out(problem, folds, made.active, made)
-        except FitError:
+        if only_bends(problem, made):
+            continue
+        scores = trial.held_out(problem, folds)
+        if scores is None:
             continue
         gain = scores.total - held_base.total
-        if gain < STEP.least_gain or trial.score - base.log_posterior < STEP.least_gain:
-            continue
-        if only_bends(problem, made) or not matters(problem, held_base, scores, least):
+        if gain < STEP.least_gain or not matters(problem, held_base, scores, least):
             continue
         if not beyond_form(problem, refitted, held_base, scores, form):
             continue

@@ -11,6 +11,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.noise import Autoregression, fit_noise, log_likelihood, whiten
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.fit.sensor_noise import noise_of_repeats
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import LAWS, STEP, STRUCTURE
 from toolkit.diagnosis.search.screen import LinearisedFit
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 
 TOO_LARGE = ("more than its stated noise",)
+BEYOND_REPEATS = ("more than repeats of a run differ by",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -234,8 +236,8 @@ class StructureFound:
 
     @property
     def is_too_large(self) -> bool:
-        """Tell whether it is all that is known that the residual is larger than the stated noise."""
-        return self.variables == TOO_LARGE
+        """Tell whether it is all that is known that the residual is larger than a noise that is known."""
+        return self.variables in (TOO_LARGE, BEYOND_REPEATS)
 
 
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -283,20 +285,36 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
 
 
 def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | None:
-    """Return the finding that a residual is larger than the sensor noise which a certificate states."""
-    from scipy.stats import chi2
+    """Return the finding that a residual is larger than the noise that is stated, or that repeats show.
 
-    sd, counted = problem.stated_sd(name), problem.kept[name]
-    if sd is None or counted.sum() < STRUCTURE.stated_rows:
+    Repeats show it and its colour, but for their zeros: beside them every run counts about its own.
+    """
+    from scipy.stats import chi2, f
+
+    stated, repeated = problem.stated_sd(name), noise_of_repeats(problem, base, name)
+    counted, residual, known = problem.kept[name], base.residual[name], math.inf
+    if counted.sum() < STRUCTURE.stated_rows:
         return None
-    # Coarse steps add their own to what the sensor is stated to have.
-    ratio = float(np.mean(base.residual[name][counted] ** 2)) / (sd**2 + problem.floor[name] ** 2)
-    worth = max(counted.sum() / base.noise[name].correlation_rows, STRUCTURE.stated_worth)
-    p = float(chi2.sf(ratio / STRUCTURE.stated**2 * worth, worth))
+    if stated is not None:
+        share = 1 / base.noise[name].correlation_rows
+        # Coarse steps add their own to what the sensor is stated to have.
+        ratio = float(np.mean(residual[counted] ** 2)) / (stated**2 + problem.floor[name] ** 2)
+    elif repeated is not None:
+        sd, share, rows = repeated
+        known = max(rows * share, STRUCTURE.stated_worth)
+        runs = [residual[run][counted[run]] for run in problem.slices if counted[run].any()]
+        about = np.concatenate([values - values.mean() for values in runs])
+        ratio = float(np.mean(about**2)) / max(sd, problem.floor[name]) ** 2
+    else:
+        return None
+    worth = max(float(counted.sum()) * share, STRUCTURE.stated_worth)
+    least = ratio / STRUCTURE.stated**2
+    p = float(chi2.sf(least * worth, worth) if known == math.inf else f.sf(least, worth, known))
     if p >= STRUCTURE.alpha:
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
-    return StructureFound(output=name, variables=TOO_LARGE, gain=gain, p_value=p, rest=True)
+    reason = BEYOND_REPEATS if stated is None else TOO_LARGE
+    return StructureFound(output=name, variables=reason, gain=gain, p_value=p, rest=True)
 
 
 def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:

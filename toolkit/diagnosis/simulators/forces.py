@@ -24,7 +24,7 @@ from toolkit.errors import ConfigError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.effects.applied import Conditioned
+    from toolkit.effects.applied import Conditioned, EffectKey
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]
@@ -111,6 +111,11 @@ class Forces:
             for one in self.listed
             if one.bristle is not None and one.dry is not None
         )
+
+    @property
+    def terms(self) -> tuple[EffectKey, ...]:
+        """Which terms enter the equation, whatever their sizes."""
+        return tuple(force.active.key for force in self.listed)
 
     @property
     def sizes(self) -> tuple[float, ...]:

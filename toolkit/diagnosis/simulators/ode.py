@@ -36,7 +36,7 @@ from toolkit.diagnosis.simulators.states import (
     term_places,
     way_of,
 )
-from toolkit.diagnosis.simulators.trajectory import Path, trajectories
+from toolkit.diagnosis.simulators.trajectory import Guesses, Path, trajectories
 from toolkit.diagnosis.simulators.turning import Turning
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
@@ -59,7 +59,6 @@ if TYPE_CHECKING:
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 FINER = 4  # rows between two rows, one of them among them
-_MISSED = 3  # times in turn: an equation that is not smooth enough
 _LEVELS = 41  # quantiles of a state
 _STATES = 4  # simulations whose states are kept: a fit asks for the last one again
 _MOST_KEPT, _MOST_HELD = 400, 200_000_000  # simulations of a run to remember, and their bytes
@@ -79,7 +78,7 @@ class OdeModel:
         self._driven: dict[Any, Run] = {}
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
-        self._missed = 0  # times in turn that no guess led to a simulation
+        self._guesses = Guesses()
         self._states: Memory[NDArray[np.float64]] = Memory(_STATES * len(case.runs), _MOST_HELD)
         self._near: dict[Run, NDArray[np.float64]] = {}  # states simulated last
         self._steps: dict[Run, NDArray[np.intp]] = {}  # of the simulation as declared
@@ -342,12 +341,12 @@ class OdeModel:
         )
         for force in forces:
             sizes[own : own + force.added] = force.sizes
-        flow = RowFlow(columns, rows, p, together, atol)
+        flow, terms = RowFlow(columns, rows, p, together, atol), forces[0].terms
         with silenced():
-            smooth = ~together.abrupt & (self._missed < _MISSED)
+            smooth = ~together.abrupt & self._guesses.are_tried(terms)
             path, reached = trajectories(flow, Path(x, steps, slopes), sizes, smooth)
         if smooth[0] and self.scale:
-            self._missed = self._missed + 1 if path.slopes is None else 0
+            self._guesses.led(terms, on=path.slopes is not None)
         for run, at in zip(runs, rows.slices, strict=True):
             if reached[0]:
                 self._near[run] = path.x[:own, 0, at]

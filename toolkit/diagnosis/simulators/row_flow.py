@@ -182,7 +182,13 @@ def stepped(
 
 
 def finer(steps: Places, errors: Array) -> Places:
-    """Return the steps of every interval by its errors, (rows,) both: a power of two, never fewer."""
+    """Return the steps of every interval by its errors, (sets, rows): a power of two, never fewer.
+
+    Parameters
+    ----------
+    steps : so far, (rows,)
+    errors : of every set, (sets, rows)
+    """
     wanted = steps * _SAFE * np.maximum(errors, 1e-30) ** 0.2
     power = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.intp)
     return np.where(errors > 1, np.maximum(power, 2 * steps), steps)

@@ -35,6 +35,7 @@ _STALLED = 3  # corrections that are no smaller than the last: no way leads on
 _FAR = 0.5  # of a state's spread, by which one correction moves it: beyond, the derivatives are others
 _STEP = 1e-6  # of a state's size, for differences
 _REFINED = 8
+_MISSED = 3  # times in turn: terms that are not smooth enough
 _MARCHED = 8  # columns: fewer are integrated in less time one by one, by plain numbers
 
 
@@ -45,6 +46,30 @@ class Path:
     x: Array
     steps: Places
     slopes: Array | None
+
+
+class Guesses:
+    """Of which terms in an equation a guess leads to a simulation, so that others are seldom tried.
+
+    One term with a corner says nothing of another, nor parameters far off of those near by: after three
+    misses in turn of the same terms a guess waits, for twice as many simulations after every further one.
+    """
+
+    def __init__(self) -> None:
+        self._missed: dict[object, int] = {}
+        self._waiting: dict[object, int] = {}
+
+    def are_tried(self, terms: tuple[object, ...]) -> bool:
+        """Tell whether the next simulation with such terms is to begin from a guess."""
+        waiting = self._waiting.get(terms, 0)
+        self._waiting[terms] = max(waiting - 1, 0)
+        return not waiting
+
+    def led(self, terms: tuple[object, ...], *, on: bool) -> None:
+        """Learn whether a guess has led to a simulation; what the bare equation missed, all terms have."""
+        missed = 0 if on else self._missed.get(terms, self._missed.get((), 0)) + 1
+        self._missed[terms] = missed
+        self._waiting[terms] = 2**missed if missed >= _MISSED else 0
 
 
 def trajectories(
@@ -65,13 +90,12 @@ def trajectories(
     rest = np.flatnonzero(smooth)
     for _ in range(_REFINED if len(rest) else 0):
         errors, slopes, solved = _converged(flow, x, rest, steps, slopes, sizes)
-        rest = rest[solved]
-        if not len(rest) or (errors <= 1).all():
+        wanted = finer(steps, errors)
+        able = solved & (wanted.max(axis=1) <= MOST_STEPS)  # the others are not waited for
+        rest = rest[able]
+        if not len(rest) or (errors[able] <= 1).all():
             break
-        steps = finer(steps, errors)
-        if steps.max() > MOST_STEPS:
-            rest = rest[:0]
-            break
+        steps = wanted[able].max(axis=0)
     reached = np.zeros(x.shape[1], dtype=bool)
     reached[rest] = True
     others = np.flatnonzero(~reached)
@@ -88,9 +112,9 @@ def _converged(
 
     Returns
     -------
-    errors of the intervals, derivatives of the flow, and which sets came to rest
+    errors of each set's intervals, (sets, rows - 1), derivatives of the flow, and which sets came to rest
     """
-    errors = np.zeros(len(steps))
+    errors = np.zeros((len(sets), len(steps)))
     active, slopes, kept = np.arange(len(sets)), near, near
     before, missed = np.full(len(sets), np.inf), np.full(len(sets), np.inf)
     stalled = np.zeros(len(sets), dtype=np.intp)
@@ -112,8 +136,7 @@ def _converged(
         share = _FAR / np.maximum((np.abs(moved) / sizes[:, None, None]).max(axis=(0, 2)), _FAR)
         x[:, at[usable], 1:] += (share[:, None] * moved)[:, usable]
         done = usable & (off < _CLOSE)
-        if done.any():
-            np.maximum(errors, shares[done].max(axis=0), out=errors)
+        errors[active[done]] = shares[done]
         solved[active[done]] = True
         fresh = slopes.shape[1] > 1 or len(active) == 1
         miss = np.sqrt(np.mean((off_rows / size) ** 2, axis=(0, 2)))

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.audit.corrected import CorrectedCopy
-from toolkit.audit.linked import RestingReport
+from toolkit.audit.linked import Linked, RestingReport
 from toolkit.audit.model import CLEAN
 from toolkit.audit.one_file import ArchivedFile
-from toolkit.audit.since_good import DriftedFile, DriftedTest
-from toolkit.calibration.registry.registry import RefusedRecord
+from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+from toolkit.calibration.registry.registry import RefusedRecord, Registry
 from toolkit.calibration.registry.standing import approved_after
 from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     import datetime as dt
 
     from toolkit.audit.archive import ArchiveAudit
-    from toolkit.audit.linked import Linked
-    from toolkit.audit.since_good import Drift
-    from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.archives.amended import Amended
 
 

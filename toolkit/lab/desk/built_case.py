@@ -12,13 +12,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from toolkit.declared import toml_text
 from toolkit.declared.declaration import fields_of
 from toolkit.declared.describe import summary
 from toolkit.declared.kinds import FileKind
 from toolkit.declared.tables import FormsKind, TableKind
+from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.case.reader import CONDITIONS, CaseFile
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import parse_toml, toml_entries, write_atomic
@@ -29,10 +30,6 @@ from toolkit.lab.desk.uploads import CASES, check_inside, enter_case, leading_ou
 from toolkit.lab.starters import guess_case, headers_of
 from toolkit.publication import publication
 from toolkit.recording.sniff import sniff
-
-if TYPE_CHECKING:
-    from toolkit.diagnosis.case.case import Case
-
 
 TRIAL_S = 10.0
 """Seconds that the simulation may take for one answer while somebody waits."""

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NotRequired, TypedDict
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    Rows = Sequence[float] | NDArray[np.float64]
+    Rows = Sequence[float] | Array
 
 SAMPLES = 3 * 2**10
 """Rows that a chart draws at most: the others are left out, each by its place."""

@@ -7,17 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from toolkit.lab.home import PLAN
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 Kind = Literal["test", "audit", "diagnosis", "case", "plan"]
 

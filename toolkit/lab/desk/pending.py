@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from toolkit.calibration.registry.registry import instrument_of
+from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.calibration.registry.signatures import operators_of
 from toolkit.errors import ConfigError, OutputError, ToolkitError, TrustError
 from toolkit.inputs import REQUEST_FILE, check_size, is_regular
@@ -24,10 +24,7 @@ from toolkit.trust.keys import agent_keys, agent_signer
 from toolkit.trust.people import Action, Version, inability, objections
 from toolkit.trust.requests import Request, check_same, check_standing, parse_request, read_request
 from toolkit.trust.signing import Travel
-
-if TYPE_CHECKING:
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.trust.ssh import PublicKey
+from toolkit.trust.ssh import PublicKey
 
 FOLDER = "requests"
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*\Z")

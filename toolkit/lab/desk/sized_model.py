@@ -22,16 +22,13 @@ from toolkit.estimate import plus_minus
 from toolkit.files import same_file
 from toolkit.inputs import RESULT_FILE, TABLE_FILE, read_input, read_regular
 from toolkit.lab.desk.chart import Chart, Series, sampling
-from toolkit.lab.desk.holdings import ANSWER, CASE
+from toolkit.lab.desk.holdings import ANSWER, CASE, Holdings
 from toolkit.lab.desk.uploads import claimed_folder
 from toolkit.publication import publication
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.by_hand import Beside, Sized, Trial
-    from toolkit.lab.desk.holdings import Holdings
     from toolkit.simulation.model_file import ModelFile
 
 MODELS = "models"
@@ -179,7 +176,7 @@ def _charts(row: Beside, *, has_time: bool) -> Iterator[tuple[str, Chart]]:
     """Yield the output of a run, ``beside`` what was recorded, and what is ``left`` of it."""
     import numpy as np
 
-    def series(label: str, values: NDArray[np.float64], *, line: bool) -> Series:
+    def series(label: str, values: Array, *, line: bool) -> Series:
         at = np.flatnonzero(np.isfinite(values))
         at = at[:: sampling(len(at))]
         x = row.x[at] if has_time else at + 1.0

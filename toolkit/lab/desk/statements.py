@@ -12,20 +12,17 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from toolkit.declared import toml_text
 from toolkit.declared.declaration import fields_of
 from toolkit.declared.faults import lines_of
-from toolkit.declared.kinds import BoolKind, ChoiceKind, DateKind, FileKind, NumberKind, TextKind
+from toolkit.declared.kinds import BoolKind, ChoiceKind, DateKind, FileKind, Kind, NumberKind, TextKind
 from toolkit.declared.lists import KeyedKind, ListKind
 from toolkit.declared.tables import Field, FormsKind, TableKind
 from toolkit.declared.text import key_of, value_text
 from toolkit.errors import ConfigError
 from toolkit.files import toml_entries
-
-if TYPE_CHECKING:
-    from toolkit.declared.kinds import Kind
 
 Place = tuple[str | int, ...]
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.planning.interval import IntervalPlan
     from toolkit.report.word.package import Template
 
 

@@ -17,7 +17,7 @@ from toolkit.errors import ConfigError
 from toolkit.files import reads_as_number
 from toolkit.lab.answers import findings_text, one_line, table
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
-from toolkit.planning.session_plan import SessionPlan
+from toolkit.planning.session_plan import PlannedLoad, SessionPlan
 
 if TYPE_CHECKING:
     from datetime import date
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.planning.criteria import Criterion
     from toolkit.planning.fixtures import FeasibleLoads
-    from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template
 
 

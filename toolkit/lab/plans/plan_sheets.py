@@ -11,7 +11,7 @@ from toolkit.declared import Entry
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import DeliveredDocument, Timing
 from toolkit.lab.home import PLAN
-from toolkit.planning.printed_units import title_of
+from toolkit.planning.printed_units import PrintedUnits, title_of
 from toolkit.planning.sweep_plan import sweep_lines
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.planning.interval import IntervalPlan, IntervalRisk
     from toolkit.planning.next_run_plan import NextRunPlan
-    from toolkit.planning.printed_units import PrintedUnits
     from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
     from toolkit.planning.session_plan import PlannedLoad, SessionPlan
     from toolkit.report.word.package import Template

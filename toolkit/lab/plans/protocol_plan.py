@@ -19,14 +19,13 @@ from toolkit.findings import FindingEntry
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.lab.plans.planned_loads import load_of, nominal_loads
 from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
-from toolkit.planning.protocol_plan import ProtocolPlan
+from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
     from toolkit.planning.demands import Demand
     from toolkit.planning.expectation import EarlierTest
     from toolkit.planning.printed_units import PrintedUnits
-    from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
     from toolkit.report.word.package import Template
     from toolkit.simulation.plan import Plan
 

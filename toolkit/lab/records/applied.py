@@ -11,14 +11,17 @@ import dataclasses
 import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+from typing import Annotated, Any, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
-from toolkit.calibration.records.use import UsedRecord
+from toolkit.arrays import Array
+from toolkit.calibration.records.use import CalibrationUse, UsedRecord
 from toolkit.errors import ConfigError, OutputError, UnreadableError
 from toolkit.findings import Finding, FindingEntry
 from toolkit.inputs import RECORDING_FILE, read_input
+from toolkit.lab.records.record import Loads, Record
 from toolkit.recording.columns import rig
 from toolkit.recording.extras import needed
 from toolkit.recording.formats.mdf import mdf_bytes
@@ -29,12 +32,6 @@ from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, STAMP
 from toolkit.recording.model import Series
 from toolkit.recording.read import read_recording
 from toolkit.recording.sniff import sniff
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.lab.records.record import Loads, Record
 
 
 class AppliedRange(TypedDict):
@@ -96,7 +93,7 @@ def _parquet(data: bytes, path: Path) -> Vectors:
     return Vectors(where=str(path), vectors=[vector for vector in vectors if vector.values.dtype.kind != "O"])
 
 
-def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, NDArray[np.float64]]:
+def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, Array]:
     """Return the columns of the output by header: those of the file, then each load and its U.
 
     Raises

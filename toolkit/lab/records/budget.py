@@ -15,8 +15,6 @@ from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines, table
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
@@ -21,9 +21,7 @@ from toolkit.lab.answers import (
 from toolkit.trust.signing import HERE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
     from datetime import date
-    from pathlib import Path
 
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.signatures.sealing import Sealing

@@ -4,26 +4,18 @@ from __future__ import annotations
 
 import datetime as dt
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict
+from typing import Annotated, TypedDict
 
-from toolkit.calibration.control.chart import ChartPoint, ControlLimits
+from toolkit.calibration.control.chart import ChartPoint, ControlLimits, Series
 from toolkit.calibration.control.recall import DueInstrument
+from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.standards.e74 import E74Result
+from toolkit.calibration.standards.evaluation import Evaluation
 from toolkit.calibration.standards.iso376 import Iso376Result
 from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines, table
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from toolkit.calibration.control.chart import Series
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.standards.e74 import E74Result
-    from toolkit.calibration.standards.evaluation import Evaluation
-    from toolkit.calibration.standards.iso376 import Iso376Result
-
 
 StandardEvaluation = TypedDict(
     "StandardEvaluation",

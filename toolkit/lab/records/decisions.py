@@ -6,19 +6,17 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
+from typing import Annotated, Any, Literal, TypedDict
 
+from toolkit.calibration.registry.approval import Decision
+from toolkit.calibration.registry.candidate import Candidate
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.status import RecordStatus
 from toolkit.calibration.registry.verify import VerifiedRecord, verify_registry
 from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import finding_lines, table
 from toolkit.lab.records.registry_answer import RecordRow, record_row, void_day
-
-if TYPE_CHECKING:
-    from toolkit.calibration.registry.approval import Decision
-    from toolkit.calibration.registry.candidate import Candidate
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.status import RecordStatus
 
 
 class VerifyRegistryAnswer(TypedDict):

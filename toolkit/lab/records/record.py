@@ -13,11 +13,10 @@ from toolkit.lab.faces import Face, Facts
 from toolkit.units import printed
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
@@ -185,7 +184,7 @@ class Record(Face):
             figures |= open_figures(report, title=self.id)
         return figures
 
-    def _expanded(self, points: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def _expanded(self, points: Array) -> dict[str, Array]:
         import numpy as np
 
         from toolkit.calibration.uncertainty.budget import budgets_of_rows
@@ -218,7 +217,7 @@ class Record(Face):
             )  # fmt: skip
         return rows, stored_check(self.registry.folder, self.result)
 
-    def _beyond(self, points: NDArray[np.float64]) -> tuple[Finding, ...]:
+    def _beyond(self, points: Array) -> tuple[Finding, ...]:
         from toolkit.findings import Finding
 
         findings = []
@@ -239,9 +238,9 @@ class Loads(Face):
     record stood.
     """
 
-    value: Mapping[str, NDArray[np.float64]]
+    value: Mapping[str, Array]
     units: Mapping[str, str]
-    U: Mapping[str, NDArray[np.float64]]
+    U: Mapping[str, Array]
     use: CalibrationUse
     findings: tuple[Finding, ...]
     index: Any = None
@@ -250,7 +249,7 @@ class Loads(Face):
         """Return a column a load, ``FY [N]``, and beside it its expanded uncertainty, ``U(FY) [N]``."""
         import pandas as pd
 
-        columns: dict[str, NDArray[np.float64]] = {}
+        columns: dict[str, Array] = {}
         for name, values in self.value.items():
             columns[f"{name} [{self.units[name]}]"] = values
             if name in self.U:
@@ -282,7 +281,7 @@ class Loads(Face):
     def _plots(self) -> Mapping[str, Plot]:
         from toolkit.report.content import Curve, Plot
 
-        def plot(name: str, values: NDArray[np.float64]) -> Plot:
+        def plot(name: str, values: Array) -> Plot:
             rows = tuple(float(row) for row in range(1, len(values) + 1))
             curve = Curve(label=name, x=rows, y=tuple(values.tolist()), style="line")
             unit = printed(self.units[name])

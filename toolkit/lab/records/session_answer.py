@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 from toolkit.declared.answers import entry_of
 from toolkit.errors import SessionError, ToolkitError
 from toolkit.estimate import round_uncertainty
-from toolkit.findings import FindingEntry
+from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import counted, finding_lines, refuse_unwritable, table
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.candidate import Candidate
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.findings import Finding
 
 
 class RefittedRecord(TypedDict):

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 from toolkit.effects.applied import SimulatedEffect
-from toolkit.findings import FindingEntry
+from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.errors import ToolkitError
-    from toolkit.findings import Finding
     from toolkit.simulation.acquisition import OwnProgram
     from toolkit.simulation.plan import Plan
     from toolkit.worker.posix import Limits

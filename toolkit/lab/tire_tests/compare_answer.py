@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypedDict
 from toolkit.calibration.records.use import UsedRecord
 from toolkit.comparison.laboratories import LaboratoryComparison
 from toolkit.declared.answers import entry_of, merged
-from toolkit.findings import FindingEntry
+from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import (
     DeliveredDocument,
     DraftKeys,
@@ -27,7 +27,6 @@ from toolkit.lab.answers import (
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, Precision, Repeats
-    from toolkit.findings import Finding
     from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
 

@@ -17,16 +17,14 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.channels import Axes
     from toolkit.lab.tire_tests.fit_models import Fitted
     from toolkit.lab.tire_tests.resolve import Resolved
     from toolkit.tires.fmu.equations import TireEquations
 
-    Columns = dict[str, tuple[str, NDArray[np.float64]]]
+    Columns = dict[str, tuple[str, Array]]
 
 _KINDS = {
     ".tir": "tir",

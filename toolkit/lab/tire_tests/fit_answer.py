@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import UsedRecord
-from toolkit.estimate import plus_minus
-from toolkit.findings import FindingEntry
+from toolkit.estimate import Estimate, plus_minus
+from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import Timing, draft_keys, findings_text, mark_words, signature_words, table
 from toolkit.tires.table_fit import slope_sign
 from toolkit.units import printed
 
 if TYPE_CHECKING:
-    from toolkit.estimate import Estimate
-    from toolkit.findings import Finding
     from toolkit.lab.tire_tests.fit_models import Fitted
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_model import GlobalFit

@@ -16,7 +16,6 @@ from toolkit.lab.answers import finding_lines, table
 if TYPE_CHECKING:
     from toolkit.audit.estimate import Interval
     from toolkit.audit.inspection import Inspection, LoadBlock
-    from toolkit.calibration.registry.registry import RefusedRecord
 from toolkit.audit.model import Segment
 
 

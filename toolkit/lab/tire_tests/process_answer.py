@@ -11,7 +11,7 @@ from toolkit.calibration.records.use import UsedRecord
 from toolkit.channels import CHANNELS
 from toolkit.characteristics.characteristic import BOTH, TRANSIENT
 from toolkit.declared.answers import entry_of
-from toolkit.estimate import plus_minus
+from toolkit.estimate import Estimate, plus_minus
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import (
     DraftKeys,
@@ -26,11 +26,8 @@ from toolkit.lab.answers import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from toolkit.characteristics.model import Point
     from toolkit.characteristics.sweep_fit import SweepFit
-    from toolkit.estimate import Estimate
     from toolkit.lab.tire_tests.resolve import Resolved
     from toolkit.reduction.model import Condition as ReducedCondition
     from toolkit.reduction.model import HubLoad

@@ -148,7 +148,7 @@ def make_reports(
         the only test cannot be read, or its report is not delivered
     """
     from toolkit.errors import ConfigError, ToolkitError
-    from toolkit.lab.tire_tests.handover import diagnosis_findings
+    from toolkit.lab.tire_tests.handover import details_of, diagnosis_findings
     from toolkit.report.deliver import deliver_all
     from toolkit.trust.signing import HERE
 
@@ -157,6 +157,8 @@ def make_reports(
             "a request is of one document", where="--request, --answer", got=f"{len(tests)} tests",
             expected="one test", next_step="request each report by itself; nothing was made", rule="usage",
         )  # fmt: skip
+    if options.details is not None:
+        details_of(tests[0], options.details)  # one file for all tests: refused before any of them is read
     resolved: list[Resolved | ToolkitError] = []
     jobs: list[Job] = []
     taken: set[Path] = set()

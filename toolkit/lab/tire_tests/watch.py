@@ -8,14 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict
+from typing import Annotated, TypedDict
 
-from toolkit.lab.tire_tests.reports import NamedRefusal, NamedReport
+from toolkit.lab.tire_tests.reports import MadeReport, NamedRefusal, NamedReport, Options
+from toolkit.lab.tire_tests.resolve import Resolved
 from toolkit.lab.tire_tests.watching import Aside, Round, Waiting, Watcher
-
-if TYPE_CHECKING:
-    from toolkit.lab.tire_tests.reports import MadeReport, Options
-    from toolkit.lab.tire_tests.resolve import Resolved
 
 
 class WatchAnswer(TypedDict):

@@ -7,16 +7,12 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, TypedDict
+from typing import Annotated, TypedDict
 
 from toolkit.declared.answers import entry_of
 from toolkit.lab.answers import table
-from toolkit.qualification.model import Check, NotCovered
+from toolkit.qualification.model import Check, NotCovered, QualificationRecord
 from toolkit.system import is_administrator
-
-if TYPE_CHECKING:
-    from toolkit.qualification.model import QualificationRecord
-
 
 PACKAGES = (
     "libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils"

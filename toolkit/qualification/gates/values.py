@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.files import read_toml
 from toolkit.qualification.gates.bench import Act, Bench, Demonstration
 from toolkit.qualification.gates.virtual_hub import CELLS, PER_INDICATION
@@ -103,7 +103,7 @@ def _sweep(FZ: float = 1.0, FY: float = 1.0, MZ: float = 1.0, reverse: float = 1
     )  # fmt: skip
 
 
-def _tire(SA: NDArray[np.float64], FZ: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def _tire(SA: Array, FZ: Array) -> tuple[Array, ...]:
     side = -_FRICTION * FZ * np.tanh(_STIFFNESS / _FRICTION * SA)
     return side, -_TRAIL * (1.0 - np.abs(SA) / np.radians(15.0)) * side
 

@@ -16,6 +16,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.machine.default import SIMULATED_MACHINE
 
 RIG = "rig"  # an instrument that no machine definition knows
@@ -69,8 +70,8 @@ class Session:
         return path
 
     def _table(
-        self, path: Path, loads: NDArray[np.float64], more: Mapping[str, float],
-        run: NDArray[np.int_] | None = None,
+        self, path: Path, loads: Array, more: Mapping[str, float],
+        run: NDArray[np.int_] | None = None
     ) -> None:  # fmt: skip
         names = (*CELLS, *LOADS)
         rows = np.column_stack([_cells(loads, start=0 if run is not None else 1000), loads])
@@ -110,14 +111,14 @@ class Session:
         return f"polarity = [{', '.join(entries)}]\n"
 
 
-def _steps(zero: bool) -> NDArray[np.float64]:
+def _steps(zero: bool) -> Array:
     """Return the loads of one run (rows, 3): no load, each load by itself, and all of them together."""
     alone = [share * row for row in np.diag(LARGEST) for share in (-1.0, -0.5, 0.5, 1.0)]
     together = [0.6 * np.array(LARGEST) * turns for turns in itertools.product((-1, 1), repeat=3)]
     return np.array([*([np.zeros(3)] if zero else []), *alone, *together])
 
 
-def _cells(loads: NDArray[np.float64], start: int) -> NDArray[np.float64]:
+def _cells(loads: Array, start: int) -> Array:
     """Return indications (rows, 3) [mV/V] of loads, with a scatter of equal steps modulo the golden ratio."""
     exact = np.linalg.solve(PER_INDICATION, loads.T).T
     at = np.arange(start, start + exact.size)

@@ -10,16 +10,13 @@ header and in the format's own place for it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
+from toolkit.machine import Machine
 from toolkit.recording.formats.lvm import lvm_bytes, read_lvm
 from toolkit.recording.formats.mat import mat_bytes, read_mat
 from toolkit.recording.formats.mdf import mdf_bytes, read_mdf
 from toolkit.recording.formats.tdms import read_tdms, tdms_bytes
 from toolkit.recording.formats.vectors import Vectors, Written
-
-if TYPE_CHECKING:
-    from toolkit.machine import Machine
 
 READERS: dict[str, Callable[[bytes, object, Machine], Vectors]] = {
     "lvm": read_lvm,

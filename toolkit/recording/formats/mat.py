@@ -19,9 +19,10 @@ import struct
 import warnings
 import zlib
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.errors import UnreadableError
 from toolkit.inputs import RECORDING_FILE, limit_of
@@ -38,10 +39,6 @@ from toolkit.recording.formats.vectors import (
     truncated,
     version,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 _HEADER = 128
 _COMPRESSED, _MATRIX = 15, 14

@@ -6,19 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.errors import CellError, ColumnError, RecordingError, UnitError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.columns import assign_columns, header_of
 from toolkit.recording.model import Series
 from toolkit.units import split_header, unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 _AGAIN = "copy the file again from the machine; it was cut off or damaged on its way"
 
@@ -34,7 +32,7 @@ class Vector:
     name: str
     unit: str | None
     values: NDArray[Any]
-    half: NDArray[np.float64] | None = None
+    half: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,7 +50,7 @@ class Written:
     symbol: str
     header: str
     unit: str
-    values: NDArray[np.float64]
+    values: Array
 
     @property
     def name(self) -> str:
@@ -125,7 +123,7 @@ def series_of(table: Vectors, machine: Machine) -> tuple[Series, ...]:
     )
 
 
-def quantum(raw: NDArray[Any], values: NDArray[Any]) -> NDArray[np.float64] | None:
+def quantum(raw: NDArray[Any], values: NDArray[Any]) -> Array | None:
     """Return half the step in which a file stores values: of a digitiser's counts, or of a single float.
 
     Parameters
@@ -177,7 +175,7 @@ def _header(vector: Vector, where: str) -> str:
     return vector.name
 
 
-def _numbers(vector: Vector, header: str, rows: int, where: str) -> NDArray[np.float64]:
+def _numbers(vector: Vector, header: str, rows: int, where: str) -> Array:
     values = vector.values
     if values.ndim != 1 or values.dtype.kind not in "fiubSUM":
         raise UnreadableError(

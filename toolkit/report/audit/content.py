@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from toolkit.audit.model import NOT_IDENTIFIED, TELLS
+from toolkit.audit.model import NOT_IDENTIFIED, TELLS, Grade
 from toolkit.audit.sides import disputed
 from toolkit.files import sha256_bytes
 from toolkit.report.content import Curve, Plot, ReportContent
@@ -16,10 +16,7 @@ from toolkit.report.style import Style
 from toolkit.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from toolkit.audit.archive import ArchiveAudit
-    from toolkit.audit.model import Grade
     from toolkit.report.audit.page import AuditView
 
 _RIGHT = ("exact", "rounding")

@@ -10,8 +10,8 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.audit.since_good import DriftedFile, DriftedTest
-from toolkit.calibration.records.use import mark_of
+from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+from toolkit.calibration.records.use import CalibrationUse, mark_of
 from toolkit.characteristics.catalogue import summary
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import rows_of, timeline
@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.linked import Linked, RestingReport
-    from toolkit.audit.since_good import Drift
     from toolkit.audit.timeline import Timeline, Trace
-    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.findings import Finding
 
 MOST_ROWS = 20_000

@@ -9,14 +9,12 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from toolkit.audit.timeline import Stretch
+from toolkit.arrays import Array
+from toolkit.audit.timeline import Stretch, Timeline
 from toolkit.report.pages.kit import drawn
 
 if TYPE_CHECKING:
     from markupsafe import Markup
-    from numpy.typing import NDArray
-
-    from toolkit.audit.timeline import Timeline
 
 
 class Drawing:
@@ -122,9 +120,7 @@ def timeline(versions: Timeline) -> Markup:
     return drawing.markup()
 
 
-def rows_of(
-    load: str, unit: str, old: NDArray[np.float64], new: NDArray[np.float64], *, width: int = 500
-) -> Markup:
+def rows_of(load: str, unit: str, old: Array, new: Array, *, width: int = 500) -> Markup:
     """Return one load of a file against its rows, as the file has it and by the record in force."""
     left, top, height = 62, 10, 150
     right = width - 10

@@ -8,12 +8,13 @@ from __future__ import annotations
 import datetime as dt
 import json
 import re
-from typing import TYPE_CHECKING
 
-from toolkit.calibration.control.as_found import as_found, as_found_before
-from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.control.as_found import AsFound, as_found, as_found_before
+from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.gates import unverifiable
+from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import Reason, not_in_force, unapproved
+from toolkit.calibration.registry.status import RecordStatus
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.errors import ConfigError, RecordError, ToolkitError
@@ -23,13 +24,7 @@ from toolkit.machine import load_machine, machine_names
 from toolkit.report.certificate.loads import FoundSession, load_results
 from toolkit.report.certificate.model import MOST_FIGURES, Certificate, LoadResult
 from toolkit.report.certificate.statements import Stated, read_stated
-
-if TYPE_CHECKING:
-    from toolkit.calibration.control.as_found import AsFound
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.status import RecordStatus
-    from toolkit.report.style import Style
+from toolkit.report.style import Style
 
 _METHODS = {
     "ols": "ordinary least squares",

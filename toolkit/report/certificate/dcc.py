@@ -7,8 +7,6 @@ same certificate and day of issue give the same bytes.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from toolkit.errors import ConfigError
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.recording.marks import OWN_OUTPUT
@@ -24,12 +22,10 @@ from toolkit.report.certificate.dcc_xml import (
     rich,
     text,
 )
+from toolkit.report.certificate.model import Certificate, LoadResult
 from toolkit.report.certificate.statements import RULES
 from toolkit.units import unit
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from toolkit.report.certificate.model import Certificate, LoadResult
 
 VERSION = "3.3.0"
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
 from toolkit.calibration.uncertainty.budget import calibration_budget, predict
 from toolkit.calibration.uncertainty.common_errors import standard_errors
@@ -14,8 +15,6 @@ from toolkit.report.certificate.model import Adjustment, CheckLine, Expanded, Lo
 from toolkit.report.certificate.statements import decide
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.calibration.control.as_found import AsFound
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.table import Table
@@ -166,7 +165,7 @@ def _left(
     load: LoadFit,
     loads: Table,
     check: Table | None,
-    residuals: NDArray[np.float64],
+    residuals: Array,
     checks: tuple[CheckLine, ...],
 ) -> tuple[float, Expanded]:
     """Return the largest deviation as left and its uncertainty: of the check loads, else of the residuals."""

@@ -6,12 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import by_name
-from toolkit.estimate import plus_minus
+from toolkit.estimate import Estimate, plus_minus
 from toolkit.units import printed
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, FactorSpread, Section
-    from toolkit.estimate import Estimate
     from toolkit.report.style import Style
 
 # A table of more rows is for programs.

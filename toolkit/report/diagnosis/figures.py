@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.diagnosis.answer.locate import time_unit
 from toolkit.units import unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from toolkit.diagnosis.answer.answer import DiagnosedLaw, Diagnosis, MismatchPlace
     from toolkit.diagnosis.law.learn import Laws
@@ -161,7 +161,7 @@ def run_in_time(search: Search, channel: str, *, after: bool, laws: Laws | None 
     return draw_svg((8.6, 4.4), draw)
 
 
-def drawn(t: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def drawn(t: Array, y: Array) -> tuple[Array, Array]:
     """Return the rows of a curve that show in print: of every pixel its least and its largest value."""
     usable = np.flatnonzero(np.isfinite(y))
     if len(usable) <= 2 * _PIXELS:
@@ -202,7 +202,7 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     names = [name for name in problem.names if name in floors]
     fits = [("refitted", search.refitted)] + ([("with the effect", search.augmented)] if after else [])
 
-    def table(fit: Any) -> NDArray[np.float64]:
+    def table(fit: Any) -> Array:
         share = np.zeros((len(names), len(problem.runs)))
         for i, name in enumerate(names):
             noise = max(floors[name], 1e-300)
@@ -230,7 +230,7 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     return draw_svg((8.6, 0.9 + len(fits) * (0.5 + 0.42 * len(names))), draw)
 
 
-def _write_cells(axes: Axes, values: NDArray[np.float64], largest: float) -> None:
+def _write_cells(axes: Axes, values: Array, largest: float) -> None:
     if values.shape[1] > 16:
         return
     for i in range(values.shape[0]):
@@ -244,7 +244,7 @@ def _short(name: str) -> str:
     return name.removesuffix(".csv").removesuffix(".xlsx")
 
 
-def variable_of(search: Search, name: str) -> NDArray[np.float64] | None:
+def variable_of(search: Search, name: str) -> Array | None:
     """Return the values of a place's variable over all runs (n,), None where it has no numbers."""
     problem = search.problem
     if name in problem.names:
@@ -256,9 +256,7 @@ def variable_of(search: Search, name: str) -> NDArray[np.float64] | None:
     return None
 
 
-def binned(
-    x: NDArray[np.float64], y: NDArray[np.float64], *, bins: int = _BINS
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def binned(x: Array, y: Array, *, bins: int = _BINS) -> tuple[Array, Array]:
     """Return means of x and y in bins of equal counts."""
     edges = np.unique(np.quantile(x, np.linspace(0, 1, bins + 1)))
     if len(edges) < 3:
@@ -294,7 +292,7 @@ _LEVELS = 6  # of a condition, beyond which it is the runs' own name
 _MAP_BINS = 12
 
 # Label, the values of all rows, and what they are called where they are levels of a condition.
-Variable = tuple[str, "NDArray[np.float64]", tuple[str, ...]]
+Variable = tuple[str, "Array", tuple[str, ...]]
 
 
 def variables(search: Search) -> list[Variable]:
@@ -363,8 +361,8 @@ def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool
 
 def _panel(
     axes: Axes,
-    x: NDArray[np.float64],
-    residual: NDArray[np.float64],
+    x: Array,
+    residual: Array,
     levels: tuple[str, ...],
     *,
     label: str,

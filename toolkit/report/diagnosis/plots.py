@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.diagnosis.answer.locate import time_unit
 from toolkit.report.content import Curve, Plot
 from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
@@ -16,8 +17,6 @@ from toolkit.report.diagnosis.numbers import few
 from toolkit.units import printed
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.diagnosis.answer.answer import ChannelMismatch, Diagnosis
     from toolkit.diagnosis.search.search import Search
     from toolkit.report.style import Style
@@ -121,7 +120,7 @@ def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
     clock, seconds = time_unit(problem.case)
     t = run.t[stride] / seconds
 
-    def curve(label: str, group: int, y: NDArray[np.float64], *, points: bool = False) -> Curve:
+    def curve(label: str, group: int, y: Array, *, points: bool = False) -> Curve:
         rows = good if points else np.ones(len(t), dtype=bool)
         return Curve(
             label=label, x=tuple(t[rows].tolist()), y=tuple(y[rows].tolist()), group=group,

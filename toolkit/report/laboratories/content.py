@@ -9,19 +9,16 @@ import datetime as dt
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from toolkit.comparison.laboratories import LaboratoryComparison, Measurand, Score
 from toolkit.comparison.precision import OUTLIER, STRAGGLER, h_limit, k_limit
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.files import sha256_bytes
 from toolkit.report.content import Curve, Plot, ReportContent
 from toolkit.report.document import Document, Rows, finding_table
+from toolkit.report.style import Style
 from toolkit.units import printed
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from toolkit.comparison.laboratories import LaboratoryComparison, Measurand, Score
-    from toolkit.report.style import Style
 
 _SUBJECT = "Interlaboratory comparison"
 _MOST_MEANS, _MOST_NAMED = 6, 3

@@ -5,16 +5,14 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from toolkit.files import sha256_bytes
+from toolkit.findings import Finding
 from toolkit.report.content import Plot, ReportContent
 from toolkit.report.document import Document, Rows, finding_table
+from toolkit.report.style import Style
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from toolkit.findings import Finding
-    from toolkit.report.style import Style
 
 _SUBJECTS = {
     "session": "Plan of a calibration session",

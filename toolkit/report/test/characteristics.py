@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import columns, tables
 from toolkit.characteristics.characteristic import COLUMNS as BUDGET
+from toolkit.characteristics.characteristic import WideTable
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.model import summary_estimates as estimates_of_summary
 from toolkit.characteristics.model import summary_load as load_of_summary
-from toolkit.estimate import round_to_uncertainty
+from toolkit.estimate import Estimate, round_to_uncertainty
 from toolkit.report.content import Cell
 from toolkit.report.document import DeclaredTable, Rows
 from toolkit.report.style import Style
@@ -18,9 +20,6 @@ from toolkit.report.vocabulary import QUANTITIES
 from toolkit.units import printed
 
 if TYPE_CHECKING:
-    from toolkit.characteristics.characteristic import WideTable
-    from toolkit.characteristics.model import Row
-    from toolkit.estimate import Estimate
     from toolkit.pipeline import TestResult
 
 Cells = dict[str, Cell]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.use import DRAFT, UNVERIFIED, CalibrationUse
 from toolkit.characteristics.catalogue import columns
-from toolkit.characteristics.characteristic import PULL, STIFFNESS
+from toolkit.characteristics.characteristic import PULL, STIFFNESS, WideTable
 from toolkit.files import sha256_bytes
 from toolkit.report.content import IMPOSSIBLE, ReportContent
 from toolkit.report.document import Chapter, Document
@@ -17,7 +17,6 @@ from toolkit.report.style import Style
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.characteristics.characteristic import WideTable
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
     from toolkit.recording.folder import ReportDetails

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from toolkit.report.content import Cell
 from toolkit.report.document import Rows
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, ReportedTest
-
-if TYPE_CHECKING:
-    from toolkit.report.content import Cell
 
 
 @REPORT.table(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,15 +13,11 @@ from toolkit.report.figures import draw, draw_svg
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
 from toolkit.report.test.content import REPORT, ReportedTest
-from toolkit.tires.comparison import Comparison, model_curve, rows_of_model
+from toolkit.tires.comparison import Comparison, ComparisonRow, model_curve, rows_of_model
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import Measured, binned
-
-if TYPE_CHECKING:
-    from toolkit.tires.comparison import Comparison, ComparisonRow
-    from toolkit.tires.global_model import ModelFit
-    from toolkit.tires.model import CurveFit
-
+from toolkit.tires.global_model import ModelFit
+from toolkit.tires.model import CurveFit
 
 _LABELS = {
     "FX": "longitudinal force FX / N",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import summary
+from toolkit.characteristics.characteristic import Characteristic
 from toolkit.errors import ConfigError
 from toolkit.estimate import plus_minus
 from toolkit.machine import load_machine
@@ -22,9 +22,6 @@ from toolkit.report.test.figures import TURNED, load_groups
 from toolkit.report.vocabulary import Entry
 from toolkit.units import printed
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from toolkit.characteristics.characteristic import Characteristic
 
 _PSI = 0.45359237 * 9.80665 / 0.0254**2  # Pa
 

@@ -55,11 +55,32 @@ from toolkit.words.phrasebook import locale_of
 _MARK = "\ufdd0"  # a noncharacter: it stands where a literal figure goes, and no value may hold it
 
 
-def needed_figures(template: Template, content: ReportContent) -> tuple[str, ...]:
-    """Return the names of the figures that the template will show for this content."""
-    sites = scan(stories(open_package(template)))
-    names = [site.tag.name for site in sites if site.tag.family == "figure"]
-    return tuple(dict.fromkeys(name for name in names if name in content.plots))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """What a template asks for before anything is drawn: ``figures`` by name, and what its lint found."""
+
+    lint: tuple[LintFinding, ...]
+    figures: tuple[str, ...]
+
+
+def survey(template: Template, content: ReportContent, *, fonts: bool = False) -> Survey:
+    """Return which figures the template will show for this content, and the findings of its lint.
+
+    ``fonts`` also warns of fonts that are not installed.
+
+    Raises
+    ------
+    TemplateError
+        the lint finds an error
+    """
+    package = open_package(template)
+    parts = stories(package)
+    lint = check_stories(package, parts, content.style, content.vocabulary, fonts=fonts)
+    errors = [finding for finding in lint if finding.level == "error"]
+    if errors:
+        raise _lint_error(template, errors)
+    names = [site.tag.name for site in scan(parts) if site.tag.family == "figure"]
+    return Survey(lint=lint, figures=tuple(dict.fromkeys(name for name in names if name in content.plots)))
 
 
 def fill(
@@ -68,7 +89,7 @@ def fill(
     pictures: Mapping[str, Picture],
     *,
     allow_missing: bool = False,
-    fonts: bool = False,
+    surveyed: Survey | None = None,
 ) -> Filled:
     """Fill a template.
 
@@ -76,21 +97,18 @@ def fill(
     ----------
     template : a template that is safe to open
     content : what the report says
-    pictures : the drawn figures by name, those of `needed_figures` at least
+    pictures : the drawn figures by name, those of its `survey` at least
     allow_missing : print a visible mark for a value that the test has not, in place of an error
-    fonts : also warn of fonts that are not installed
+    surveyed : the survey of this template for this content, where it was made before
 
     Raises
     ------
     TemplateError
         the lint finds an error, or a value, figure or table of the template is not in this test
     """
+    lint = (surveyed or survey(template, content)).lint
     package: Any = open_package(template)
     parts = stories(package)
-    lint = check_stories(package, parts, content.style, content.vocabulary, fonts=fonts)
-    errors = [finding for finding in lint if finding.level == "error"]
-    if errors:
-        raise _lint_error(template, errors)
     return _Filler(package, parts, template, content, pictures, allow_missing).run(lint)
 
 
@@ -405,4 +423,4 @@ def _unprintable(table: Table | None) -> str:
     return ""
 
 
-__all__ = ["Entry", "Filled", "fill", "needed_figures"]
+__all__ = ["Entry", "Filled", "Survey", "fill", "survey"]

@@ -17,17 +17,14 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.errors import RenderError
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.preview import Word, words_of
 from toolkit.report.word.toc_pages import squeeze
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LEAST = 4.0
 """Points from the top to the bottom of a line's letters: of a font of some 3.5 points."""
@@ -106,7 +103,7 @@ class Print:
                 return f"{text[:20]!r} hardly differs from what is behind it, or is covered"
         return ""
 
-    def _draw(self, number: int) -> NDArray[np.float64]:
+    def _draw(self, number: int) -> Array:
         """Return the luminance of a page, 0 to 1 (rows, columns)."""
         from PIL import Image
 
@@ -149,7 +146,7 @@ def _places(page: Page, text: str) -> Iterator[tuple[Word, ...]]:
         at = page.text.find(text, at + 1)
 
 
-def _inked(page: NDArray[np.float64], left: float, top: float, right: float, bottom: float) -> bool:
+def _inked(page: Array, left: float, top: float, right: float, bottom: float) -> bool:
     """Tell whether there is ink at a place [pt] that departs from what is around it, as letters do."""
     scale = _DPI / 72
     rows = slice(max(int(top * scale), 0), max(int(np.ceil(bottom * scale)), 1))
@@ -165,7 +162,7 @@ def _inked(page: NDArray[np.float64], left: float, top: float, right: float, bot
     return bool(min(ink.any(axis=1).mean(), ink.any(axis=0).mean()) >= _SPREAD)
 
 
-def _linear() -> NDArray[np.float64]:
+def _linear() -> Array:
     """Return the luminance of each of the 256 levels of a colour of sRGB (IEC 61966-2-1)."""
     level = np.arange(256) / 255
     return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)

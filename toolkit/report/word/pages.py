@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import datetime as dt
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from docx.enum.section import WD_HEADER_FOOTER
 from lxml import etree
@@ -15,9 +16,6 @@ from toolkit.report.word.own import RED, element, own_paragraph
 from toolkit.report.word.scan import LITERAL, visible_texts
 from toolkit.report.word.xml import W_P, Element, Story, clean, in_fallback, q
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 _NOTES = ("footnote", "endnote")
 _OFF = ("0", "false", "off")

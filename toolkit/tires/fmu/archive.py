@@ -25,11 +25,10 @@ from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError, OutputError
 from toolkit.tires.fmu.description import VERSIONS, FmiVersion, build_text, description_text
-from toolkit.tires.recorded import CONSTANT, QUANTITY
+from toolkit.tires.recorded import CONSTANT, QUANTITY, Program, Step
 
 if TYPE_CHECKING:
     from toolkit.tires.fmu.equations import TireEquations
-    from toolkit.tires.recorded import Program, Step
 
 
 _LARGEST_PRODUCT = 4  # a power that is written as a product

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from toolkit.channels import signs
 from toolkit.errors import ConfigError
-from toolkit.tires.global_model import Rows
+from toolkit.tires.global_data import Measured
+from toolkit.tires.global_model import GlobalModel, ModelFit, Rows
 from toolkit.tires.mf import MF52, MF61
 from toolkit.tires.recorded import NotRecordedError, Program, record
-from toolkit.tires.tir import si_number
+from toolkit.tires.tir import TirFile, si_number
 from toolkit.tires.tir_checks import demanded, nominal_pressure
 from toolkit.tires.tir_evaluate import forces_of
-
-if TYPE_CHECKING:
-    from toolkit.tires.global_data import Measured
-    from toolkit.tires.global_model import GlobalModel, ModelFit
-    from toolkit.tires.tir import TirFile
 
 _TEXTS = {
     "SA": ("rad", "slip angle"),

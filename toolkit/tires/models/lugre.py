@@ -19,18 +19,14 @@ SH, K_IA, SV, SM as in the brush.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.tires.contact import directed, half_length, slips, with_load
 from toolkit.tires.global_model import CAMBER, OFFSETS, SHIFT, GlobalModel, Responses, Rows, Seeds, parameters
 from toolkit.tires.recorded import as_array
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 _NODES = 10  # of Gauss-Legendre on each of the trapezoid's three parts
 

@@ -9,14 +9,11 @@ The peak is D where C >= 1 and the argument reaches pi/2; far out y tends to D s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from toolkit.arrays import Array
 from toolkit.tires.model import ParameterSpec
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 # The derivative of an analytic function by a complex step has no cancellation: it is exact.
 _COMPLEX_STEP = 1e-30
@@ -40,24 +37,24 @@ class MagicFormula:
         ParameterSpec(name="Sv", unit="y", bounds="|Sv| <= max|y|", text="vertical shift"),
     )
 
-    def value(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def value(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return y [N or N·m] at slip angles [rad]; see `value`."""
         return value(values, SA)
 
-    def slope(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def slope(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return dy/dSA [N/rad or N·m/rad]; see `slope`."""
         return slope(values, SA)
 
-    def jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def jacobian(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return dy/dparameter (6, ...); see `jacobian`."""
         return jacobian(values, SA)
 
-    def slope_jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+    def slope_jacobian(self, values: ArrayLike, SA: ArrayLike) -> Array:
         """Return d(dy/dSA)/dparameter (6, ...); see `slope_jacobian`."""
         return slope_jacobian(values, SA)
 
 
-def value(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+def value(values: ArrayLike, SA: ArrayLike) -> Array:
     """Return y of (B, C, D, E, Sh, Sv) [1/rad, 1, N, 1, rad, N] at SA [rad].
 
     Each parameter may be an array; they broadcast with SA.
@@ -67,11 +64,11 @@ def value(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
     """
     B, C, D, E, Sh, Sv = np.asarray(values)
     z = B * (np.asarray(SA) + Sh)
-    result: NDArray[np.float64] = D * np.sin(C * np.arctan(z - E * (z - np.arctan(z)))) + Sv
+    result: Array = D * np.sin(C * np.arctan(z - E * (z - np.arctan(z)))) + Sv
     return result
 
 
-def slope(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+def slope(values: ArrayLike, SA: ArrayLike) -> Array:
     """Return dy/dSA [N/rad or N·m/rad] of (B, C, D, E, Sh, Sv) at SA [rad].
 
     >>> round(float(slope((10.0, 1.3, -4000.0, 0.5, 0.0, 7.0), 0.0)), 6)  # B C D
@@ -81,11 +78,11 @@ def slope(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
     z = B * (np.asarray(SA) + Sh)
     psi = z - E * (z - np.arctan(z))
     inner = B * (1 - E * (z * z / (1 + z * z)))
-    result: NDArray[np.float64] = D * np.cos(C * np.arctan(psi)) * C / (1 + psi * psi) * inner
+    result: Array = D * np.cos(C * np.arctan(psi)) * C / (1 + psi * psi) * inner
     return result
 
 
-def jacobian(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+def jacobian(values: ArrayLike, SA: ArrayLike) -> Array:
     """Return the derivatives of y by (B, C, D, E, Sh, Sv), stacked in front: (6, ...)."""
     B, C, D, E, Sh, _ = np.asarray(values)
     x = np.asarray(SA) + Sh
@@ -101,7 +98,7 @@ def jacobian(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
     )
 
 
-def slope_jacobian(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+def slope_jacobian(values: ArrayLike, SA: ArrayLike) -> Array:
     """Return the derivatives of dy/dSA by (B, C, D, E, Sh, Sv), stacked in front: (6, ...)."""
     base = np.asarray(values, dtype=np.complex128)
     rows = []

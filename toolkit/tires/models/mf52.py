@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.tires.global_model import GlobalModel
 from toolkit.tires.mf import (
     MF52,
@@ -32,11 +32,6 @@ from toolkit.tires.mf import (
 from toolkit.tires.models.mf61 import Lateral
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 
 def forces(p: Mapping[str, float], q: State, *, UNLOADED_RADIUS: float) -> Forces:

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.arrays import Array
 from toolkit.tires.global_model import GlobalModel
 from toolkit.tires.mf import (
     MF61,
@@ -34,12 +34,6 @@ from toolkit.tires.mf import (
 )
 from toolkit.tires.recorded import as_array, may_differ_from_zero
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-
 
 LATERAL = tuple(
     "PCY1 PDY1 PDY2 PDY3 PEY1 PEY2 PEY3 PEY4 PEY5 PKY1 PKY2 PKY3 PKY4 PKY5 PKY6 PKY7 PHY1 PHY2 PVY1 PVY2 "

@@ -22,16 +22,14 @@ The moment is a curve of its own and not trail times force: the two are fitted a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from toolkit.tires.global_model import Factor, GlobalModel, Responses, parameters
+from toolkit.arrays import Array
+from toolkit.tires.global_model import Factor, GlobalModel, Responses, Rows, Seeds, parameters
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import nonzero, sine
-
-if TYPE_CHECKING:
-    from toolkit.tires.global_model import Array, Rows, Seeds
 
 # name, unit, default, low, high, size, needs, text
 _FY = """

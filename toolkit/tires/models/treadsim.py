@@ -24,18 +24,15 @@ within 3e-3 and 2e-2.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.arrays import Array
 from toolkit.tires.bristles import Tread, balance, middles, sharpened, summed
 from toolkit.tires.contact import bulged, half_length, slips, with_load
 from toolkit.tires.global_model import OFFSETS, SHIFT, GlobalModel, Responses, Rows, Seeds, parameters
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 BRISTLES = 40
 LINES = 5
