@@ -32,7 +32,7 @@ def test_a_short_recording_has_fewer_knots_and_is_asked_all_the_same(tmp_path, r
 
 
 def test_a_simulation_that_is_open_where_nothing_was_recorded_is_asked_about_the_rest(tmp_path):
-    """An effect on recorded gauges has no value where one was not recorded, and no row of the output either."""
+    """An effect on gauges has no value where one was not recorded, and no row of the output either."""
     L = np.linspace(10.0, 90.0, 40)
     F = L + 0.001 * (L - 50.0) ** 2
     F[[3, 17]] = np.nan
