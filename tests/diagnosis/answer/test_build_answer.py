@@ -126,3 +126,18 @@ def test_a_distance_below_what_the_rows_resolve_has_an_interval_up_to_there(prob
             assert estimate.ci95[0] > 0.009
         else:
             assert estimate.ci95 == (0.0, high)
+
+
+def test_a_negative_size_has_both_ends_of_its_interval(problem):
+    active = AppliedEffect(
+        effect=effects()["nonlinearity"], channel="F", values={"quadratic": -8e-4, "cubic": -1.8e-3}
+    )
+    search = SimpleNamespace(
+        problem=problem,
+        augmented=SimpleNamespace(active=(active,), covariance=np.eye(4)),
+        variance=lambda _: 1e-8,
+    )
+    for estimate in _parameters(search, active, None):
+        low, high = estimate.ci95
+        # 1.975 of Student's distribution of 156 degrees
+        assert (low, high) == pytest.approx((estimate.value - 1.975e-4, estimate.value + 1.975e-4), abs=1e-6)

@@ -261,8 +261,8 @@ def _parameters(
         if half is not None:
             ci = (value - half, value + half)
         # What is smaller than the equation can tell acts as if it were as large as that.
-        least = active.values.get(f"least_{parameter.name}", 0.0)
-        if active.searched and value < least:
+        least = active.values.get(f"least_{parameter.name}")
+        if active.searched and least is not None and value < least:
             ci = (parameter.bounds[0], least if ci is None else max(ci[1], least))
         turned = parameter.sign_in(problem.case.axes)
         if turned < 0:

@@ -37,9 +37,9 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
 
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
     stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
-    there rings, coloured noise takes it up, and no structure shows. What takes nearly all that the laws take
-    keeps its name, whatever they make of the rest. Any other loses it where all that is named has another
-    size beside the laws, or where it leaves more than the sensor's noise and they do not.
+    there rings, coloured noise takes it up, and no structure shows. In an equation a name that leaves more
+    than the sensor's noise where laws do not is lost: it imitates them. Else what takes nearly all that the
+    laws take keeps its name, and any other loses it where all that is named has another size beside them.
     """
     predicting = any(law.predicts for law in laws.listed)
     is_asked = predicting or _leaves_process_noise(search)
@@ -53,10 +53,10 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     alone = learned(bare, withdrawn=False, budget=budget)
     if not any(law.predicts for law in alone.listed):
         return search, laws if alone.complete else replace(laws, complete=False)
-    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
-        return search, laws
     if bare.problem.shown_sd and _leaves_process_noise(search) and not _process_noise(search, alone.fit):
         return bare, alone
+    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
+        return search, laws
     if any(_holds_beside(laws, step) for step in search.steps):
         if _parameters(alone.fit) >= _parameters(laws.fit):
             return search, laws
