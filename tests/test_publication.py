@@ -74,13 +74,13 @@ def test_results_replace_the_old_ones_and_nothing_else(tmp_path: Path, kind: str
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-AMONG = pytest.mark.campaign(
-    "beside other files, the most calls: a fresh and an exchanged folder are killed in every run"
+ALIKE = pytest.mark.campaign(
+    "a fresh folder, and one with other files: one that is exchanged is killed at any call in every run"
 )
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[AMONG] * (kind == "among others")) for kind in KINDS]
+    "kind", [pytest.param(kind, marks=[ALIKE] * (kind != "exchanged")) for kind in KINDS]
 )
 def test_killed_at_any_call_the_set_is_never_mixed_and_the_next_command_completes_it(
     tmp_path: Path, kind: str

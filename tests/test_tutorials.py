@@ -129,7 +129,13 @@ def same(expected: str, printed: str) -> bool:
     )
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+LONGEST = pytest.mark.campaign("the longest of the notebooks: the others are run cell by cell in every run")
+
+
+@pytest.mark.parametrize(
+    "notebook",
+    [pytest.param(path, id=path.stem, marks=[LONGEST] * (path.stem == "diagnosis")) for path in NOTEBOOKS],
+)
 def test_a_notebook_runs_from_its_first_cell_to_its_last(
     notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,9 +11,9 @@ from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.session.session_file import Amount
 from toolkit.errors import ToolkitError
-from toolkit.lab.plans.planned_loads import load_of
 from toolkit.machine import load_machine, read_protocol
 from toolkit.machine.default import DEFAULT_MACHINE
+from toolkit.planning.demands import load_of
 from toolkit.recording.folder import read_test_folder
 from toolkit.recording.read import read_recording
 from toolkit.simulation.plan import read_plan

@@ -19,8 +19,8 @@ from tests.benchmarks.timing import pairs, row
 from tests.calibration.registry.test_signatures import KEYS, RECORD, _found, _registry
 from tests.trust.seal.authority import to_pem
 from tests.trust.seal.seal_factory import authority, key, plain_pdf, trust
-from toolkit.calibration.registry.issuing import issue
 from toolkit.lab.home import packaged_home
+from toolkit.lab.signatures.issuing import issue
 from toolkit.lab.signatures.people import checkpoint_of, lines_of
 from toolkit.lab.signatures.proofs import registry_ledger
 from toolkit.lab.signatures.verification import verify_file

@@ -10,7 +10,7 @@ import pytest
 from tests.characteristics.sweep_factory import STIFFNESS, Form, relaxing, string, sweep, triangle
 from tests.conftest import SHARED_DATA
 from toolkit.characteristics.sweep_fit import fit_sweep
-from toolkit.machine.sweeping import Delay, Sweeping
+from toolkit.machine.protocol import Delay, Sweeping
 
 V, RATE, AMPLITUDE = 2.128, np.radians(1.0), np.radians(1.5)
 T = np.arange(0.0, 24.0, 0.02)

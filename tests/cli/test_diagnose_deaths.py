@@ -132,6 +132,9 @@ def test_a_simulator_that_prints_without_end_does_not_end_the_tool(tmp_path, ans
     assert ended.stderr == ""
 
 
+@pytest.mark.campaign(
+    "a whole diagnosis in which most runs die: refused parameters are told in every run (test_user_code)"
+)
 def test_one_set_of_parameters_that_kills_is_a_failed_run_and_told(tmp_path, answered):
     dies = "if p['mass'] != 94.0: print('only 94', flush=True); os._exit(5)\n    "
     case = write_case(tmp_path, simulator=START + dies + GOOD)

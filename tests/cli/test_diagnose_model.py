@@ -106,6 +106,9 @@ def test_inputs_belong_to_a_model_file(run, tmp_path):
     assert found.exception.rule == "model-file"
 
 
+@pytest.mark.campaign(
+    "the document by the command: an answer's document is made and told in every run (tests/report/diagnosis)"
+)
 @pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")), reason="LibreOffice and poppler make the PDF"
 )

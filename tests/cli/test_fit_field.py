@@ -13,6 +13,9 @@ from toolkit.cli.main import run
 from toolkit.lab.tire_tests.tires import read_tire
 
 
+@pytest.mark.campaign(
+    "a whole belt test: its file, its sweeps and the fit of its rows are each held in every run (tests/tires)"
+)
 def test_a_belt_test_becomes_a_tire_file_with_intervals(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

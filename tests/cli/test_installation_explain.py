@@ -20,7 +20,7 @@ REFUSERS = {"_refuse", "refuse_cell", "problem"}
 def rules_in(module: Module) -> set[str]:
     """Return the constants given as ``rule=...``, or as the first argument of a function that refuses."""
     found = set()
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if not isinstance(node, ast.Call):
             continue
         named = [k.value for k in node.keywords if k.arg == "rule"]

@@ -207,6 +207,12 @@ def test_a_manifest_holds_its_files_and_is_proved_by_their_pdf(run: Run, home: P
     write(sealed)
     (tmp_path / "r.docx").write_bytes(word + b"!")
     assert run(tmp_path / "manifest.json")[0] == 2
+    for name in ("r.docx", "r.pdf"):  # lost, or of another name: which of them the answer says
+        manifest = write(sealed)
+        (tmp_path / name).rename(tmp_path / f"copy of {name}")
+        code, answer = run(manifest)
+        assert (code, answer["kind"]) == (2, "manifest")
+        assert answer["why"].startswith(f"{name}, which it lists, cannot be read")
     (tmp_path / "manifest.json").write_text('{"outputs": [{"name": "../x", "sha256": "0"}]}')
     assert run(tmp_path / "manifest.json")[0] == 2
 

@@ -71,7 +71,7 @@ def effects_named(modules: Sequence[Module]) -> list[Mention]:
 def _imports_effects(module: Module) -> bool:
     if "effects" not in module.text and "diagnosis" not in module.text:
         return False
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, ast.ImportFrom) and node.module:
             if node.module.startswith((f"{PACKAGE}.effects", f"{PACKAGE}.diagnosis")):
                 return True

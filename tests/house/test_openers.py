@@ -54,7 +54,7 @@ ALLOWED = {
 
 def openings(module: Module) -> list[tuple[str, str, int]]:
     """Return the calls of a module that open a file for reading: module, call, line."""
-    calls = [node for node in ast.walk(module.tree) if isinstance(node, ast.Call)]
+    calls = [node for node in module.nodes if isinstance(node, ast.Call)]
     return [(module.name, name, call.lineno) for call in calls if (name := _opening(call)) is not None]
 
 
@@ -111,7 +111,7 @@ def test_links_are_followed_by_one_function() -> None:
     others = [
         f"{module.name}:{node.lineno}"
         for module in read_package()
-        for node in ast.walk(module.tree)
+        for node in module.nodes
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
         and (node.func.attr == "realpath" or (node.func.attr == "resolve" and not node.args))
         and module.name != "toolkit.files"

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from toolkit.planning.criteria import CRITERIA, Criterion, criterion
 from toolkit.planning.exchange import (
     Alternatives,
     Points,
@@ -21,6 +20,7 @@ from toolkit.planning.exchange import (
     is_less,
     shrunk,
 )
+from toolkit.planning.row_exchange import CRITERIA, Criterion, criterion
 
 Losses = Callable[[Sequence[Points]], NDArray[np.float64]]
 

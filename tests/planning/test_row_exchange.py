@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from toolkit.planning.criteria import Criterion
-from toolkit.planning.row_exchange import Response, exchange, loss
+from toolkit.planning.row_exchange import Criterion, Response, exchange, loss
 
 
 def plain(columns: NDArray[np.float64]) -> Response:

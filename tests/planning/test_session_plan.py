@@ -11,9 +11,9 @@ import pytest
 from tests.planning.test_fixtures import made
 from toolkit.errors import ConfigError
 from toolkit.planning import session_search
-from toolkit.planning.criteria import Criterion
 from toolkit.planning.fixtures import FeasibleLoads
 from toolkit.planning.knowledge import Knowledge
+from toolkit.planning.row_exchange import Criterion
 from toolkit.planning.session_plan import SessionPlan, plan_session
 from toolkit.planning.session_search import Demand
 
@@ -89,6 +89,9 @@ def test_the_same_seed_gives_the_same_plan(
     assert again.outlook == fewest.outlook
 
 
+@pytest.mark.campaign(
+    "one more search: an uncertainty that cannot be had names the nearest plan in every run"
+)
 @pytest.mark.usefixtures("few_runs")
 def test_less_uncertainty_takes_more_loads(
     knowledge: Knowledge, feasible: FeasibleLoads, fewest: SessionPlan

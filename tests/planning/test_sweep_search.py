@@ -78,6 +78,9 @@ def test_two_speeds_within_the_limits_of_the_machine_where_nobody_states_a_delay
         assert stated.steer_rates_rad_s[0] - 1e-9 <= rate <= stated.steer_rates_rad_s[1] + 1e-9
 
 
+@pytest.mark.campaign(
+    "two more searches: sweeps at two speeds, where no delay is stated, are planned in every run"
+)
 def test_a_stated_delay_takes_one_speed_and_its_uncertainty_is_in_the_budget() -> None:
     sure = machine(delay=Delay(value_s=0.0, u_s=0.001, source="test"))
     choice = least("relaxation_length=40 mm", sure)

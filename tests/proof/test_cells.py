@@ -66,7 +66,6 @@ def test_an_unknown_effect_of_a_cell_is_an_error(scenario: Scenario) -> None:
         )
 
 
-@pytest.mark.campaign("a session by a process of its own: the same words enter one in every run")
 def test_the_public_command_finds_the_cells_of_the_session(tmp_path: Path) -> None:
     rng = np.random.default_rng(6)
     matrix = cell_cases.geometry(rng)

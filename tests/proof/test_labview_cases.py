@@ -73,6 +73,9 @@ def test_the_same_numbers_give_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a.xlsx").read_bytes() == (tmp_path / "b.xlsx").read_bytes()
 
 
+@pytest.mark.campaign(
+    "sessions entered twice over: that of a drawn case is entered in every run (test_cells)"
+)
 @pytest.mark.usefixtures("entered_here")
 def test_the_older_record_stands_in_the_registry_and_the_case_names_the_newer(tmp_path: Path) -> None:
     case = drawn("wrong_calibration")

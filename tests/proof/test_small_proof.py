@@ -46,8 +46,8 @@ def _answered(case: Path, out: Path, *, apart: bool) -> None:
     assert ended.value.code in (0, 1, None)
 
 
-EVERY_RUN = (1, 4, 5, 8)
-"""Of the cases, by their places, those of every run of the tests: a null, two large effects, a class."""
+EVERY_RUN = (1, 5, 8)
+"""Of the cases, by their places, those of every run of the tests: a null, a large effect, a class."""
 ALL = pytest.mark.campaign(
     "every case of the small proof: the other nulls, the slowest effect, and what no name is for"
 )
@@ -81,7 +81,7 @@ def test_the_small_proof_stays_above_its_floors(tmp_path: Path, places: Sequence
     # apart is not a wrong name.
     for bucket in ("null", "outside", "confounded"):
         assert [(j.case, j.reported) for j in rows_of.get(bucket, []) if j.false_name] == []
-    # Of three large effects two are named at least, and both where there are two.
-    assert sum(j.right for j in rows_of["single"]) >= 2, [
+    # Of three large effects two are named at least; where there is one, it is.
+    assert sum(j.right for j in rows_of["single"]) >= min(2, len(rows_of["single"])), [
         (j.case, j.truth, j.column) for j in rows_of["single"]
     ]

@@ -172,6 +172,17 @@ def test_marks_in_the_properties(read):
     assert read(workbook(), machine=load_machine("m15-virtual")).simulated
 
 
+def test_marks_outlive_a_program_that_sets_keywords_apart_by_blanks(read):
+    """LibreOffice Calc 7.4 saves the keywords ``a; b`` as ``a b``."""
+
+    def marked(words):
+        return packed(members(keywords=words))
+
+    assert read(marked("toolkit-recording machine=m15 simulated")).simulated
+    refused(read, marked("toolkit-output simulated"), UnreadableError, "own-output")
+    refused(read, marked("toolkit-recording machine=m15-virtual simulated"), RecordingError, "other-machine")
+
+
 def test_csv(read):
     for text in (CSV, CSV.replace(",", ";"), "\ufeff" + CSV, CSV.replace("\n", "\r\n"), "\n" + CSV + "\n\n"):
         recording = read(text.encode())

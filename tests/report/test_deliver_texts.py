@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from tests.report.alien_factory import text_box
 from tests.report.report_factory import make_record, make_result
-from tests.report.template_factory import make, p, tbl
+from tests.report.template_factory import make, p, run, sdt, tbl
 from toolkit.errors import RenderError
 from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, deliver
@@ -120,3 +121,18 @@ def test_what_is_printed_otherwise_is_no_loss(tmp_path: Path, names: tuple[str, 
 def test_a_glyph_of_another_font_within_a_line_is_found(tmp_path: Path, special: str) -> None:
     made = delivered(tmp_path, p("[{{tk:test.special}}] and more on the line"), special=special)
     assert all(check.ok or check.warning for check in made.checks)
+
+
+def test_the_lines_of_a_text_stay_lines(tmp_path: Path) -> None:
+    """LibreOffice 7.4 prints no line break of a control of plain text."""
+    controls = "".join(
+        f"<w:p>{sdt('tk:test.special', run('as typed'), plain)}</w:p>"
+        for plain in ("<w:text/>", '<w:text w:multiLine="1"/>')
+    )
+    made = delivered(tmp_path, p("{{tk:tire.size}}") + controls, special="1 Hill Road\nNorthtown")
+    text = subprocess.run(
+        ["pdftotext", "-layout", made.pdf, "-"], capture_output=True, text=True, check=True
+    ).stdout
+    lines = [" ".join(one.split()) for one in text.splitlines()]
+    assert lines.count("1 Hill Road") == 2
+    assert lines.count("Northtown") == 2

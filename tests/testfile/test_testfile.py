@@ -354,3 +354,30 @@ def test_a_file_saved_again_without_an_edit_is_read(tmp_path: Path, light: Path)
             copy.writestr(name, text)
     assert python_calamine.load_workbook(path).sheet_names[-1] == "test"
     assert read_test_file(path) == read_test_file(light)
+
+
+def test_a_program_that_rounds_numbers_is_told_as_what_it_is(tmp_path: Path, light: Path) -> None:
+    """LibreOffice Calc 7.4 writes 15 digits of a number, and TRUE as a formula, though nobody typed."""
+    path = tmp_path / "x.xlsx"
+    with zipfile.ZipFile(light) as old, zipfile.ZipFile(path, "w") as copy:
+        for name in old.namelist():
+            text = old.read(name).decode()
+            if name.startswith("xl/worksheets/sheet"):
+                text = re.sub(
+                    r'(t="n"[^>]*><v>)(-?[0-9.e+-]+)<', lambda m: f"{m[1]}{float(m[2]):.15g}<", text
+                )
+                text = re.sub(
+                    r't="b"([^>]*)><v>([01])<',
+                    lambda m: f't="b"{m[1]}><f aca="false">{("FALSE", "TRUE")[int(m[2])]}()</f><v>{m[2]}<',
+                    text,
+                )
+            copy.writestr(name, text)
+    with pytest.raises(RecordingError, match="15 digits") as caught:
+        read_test_file(path)
+    assert caught.value.rule == "test-file-changed"
+    assert "saved again" in caught.value.what
+    book = openpyxl.load_workbook(light)
+    book["reduced"]["F5"] = book["reduced"]["F5"].value * 1.001
+    book.save(tmp_path / "edited.xlsx")
+    with pytest.raises(RecordingError, match="changed after it was written"):
+        read_test_file(tmp_path / "edited.xlsx")

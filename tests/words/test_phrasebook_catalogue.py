@@ -29,7 +29,7 @@ def texts_of(template: Path) -> list[str]:
 def literals() -> Iterator[str]:
     """Yield every text that the code spells, with a hole for each value."""
     for module in read_package():
-        for node in ast.walk(module.tree):
+        for node in module.nodes:
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 yield node.value
             elif isinstance(node, ast.JoinedStr):

@@ -113,6 +113,7 @@ def test_the_pages_are_accessible_and_ask_no_other_host(browser: BrowserContext,
     page.close()
 
 
+@pytest.mark.campaign("a look in the browser: every number of a page is one of its command in every run")
 def test_a_value_is_told_with_U_under_the_pointer_and_by_the_keys(
     browser: BrowserContext, working: Served
 ) -> None:

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, Which, columns_of
-from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.screen import Screen, Signature, layout, screen_of
 from toolkit.audit.sides import statement
-from toolkit.audit.weigh import steps, weighed
+from toolkit.audit.weigh import impossible, inclinations, steps, weighed
 from toolkit.calibration.registry.clock import in_future
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding

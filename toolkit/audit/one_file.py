@@ -29,9 +29,8 @@ from toolkit.audit.model import (
     SkippedRecord,
     columns_of,
 )
-from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.structure import structure_findings
-from toolkit.audit.weigh import steps, weighed
+from toolkit.audit.weigh import impossible, inclinations, steps, weighed
 from toolkit.calibration.registry.clock import in_future
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs

@@ -4,7 +4,7 @@ Fy and Mz that no record gives from the cells beside them were computed in anoth
 changed since. Rows alone cannot say which: a sign turned in the equation and a sign turned in a column
 give the same numbers. What needs no record can, and each side is held against it:
 
-- what a tire can do (`toolkit.audit.quality`), for the recorded values and for the recomputed ones;
+- what a tire can do (`toolkit.audit.weigh`), for the recorded values and for the recomputed ones;
 - continuity: where the explanation changes in mid-block, load and slip angle stand still, so that whatever
   steps there was changed there;
 - the curve over load, which the blocks of sound rows make and the others must lie on;

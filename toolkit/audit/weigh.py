@@ -1,7 +1,11 @@
-"""A recording's own evidence about both sides of a disagreement, and what its rows show of continuity."""
+"""A recording's own evidence about both sides of a disagreement, and what its rows show of continuity.
+
+Its Fy and Mz, its own or corrected ones, are judged by what they claim of the tire: by physics alone.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
@@ -11,12 +15,62 @@ from toolkit.arrays import Array
 from toolkit.audit.candidates import by_columns, cannot_correct, turned_against
 from toolkit.audit.identify import recompute
 from toolkit.audit.model import Columns, Identification, Segment
-from toolkit.audit.quality import impossible, inclinations
 from toolkit.audit.sides import judge, sudden_step
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.findings import Finding
 from toolkit.recording.model import Recording
 from toolkit.reduction.blocks import Block
+from toolkit.reduction.physics import departures, of_sizes
+
+# Load [N], slip angle [rad], FY [N], MZ [N·m] of a load block; None or NaN where the file has none.
+BlockMeans = tuple[float, float | None, float | None, float | None]
+
+
+def inclinations(recording: Recording, blocks: Sequence[tuple[int, int]]) -> tuple[float, ...]:
+    """Return the mean inclination angle [rad] of each block, by first row and stop; 0 without it."""
+    if not recording.has("IA"):
+        return (0.0,) * len(blocks)
+    return tuple(float(np.mean(recording["IA"].si_of(slice(*block)))) for block in blocks)
+
+
+def impossible(
+    where: str, rows: Sequence[str], blocks: Sequence[BlockMeans], *, values: str, IA: Sequence[float]
+) -> tuple[Finding, ...]:
+    """Return what no tire can do among the load blocks of one file, as findings of level error.
+
+    Only sizes are judged: one file does not say which way its axes point and its drum turned.
+
+    Parameters
+    ----------
+    where : the file
+    rows : name of each block in it
+    blocks : their means
+    values : what the values are, such as ``stored Fy and Mz``
+    IA : their inclination angles (`inclinations`)
+    """
+    loaded = [
+        (name, block, lean)
+        for name, block, lean in zip(rows, blocks, IA, strict=True)
+        if block[0] > 0 and block[2] is not None
+    ]
+    if not loaded:
+        return ()
+    table = np.array(
+        [[math.nan if value is None else value for value in block] for _, block, _ in loaded],
+        dtype=np.float64,
+    )
+    FZ, SA, FY, MZ = table.T
+    broken = departures(
+        of_sizes(
+            [f"{where}, {name}" for name, _, _ in loaded],
+            FZ=FZ,
+            SA=SA,
+            FY=FY,
+            MZ=np.nan_to_num(MZ, nan=0.0),
+            IA=np.array([lean for _, _, lean in loaded]),
+        )
+    )
+    return tuple(departure.finding(level="error", of=values) for departure in broken)
 
 
 def weighed(

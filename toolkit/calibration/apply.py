@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import RecordError
 from toolkit.units import si_scale, unit
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 
 def apply_record(

@@ -28,8 +28,8 @@ from toolkit.characteristics.model import Characteristics, Point, Row
 from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.scatter import Scatter, scatter_of
 from toolkit.characteristics.shared_errors import SharedErrors, shared_errors_of
-from toolkit.characteristics.sweep_findings import sweep_findings
 from toolkit.characteristics.sweep_fit import fit_sweep
+from toolkit.characteristics.sweep_length import sweep_findings
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.errors import FitError
 from toolkit.findings import Finding

@@ -159,9 +159,8 @@ def standard(
 
     Example: toolkit calibration standard cell-r1 --standard iso376 --preloads 3
     """
-    from toolkit.calibration.control.standard import evaluate_record
     from toolkit.errors import ConfigError
-    from toolkit.lab.records.control_answer import evaluation_text
+    from toolkit.lab.records.control_answer import evaluate_record, evaluation_text
 
     if name not in ("e74", "iso376"):
         raise ConfigError(

@@ -62,7 +62,6 @@ def _register() -> None:
         machine,
         person,
         plan,
-        plan_runs,  # noqa: F401  its commands stand in the group of plans
         process,
         report,
         sign,

@@ -23,7 +23,7 @@ The largest force.
 >>> list(departures({"FY_N": "much"}, Peak))
 ["FY_N: 'much' is no number", 'at_rad: missing']
 
-An entry that repeats an object's attributes is filled from it: its keys stand in the declaration alone.
+An entry that repeats attributes of objects is filled from them: its keys stand in the declaration alone.
 
 >>> entry_of(Peak, object(), FY_N=4000.0, at_rad=None)
 {'FY_N': 4000.0, 'at_rad': None}
@@ -92,21 +92,22 @@ def extended(declared: type[T], source: object, /, **more: Any) -> T:
     return declared(**(held | more))
 
 
-def entry_of(declared: type[T], source: object, /, **stated: Any) -> T:
-    """Return an entry of an answer: its keys as attributes of the source, but for those that are stated.
+def entry_of(declared: type[T], /, *sources: object, **stated: Any) -> T:
+    """Return an entry of an answer: its keys as attributes of the first source that has them, or as stated.
 
     What stands inside is filled alike; dates and paths are texts where the declaration says so.
 
     Raises
     ------
     AttributeError
-        the source has no attribute for a key that every answer has
+        no source has an attribute for a key that every answer has
     TypeError
         something is stated that is not declared
     """
     entry, kind = dict(stated), cast("Any", declared)
     for key, held, required in _declared(kind):
-        if key not in entry and (required or hasattr(source, key)):
+        source = next((source for source in sources if hasattr(source, key)), None)
+        if key not in entry and (required or source is not None):
             entry[key] = _filled(getattr(source, key), held)
     if surplus := entry.keys() - {key for key, _, _ in _declared(kind)}:
         raise TypeError(f"{kind.__name__} declares no {', '.join(sorted(surplus))}")

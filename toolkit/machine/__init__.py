@@ -3,8 +3,7 @@
 from toolkit.machine.correction import Correction
 from toolkit.machine.definition import Column, Drum, Machine, TypeB, load_machine, machine_names, own_text
 from toolkit.machine.hub import Hub
-from toolkit.machine.protocol import Protocol, read_protocol
-from toolkit.machine.sweeping import Delay, Sweeping
+from toolkit.machine.protocol import Delay, Protocol, Sweeping, read_protocol
 
 __all__ = [
     "Column",

@@ -39,8 +39,7 @@ from toolkit.inputs import SETTINGS_FILE, is_regular, read_input
 from toolkit.machine.correction import Correction
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.machine.hub import Hub, Loading
-from toolkit.machine.protocol import Protocol
-from toolkit.machine.sweeping import Sweeping
+from toolkit.machine.protocol import Protocol, Sweeping
 from toolkit.units import unit
 
 Road = Literal["convex", "concave", "flat"]

@@ -1,15 +1,33 @@
-"""What a plan has to reach: expanded uncertainties of characteristics, each by its name in the catalogue."""
+"""What a plan of a test is asked for, as texts and as numbers, and how near a design comes to it.
+
+A demand is the largest expanded uncertainty of a characteristic, named as in the catalogue; people read it in
+the units in which their machine's protocol has the loads. A class of tires is a range of two factors, of
+cornering stiffness and of friction, on the tire of an earlier test. Its members are the corners of that range
+as similar tires (`expectation.EarlierTest.similar`), and the tire itself where the range holds it: what a
+plan reaches on each of them it reaches between them.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import by_name
+from toolkit.declared import Quantity
 from toolkit.errors import ConfigError, UnitError
 from toolkit.spelling import nearest
-from toolkit.units import unit
+from toolkit.units import from_si, in_both, si_scale, unit
+
+if TYPE_CHECKING:
+    from toolkit.characteristics.model import Row
+    from toolkit.estimate import Estimate
+    from toolkit.machine import Protocol
+    from toolkit.planning.expectation import EarlierTest
+
 
 PEAK = "peak"
 _FORM = re.compile(
@@ -122,4 +140,235 @@ def _wrong(what: str, got: str, expected: str, hint: str = "") -> ConfigError:
         what, where="--u", got=got, expected=expected,
         next_step=hint or "see 'toolkit plan test --help', and docs/characteristics.md for the names",
         rule="plan-demand",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reach:
+    """The uncertainty that a design has of one demand at one load, in the direction in which it is largest.
+
+    ``value``, ``u``, ``U`` [unit], ``dof``; ``limit`` is what was demanded; ``sources`` the budget; ``tire``
+    that of a class.
+    """
+
+    demand: Demand
+    load_N: float
+    rotation: str
+    SA_rad: float | None
+    value: float
+    u: float
+    U: float
+    dof: float
+    unit: str
+    limit: float
+    sources: tuple[tuple[str, float], ...]
+    tire: str = ""
+
+    @property
+    def ratio(self) -> float:
+        """U over what was demanded."""
+        return self.U / self.limit if self.limit > 0 else math.inf
+
+
+def is_of(row: Row, demand: Demand, load_N: float) -> bool:
+    """Tell whether a row is what a demand names, at the load of its curve [N]."""
+    if row.name != demand.characteristic or row.load_N != load_N:
+        return False
+    return demand.SA_rad is None or (row.SA_rad is not None and abs(row.SA_rad - demand.SA_rad) < 1e-9)
+
+
+def worst(demand: Demand, rows: Sequence[Row], load_N: float, otherwise: float) -> Reach | None:
+    """Return the row of a demand that is furthest from it; None where there is none.
+
+    Parameters
+    ----------
+    load_N : the nominal load
+    otherwise : the limit of a demand that states none
+    """
+    read = [(row, row.estimate) for row in rows if row.estimate is not None]
+    if demand.name == PEAK:
+        read = _peaks(read)
+    reaches = [
+        Reach(
+            demand=demand, load_N=load_N, rotation=row.rotation, SA_rad=row.SA_rad, value=estimate.value,
+            u=estimate.u, U=estimate.expanded()[0], dof=estimate.dof, unit=estimate.unit,
+            limit=otherwise if demand.open else demand.limit(estimate.value), sources=row.number.by_source(),
+        )
+        for row, estimate in read
+    ]  # fmt: skip
+    return max(reaches, key=lambda reach: (reach.ratio, reach.U), default=None)
+
+
+def _peaks(read: Sequence[tuple[Row, Estimate]]) -> list[tuple[Row, Estimate]]:
+    """Return of each direction and side of zero the row with the largest force."""
+    peaks: dict[tuple[str, bool], tuple[Row, Estimate]] = {}
+    for row, estimate in read:
+        key = (row.rotation, (row.SA_rad or 0.0) > 0)
+        if row.SA_rad and (key not in peaks or abs(estimate.value) > abs(peaks[key][1].value)):
+            peaks[key] = (row, estimate)
+    return list(peaks.values())
+
+
+_MOMENTS = {"lbf": "lbf*ft"}  # of a force's unit; N*m of any other
+_DEGREE = math.radians(1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintedUnits:
+    """Units of forces and moments; angles are in degrees, lengths in millimetres.
+
+    >>> units = PrintedUnits(force="lbf", moment="lbf*ft")
+    >>> units.shown(4448.2216, "N/rad")
+    (17.4532..., 'lbf/deg')
+    """
+
+    force: str = "N"
+    moment: str = "N*m"
+
+    def shown(self, value: float, unit: str) -> tuple[float, str]:
+        """Return an SI value as it is printed, with its unit."""
+        if unit == "m":
+            return 1e3 * value, "mm"
+        quantity, _, angle = unit.partition("/")
+        names = {"N": self.force, "N*m": self.moment, "rad": "deg"}
+        if quantity not in names or angle not in ("", "rad"):
+            return value, unit
+        size = value / _DEGREE if quantity == "rad" else float(from_si(value, names[quantity]))
+        if angle:
+            return size * _DEGREE, f"{names[quantity]}/deg"
+        return size, names[quantity]
+
+
+def units_of(protocol: Protocol) -> PrintedUnits:
+    """Return the units of a protocol: force as its loads are written."""
+    written = {load.unit for load in protocol.loads_N if isinstance(load, Quantity)}
+    force = written.pop() if len(written) == 1 else "N"
+    force = "lbf" if force == "lb" else force
+    return PrintedUnits(force=force, moment=_MOMENTS.get(force, "N*m"))
+
+
+def title_of(label: str) -> str:
+    """Return what a demand is called: its characteristic's title, with the slip angle of one at an angle.
+
+    >>> title_of("slope_cornering"), title_of("FY@8deg"), title_of("peak")
+    ('cornering stiffness, slope at 0 deg', 'lateral force at 8 deg', 'peak lateral force')
+    """
+    name, _, angle = label.partition("@")
+    if name == PEAK:
+        return f"peak {by_name()['FY'].term}"
+    declared = by_name()[name]
+    return f"{declared.term} at {angle.removesuffix('deg')} deg" if angle else declared.title
+
+
+FACTORS = ("stiffness", "friction")
+PASSENGER: Mapping[str, tuple[float, float]] = {"stiffness": (0.41, 1.11)}
+"""Radial passenger tires, on the published one (1003 N/deg at 3700 N, 27 % of the load a degree).
+
+Their cornering stiffness is 11 to 19 % of the load a degree, of low aspect ratio 25 to 30 % (Gillespie,
+Fundamentals of Vehicle Dynamics, SAE 1992, pp. 347-355, as the manual of McHenry's m-smac gives it).
+"""
+_SPREAD = re.compile(r"\s*(?P<name>\w+)\s*=\s*(?P<low>[\d.eE+-]+?)\s*\.\.\s*(?P<high>[\d.eE+-]+)\s*")
+_SMALLEST, _LARGEST = 0.1, 10.0
+
+
+def parse_spread(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the range of each factor, by its name.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-spread``: no such form or factor, a factor twice, a range that is empty or beyond 0.1 to 10
+
+    Examples
+    --------
+    >>> parse_spread(["stiffness=0.7..1.3"])
+    {'stiffness': (0.7, 1.3)}
+    """
+    spread: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        match = _SPREAD.fullmatch(text)
+        ends = (math.nan, math.nan) if match is None else (_number(match["low"]), _number(match["high"]))
+        if match is None or match["name"] not in FACTORS or match["name"] in spread:
+            raise _wrong_spread(text, f"{' or '.join(FACTORS)}, each once: stiffness=0.7..1.3")
+        if not _SMALLEST <= ends[0] <= ends[1] <= _LARGEST:
+            raise _wrong_spread(text, f"factors from {_SMALLEST:g} to {_LARGEST:g}, the smaller first")
+        spread[match["name"]] = ends
+    return spread
+
+
+def members(earlier: EarlierTest, spread: Mapping[str, tuple[float, float]]) -> tuple[EarlierTest, ...]:
+    """Return the earlier test of each member of a class, of the tire itself first; no spread: of it alone."""
+    ranges = [spread.get(name, (1.0, 1.0)) for name in FACTORS]
+    own = (1.0, 1.0)
+    corners = dict.fromkeys(itertools.product(*(dict.fromkeys(ends) for ends in ranges)))
+    if all(low <= 1.0 <= high for low, high in ranges):
+        corners = {own: None} | corners
+    return tuple(
+        earlier
+        if corner == own
+        else earlier.similar(
+            stiffness=corner[0], friction=corner[1], tire=f"{earlier.tire} with {_factors(corner)}"
+        )
+        for corner in corners
+    )
+
+
+def _factors(corner: Sequence[float]) -> str:
+    return " and ".join(
+        f"{size:g} of its {name}" for name, size in zip(FACTORS, corner, strict=True) if size != 1.0
+    )
+
+
+def _wrong_spread(got: str, expected: str) -> ConfigError:
+    return ConfigError(
+        "a spread cannot be read", where="--spread", got=got, expected=expected,
+        next_step="state how far tires of the class are from the earlier test's, as factors",
+        rule="plan-spread",
+    )  # fmt: skip
+
+
+_NEAR = 0.15  # a load that is asked for is the nominal one within this part of it
+
+
+def nominal_loads(texts: Sequence[str], known_N: Sequence[float]) -> tuple[float, ...]:
+    """Return the nominal loads that are asked for, of those that are known [N]; all by default.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-load``: one that cannot be read, or is none of them
+    """
+    if not texts:
+        return tuple(known_N)
+    loads = []
+    for text in texts:
+        asked = load_of(text)
+        nearest = min(known_N, key=lambda load: abs(load - asked))
+        if abs(nearest - asked) > _NEAR * nearest:
+            raise _wrong_load(text, in_both(list(known_N), "lbf", ".0f"))
+        loads.append(nearest)
+    return tuple(sorted(set(loads)))
+
+
+def load_of(text: str) -> float:
+    """Return a load [N] that a text states with its unit.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-load``
+    """
+    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(\S.*?)\s*", text)
+    if match is None:
+        raise _wrong_load(text, "a number with its unit: '833 lbf', '3700 N'")
+    try:
+        return float(match[1]) * si_scale(match[2], "force", where="--load")
+    except UnitError as error:
+        raise _wrong_load(text, "a force with its unit: '833 lbf', '3700 N'") from error
+
+
+def _wrong_load(actual: str, expected: str) -> ConfigError:
+    return ConfigError(
+        "a load cannot be planned", where="--load", got=actual, expected=expected,
+        next_step="name a load that the earlier test measured, or another test", rule="plan-load",
     )  # fmt: skip

@@ -13,11 +13,12 @@ import dataclasses
 import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.channels import ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.characteristics.characterise import rows_of
 from toolkit.characteristics.characteristic import Characteristic
@@ -26,21 +27,15 @@ from toolkit.characteristics.model import Row
 from toolkit.characteristics.scatter import Scatter, scatter_of
 from toolkit.characteristics.shared_errors import SharedErrors, shared_errors_of
 from toolkit.errors import ConfigError
+from toolkit.machine import Machine
+from toolkit.pipeline import TestResult
 from toolkit.planning.demands import PEAK, Demand
 from toolkit.planning.design import Design
 from toolkit.reduction.common_load import slopes
 from toolkit.reduction.model import Condition
 from toolkit.simulation.tire import TireTruth, revolution_time_s
 from toolkit.tires.evaluate import estimate_at, slope_estimate_at, value_at
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine
-    from toolkit.pipeline import TestResult
-    from toolkit.tires.model import CurveFit
-
+from toolkit.tires.model import CurveFit
 
 _NEAR_ZERO_RAD = float(np.radians(2.5))
 

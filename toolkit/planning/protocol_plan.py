@@ -12,12 +12,10 @@ from typing import Annotated, Any
 from toolkit.channels import Rotation
 from toolkit.declared import Entry, toml_text
 from toolkit.machine import Machine, Protocol
-from toolkit.planning.demands import Demand
+from toolkit.planning.demands import Demand, PrintedUnits, Reach, units_of
 from toolkit.planning.design import Design, ordered, standard
 from toolkit.planning.expectation import EarlierTest
-from toolkit.planning.printed_units import PrintedUnits, units_of
 from toolkit.planning.protocol_search import Judged, ProtocolSearch, Question, least_plan, shared_loads
-from toolkit.planning.reach import Reach
 from toolkit.planning.sweep_plan import (
     TO_LOAD_S,
     PlannedSweeps,

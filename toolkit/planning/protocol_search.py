@@ -14,26 +14,22 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.characteristics.catalogue import by_name
 from toolkit.errors import ConfigError
-from toolkit.planning.demands import Demand
+from toolkit.planning.demands import Demand, Reach, is_of, worst
 from toolkit.planning.design import Design, Pace, steps_of
 from toolkit.planning.exchange import Points, PointSearch
-from toolkit.planning.reach import Reach, is_of, worst
+from toolkit.planning.expectation import EarlierTest
 from toolkit.planning.screen import Screen, criterion, openness, screen_of
 from toolkit.planning.tread import Exposure, Tread
 from toolkit.tires.fit import MIN_POINTS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.planning.expectation import EarlierTest
 
 # A curve that a report prints is measured to its peak, or to the end of the range: within this part of it.
 _PEAK_SHARE = 0.99

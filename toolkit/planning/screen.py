@@ -18,25 +18,20 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.arrays import Array
 from toolkit.channels import ROTATIONS
 from toolkit.characteristics.catalogue import by_name
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction, DirectionFit
 from toolkit.characteristics.reading import Reader
+from toolkit.planning.demands import Reach
 from toolkit.planning.design import Design
+from toolkit.planning.expectation import EarlierTest
+from toolkit.tires.model import CurveFit
 from toolkit.tires.models import model
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.planning.expectation import EarlierTest
-    from toolkit.planning.reach import Reach
-    from toolkit.tires.model import CurveFit
-
 
 _OWN = ("repeatability", "fit", "slip angle scatter")  # of the budget, what follows the design
 _STEP = 1e-4  # of a parameter's size

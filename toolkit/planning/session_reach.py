@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.errors import ConfigError
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 AS_READ = 0.02
 """Of the largest load: what loads of one weight differ by as they are read, and not as they are meant."""

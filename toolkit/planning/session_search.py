@@ -15,10 +15,9 @@ from toolkit.calibration.fit.findings import FEW_POINTS
 from toolkit.calibration.session.table import Table
 from toolkit.errors import ConfigError
 from toolkit.planning.check_loads import choose_check_loads
-from toolkit.planning.criteria import Criterion
 from toolkit.planning.fixtures import FeasibleLoads
 from toolkit.planning.knowledge import RANK_TOLERANCE, Knowledge
-from toolkit.planning.row_exchange import Price, Response, Span, exchange, loss
+from toolkit.planning.row_exchange import Criterion, Price, Response, Span, exchange, loss
 from toolkit.planning.session_reach import AS_READ, reach_of, refuse_beyond, stated_loads
 
 FEWEST_RUNS, MOST_RUNS = 3, 10

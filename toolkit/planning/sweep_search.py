@@ -23,13 +23,12 @@ from toolkit.characteristics.sweep_fit import Lag, SweepFit, forms_of
 from toolkit.characteristics.sweep_length import relaxation_length
 from toolkit.effects.filters import lag
 from toolkit.errors import ConfigError
-from toolkit.planning.reach import Reach
+from toolkit.planning.demands import Demand, Reach
 from toolkit.reduction.sweep import Sweep
 
 if TYPE_CHECKING:
     from toolkit.channels import Rotation
     from toolkit.machine import Machine, Sweeping
-    from toolkit.planning.demands import Demand
     from toolkit.planning.expectation import EarlierTest
 
 RELAXATION = "relaxation_length"

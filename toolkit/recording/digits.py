@@ -18,19 +18,14 @@ not tell: as printed digits they are rounded as far.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from decimal import Decimal
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.arrays import Array
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from toolkit.recording.model import Series
+from toolkit.recording.model import Series
 
 FULL_DIGITS = 15
 _FEW = 6

@@ -13,7 +13,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from toolkit.errors import OutputError
+from toolkit.errors import OutputError, UnreadableError
 from toolkit.inputs import RECORDING_FILE, read_regular
 from toolkit.recording.archive import read_members
 from toolkit.recording.sniff import sniff
@@ -35,6 +35,7 @@ STAMP = dt.datetime(2000, 1, 1, tzinfo=dt.UTC)
 
 _HEAD = 4096
 _KEYWORDS = re.compile(rb"<(?:\w+:)?keywords[^<>]{0,500}>([^<]{0,4000})<")
+_BETWEEN = re.compile(r"[;,\s]+")
 
 _MODIFIED = re.compile(rb"<(?:\w+:)?modified[^<>]{0,200}>([0-9]{4}-[0-9]{2}-[0-9]{2})")
 
@@ -70,10 +71,15 @@ def keywords_of(core_xml: bytes) -> tuple[str, ...]:
 
     >>> keywords_of(b"<cp:keywords>toolkit-recording; simulated</cp:keywords>")
     ('toolkit-recording', 'simulated')
+
+    LibreOffice Calc sets them apart by blanks when it saves a file again:
+
+    >>> keywords_of(b"<cp:keywords>toolkit-recording simulated</cp:keywords>")
+    ('toolkit-recording', 'simulated')
     """
     match = _KEYWORDS.search(core_xml)
     text = match.group(1).decode("utf-8", "replace") if match else ""
-    return tuple(word.strip() for word in text.split(";") if word.strip())
+    return tuple(word for word in _BETWEEN.split(text) if word)
 
 
 def saved_on(core_xml: bytes) -> dt.date | None:
@@ -191,8 +197,6 @@ def _core_keywords(data: bytes) -> tuple[str, ...]:
 
 
 def _core(data: bytes) -> bytes:
-    from toolkit.errors import UnreadableError
-
     if sniff(data).id != "zip":
         return b""
     try:

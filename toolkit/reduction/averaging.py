@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.arrays import Array
+from toolkit.machine import Machine
+from toolkit.recording.model import Recording
 from toolkit.reduction.blocks import Block
-
-if TYPE_CHECKING:
-    from toolkit.machine import Machine
-    from toolkit.recording.model import Recording
 
 # Effective rolling radius over free radius of a radial passenger tire: 0.96 to 0.98.
 ROLLING_RATIO = 0.97

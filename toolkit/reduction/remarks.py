@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.channels import CHANNELS
 from toolkit.findings import Finding
-from toolkit.reduction.conditions import CONDITIONS, condition_finding, condition_of, farthest
+from toolkit.reduction.limits import CONDITIONS, condition_finding, condition_of, farthest
 from toolkit.units import from_si, in_both, unit
 
 if TYPE_CHECKING:

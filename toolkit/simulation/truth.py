@@ -21,7 +21,7 @@ from toolkit.simulation.run import VirtualTest
 from toolkit.simulation.steady import Answer, settled
 from toolkit.simulation.steps import Motion
 from toolkit.simulation.tire import TireTruth, forces, pseudo_camber
-from toolkit.tires.slopes import limit_slope
+from toolkit.tires.evaluate import limit_slope
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

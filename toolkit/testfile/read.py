@@ -91,6 +91,16 @@ def _read(path: Path) -> TestResult:
         raise _broken(path, f"{type(error).__name__}: {error}", "the layout of a reduced test") from error
     hashes = [_cells(book, tables)] if items["schema"] == SCHEMA else list(_hashes(result))
     if formulas or str(items[DIGEST]) not in hashes:
+        if _rounded(tables):
+            raise RecordingError(
+                "the reduced test was saved again by a program that rounds numbers",
+                where=path,
+                got=f"no number of more than {_KEPT} digits, as LibreOffice Calc saves them",
+                expected=f"the file as it was written, {str(items[DIGEST])[:16]}...",
+                next_step="use the file that 'toolkit process' wrote, or process the recordings again: "
+                "whether anything else was changed, nobody can tell",
+                rule="test-file-changed",
+            )
         raise RecordingError(
             "the reduced test was changed after it was written",
             where=path,
@@ -100,6 +110,16 @@ def _read(path: Path) -> TestResult:
             rule="test-file-changed",
         )
     return result
+
+
+_KEPT = 15
+"""Significant digits that LibreOffice Calc saves of a number; a double has up to 17."""
+
+
+def _rounded(tables: dict[str, list[list[Any]]]) -> bool:
+    """Tell whether no number of a workbook has more digits than a program keeps that rounds them."""
+    cells = (cell for rows in tables.values() for row in rows for cell in row)
+    return all(float(f"{cell:.{_KEPT}g}") == cell for cell in cells if isinstance(cell, float))
 
 
 def _cells(book: Any, tables: dict[str, list[list[Any]]]) -> str:

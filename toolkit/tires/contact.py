@@ -6,18 +6,14 @@ gives FY < 0 and MZ > 0. The coordinate ``u`` along the patch runs from +1 at th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from toolkit.arrays import Array
+from toolkit.tires.global_model import Rows
 from toolkit.tires.recorded import as_array
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from toolkit.tires.global_model import Rows
-
 
 _LOCKED = 1e-6  # 1 + KAPPA of a wheel that stands still: all slides, in the direction of the velocity
 _ANGLE = np.deg2rad(89.0)

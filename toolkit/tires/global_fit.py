@@ -17,6 +17,7 @@ from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.between_loads import Between
+from toolkit.tires.evaluate import stiffness
 from toolkit.tires.global_data import CHANNELS, Measured, binned, cell, what_varies
 from toolkit.tires.global_model import (
     GlobalFit,
@@ -31,7 +32,6 @@ from toolkit.tires.global_seeds import LACKS, seeds_of, why_not_global
 from toolkit.tires.global_stage import StageFit, Task, refit, run
 from toolkit.tires.model import LOSSES, Loss, Parameter
 from toolkit.tires.quality import scatter_floor_percent
-from toolkit.tires.slopes import stiffness
 
 _NEAR = np.radians(3.0)  # rows must come as near to SA = 0 for a slope there
 _SLIP = frozenset({"kappa", "both_kappas", "alpha_and_kappa"})

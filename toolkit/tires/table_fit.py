@@ -11,8 +11,7 @@ from toolkit.arrays import Array
 from toolkit.channels import Axes, channel_of, signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
-from toolkit.reduction.conditions import CONDITIONS, condition_finding, farthest
-from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
+from toolkit.reduction.limits import CONDITIONS, LARGEST_TRAIL_M, LEAST_LOAD_N, condition_finding, farthest
 from toolkit.reduction.physics import departures, of_sizes
 from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.evaluate import slope_estimate_at, value_at

@@ -12,8 +12,7 @@ from collections.abc import Iterator, Mapping
 
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
-from toolkit.reduction.conditions import CONDITIONS
-from toolkit.reduction.limits import FRICTION, LEAST_LOAD_N, STIFFNESS
+from toolkit.reduction.limits import CONDITIONS, FRICTION, LEAST_LOAD_N, STIFFNESS
 from toolkit.tires.plausibility import LARGEST
 from toolkit.tires.slip import readers
 from toolkit.tires.tir import TirFile, factors, si_number

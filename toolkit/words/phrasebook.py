@@ -149,8 +149,7 @@ class Phrasebook:
         return self._parts(core) if spoken is None else spoken
 
     def _phrase(self, text: str) -> str | None:
-        sentence = self._whole.get(text)
-        if sentence is not None:
+        if (sentence := self._whole.get(text)) is not None:
             return sentence
         for pattern, translation in self._places:
             match = pattern.fullmatch(text)

@@ -104,6 +104,7 @@ def test_a_history_of_results_without_those_withdrawn(used: Registry, tmp_path: 
     assert [one.date.year for one in as_found_history(used, "cell")] == [2024, 2026]
 
 
+@pytest.mark.campaign("sessions of years: what was found by one session is told in every run")
 def test_the_record_of_each_session_is_that_of_the_whole_ledger(used: Registry, tmp_path: Path) -> None:
     # By the rule's words, approval for approval: the newest first day, the last entry among equals, known
     # before later told, nothing void, nothing of the session's own day or later.

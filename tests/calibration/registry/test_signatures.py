@@ -18,13 +18,13 @@ from toolkit.calibration.records.use import signature_of
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.clock import day_of, now
-from toolkit.calibration.registry.issuing import issuers
 from toolkit.calibration.registry.ledger import START, head_bytes, next_line
 from toolkit.calibration.registry.people_log import enrol, place_of
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.lab.home import packaged_home
+from toolkit.lab.signatures.issuing import issuers
 from toolkit.lab.signatures.proofs import registry_ledger
 from toolkit.lab.signatures.verification import verify_file
 from toolkit.trust.keys import Signer

@@ -14,7 +14,6 @@ import pytest
 from tests.calibration.control_factory import enter
 from tests.calibration.standards.test_e74 import GOLDEN, LBF, PONTIUS, RUN
 from tests.conftest import SHARED_DATA
-from toolkit.calibration.control.standard import evaluate_record
 from toolkit.calibration.fit.session_fit import fit_session
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
@@ -23,6 +22,7 @@ from toolkit.calibration.standards.e74 import E74Result
 from toolkit.calibration.standards.evaluation import Evaluation, evaluate_source, evaluations, source_of
 from toolkit.calibration.standards.iso376 import Iso376Result
 from toolkit.errors import ConfigError, SessionError
+from toolkit.lab.records.control_answer import evaluate_record
 
 FORCES = tuple(1000.0 * i for i in range(1, 11))
 MOUNTINGS = ((1, 0.0), (2, 0.0), (3, 120.0), (4, 240.0))

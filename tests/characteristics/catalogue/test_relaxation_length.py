@@ -14,7 +14,7 @@ from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.model import Characteristics, Row
 from toolkit.characteristics.sweep_fit import SweepFit
 from toolkit.characteristics.sweep_length import relaxation_length, speeds_of, weights_of
-from toolkit.machine.sweeping import Delay, Sweeping
+from toolkit.machine.protocol import Delay, Sweeping
 from toolkit.reduction.sweep import Sweep
 
 STATED = dataclasses.replace(

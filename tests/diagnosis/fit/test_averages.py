@@ -170,12 +170,10 @@ def test_rows_without_a_clock_are_never_averaged(tmp_path: Path) -> None:
     assert rows_of(case_of(tmp_path / "uneven", *uneven)) == 1
 
 
-SMOOTHED = pytest.mark.campaign(
-    "a gear that shifts all the time, which is smoothed first: once holds in every run"
+@pytest.mark.campaign(
+    "whole diagnoses by a gear that is looked up: what steps is never averaged in every run"
 )
-
-
-@pytest.mark.parametrize("shifts", ["once", pytest.param("all the time", marks=SMOOTHED)])
+@pytest.mark.parametrize("shifts", ["once", "all the time"])
 def test_a_simulator_that_takes_its_inputs_for_numbers_is_given_them(tmp_path: Path, shifts: str) -> None:
     """A gear that is looked up has no mean: where it has no noise it is none of what is smoothed.
 

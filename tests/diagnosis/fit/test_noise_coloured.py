@@ -123,3 +123,37 @@ def test_drawn_noise_is_stationary_from_its_first_value_and_white_after_whitenin
         np.testing.assert_allclose(series.std(axis=1), noise.marginal_sd, rtol=0.03)
         white = whiten(series, where, noise)
         np.testing.assert_allclose(white @ white.T / 20_000, np.eye(42), atol=0.04)
+
+
+def _segmented(seed: int):
+    """Return a series of an autoregression in segments of 1 to 39 values, each from its own beginning."""
+    rng = np.random.default_rng(seed)
+    lengths = [*range(1, 40), *rng.integers(1, 40, 60).tolist()]
+    times = np.concatenate([np.arange(n) + 100.0 * i for i, n in enumerate(lengths)])
+    where = layout([times], [np.ones(len(times), dtype=bool)])
+    return np.concatenate([_series(rng, 0.8, n) for n in lengths]), where
+
+
+def test_the_colour_of_many_segments_is_that_of_the_recursion_in_each_of_them():
+    values, where = _segmented(4)
+    made = fit_noise(values, where, floor=1e-9)
+    forward = backward = [values[segment] for segment in where.segments if segment.stop - segment.start >= 24]
+    for reflection in made.reflection:  # Burg (1975): the harmonic mean of both predictions' errors
+        forward, backward = [f[1:] for f in forward], [b[:-1] for b in backward]
+        pairs = list(zip(forward, backward, strict=True))
+        k = 2 * sum(f @ b for f, b in pairs) / sum(f @ f + b @ b for f, b in pairs)
+        assert reflection == pytest.approx(k, rel=1e-10)
+        forward, backward = [f - k * b for f, b in pairs], [b - k * f for f, b in pairs]
+    assert made.reflection[0] == pytest.approx(0.8, abs=0.1)
+
+
+@pytest.mark.parametrize("order", [1, 2, 8])
+def test_segments_are_whitened_as_each_is_alone(order):
+    values, where = _segmented(5)
+    noise = Autoregression(reflection=tuple(0.9 * (-0.8) ** k for k in range(order)), sd=0.7)
+    both = np.stack([values, values[::-1]], axis=1)
+    alone = [whiten(both[s], _one(s.stop - s.start), noise) for s in where.segments]
+    np.testing.assert_allclose(whiten(both, where, noise), np.concatenate(alone), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(
+        whiten(values, where, noise), np.concatenate(alone)[:, 0], rtol=1e-10, atol=1e-12
+    )

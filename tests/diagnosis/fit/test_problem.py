@@ -14,7 +14,7 @@ RAMP = np.interp(T % 5.0, [0.0, 2.4, 2.5, 4.9, 5.0], [0.0, 8.0, 0.0, -8.0, 0.0])
 
 def problem_of(residual):
     run = Run(name="r", t=T, columns={"SA": RAMP}, conditions={}, declared={}, simulated={})
-    case = SimpleNamespace(drivers=(SimpleNamespace(name="SA", role="input"),))
+    case = SimpleNamespace(drivers=(SimpleNamespace(name="SA", role="input"),), has_order=True)
     whole = np.ones(len(T), dtype=bool)
     return Problem(
         case=case, model=None, runs=(run,), free=(), known={}, observed={"FY": residual}, kept={"FY": whole},
@@ -37,3 +37,48 @@ def test_what_answers_a_sharp_move_is_no_outlier(noise):
     sharp = np.flatnonzero(np.abs(np.diff(RAMP)) > 3)
     noise[sharp] += 40.0
     assert without_outliers(problem_of(noise), {"FY": noise}).kept["FY"].all()
+
+
+def readings_of(residuals, loads):
+    """Loadings of a table without an order: each run has the same loads, (runs, loads)."""
+    runs = tuple(
+        Run(
+            name=f"r{k}",
+            t=np.arange(len(loads)),
+            columns={"p": loads},
+            conditions={},
+            declared={},
+            simulated={},
+        )
+        for k in range(len(residuals))
+    )
+    observed = np.concatenate(residuals)
+    case = SimpleNamespace(drivers=(SimpleNamespace(name="p", role="input"),), has_order=False)
+    slices = tuple(slice(k * len(loads), (k + 1) * len(loads)) for k in range(len(residuals)))
+    return Problem(
+        case=case, model=None, runs=runs, free=(), known={}, observed={"U": observed},
+        kept={"U": np.ones(len(observed), dtype=bool)}, floor={"U": 1e-6}, slices=slices,
+    )  # fmt: skip
+
+
+LOADS = np.array([5.0, 10, 15, 35, 55, 75, 95, 105, 125, 145, 165, 175])
+
+
+def test_a_reading_is_far_off_beside_the_readings_at_its_own_inputs():
+    """Nine loadings of a transducer: a run of twelve rows has no scatter of its own, all of them have."""
+    residuals = np.random.default_rng(5).normal(size=(9, len(LOADS)))
+    residuals[4] *= 0.02  # quieter by chance than the others: its last reading lies in the middle of theirs
+    residuals[4, -1] = -1.0
+    residuals[2, [4, 11]] = 60.0, -28.0  # two misreadings in one run are no pattern of the table
+    problem = readings_of(residuals, LOADS)
+    kept = without_outliers(problem, {"U": np.concatenate(residuals)}).kept["U"]
+    assert np.flatnonzero(~kept).tolist() == [28, 35]
+
+
+def test_short_runs_of_readings_have_a_scatter_together():
+    """Runs of six readings: none is long enough for itself."""
+    residuals = np.random.default_rng(6).normal(size=(8, 6))
+    residuals[3, 2] = -40.0
+    problem = readings_of(residuals, LOADS[:6])
+    kept = without_outliers(problem, {"U": np.concatenate(residuals)}).kept["U"]
+    assert np.flatnonzero(~kept).tolist() == [20]

@@ -43,6 +43,7 @@ def case(folder, *hertz, filters):
     return read_case(write_case(folder, CASE + TWO, simulator=SPRING, **frames))
 
 
+@pytest.mark.campaign("the converse of a delay at two rates, which has its name in every run")
 def test_a_filter_at_one_rate_is_no_delay_alone(tmp_path):
     made = diagnose(case(tmp_path, 0.4, filters=True), None).diagnosis
     (one,) = made.effects

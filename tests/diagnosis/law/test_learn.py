@@ -195,6 +195,7 @@ def test_a_tone_without_a_phase_of_its_own_predicts_nothing(learned):
     assert values["phase"] is None
 
 
+@pytest.mark.campaign("a whole search of nothing: noise has no law in every run (test_unseen_runs)")
 def test_of_noise_no_law_is_learned(tmp_path):
     answer = diagnosed(tmp_path, lambda r, _: r.F)
     assert answer["verdict"] == "nothing"

@@ -15,8 +15,6 @@ from tests.diagnosis.law.test_learn import estimates, run
 from toolkit.declared import json_value
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.search import search
-from toolkit.diagnosis.search.candidates import candidates
 
 SIMULATOR = """
 import numpy as np
@@ -146,20 +144,8 @@ def test_a_law_of_an_input_and_a_state_is_learned(tmp_path):
     assert fit["refitted_rmse"] > 0.02
 
 
-EVERY = pytest.mark.campaign(
-    "every effect of the catalogue beside the law: in every run the one that imitates it"
-)
-
-
-@pytest.mark.parametrize("every", [False, pytest.param(True, marks=EVERY)])
-def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path, monkeypatch, every):
+def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path):
     # A wrong sensitivity of the force takes most of its square's answer, and the law takes all of it.
-    if not every:
-        monkeypatch.setattr(
-            search,
-            "candidates",
-            lambda problem: [each for each in candidates(problem) if each.name == "sensitivity_error"],
-        )
     answer = _diagnosed(tmp_path, HIDDEN["a force that grows with its square"])
     assert (answer["verdict"], answer["effects"]) == ("unknown", [])
     (law,) = answer["laws"]

@@ -105,6 +105,9 @@ def fitted_step(tmp_path_factory):
     return problem, base, view, two, hold_out(problem, folds_of(problem, base), (), base)
 
 
+@pytest.mark.campaign(
+    "a look at all effects and two joint fits: of equals the likeliest is taken in every run"
+)
 @pytest.mark.parametrize(("noise_alone", "place"), [(True, 0), (False, 1)])
 def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_before_the_better_fit(
     fitted_step, monkeypatch, noise_alone, place

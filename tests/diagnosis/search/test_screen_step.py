@@ -1,17 +1,20 @@
 """What a look sees from where: a refit without an effect may have gone where it no longer helps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from tests.diagnosis.case_text import case_text
-from tests.diagnosis.cases import write_case
+from tests.diagnosis.cases import CELL, cell_case, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search import screen_step
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.screen_step import from_declared, look
+from toolkit.diagnosis.search.screen_step import from_declared, look, masked
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.effect import Effect
 
@@ -78,3 +81,17 @@ def test_an_unsigned_sensor_is_named(tmp_path):
     answer = diagnose(speeds(tmp_path, unsigned=True), None).diagnosis
     assert [effect.name for effect in answer.effects] == ["rectification"]
     assert answer.fit.held_out[0].augmented_rmse < 0.03
+
+
+def test_no_twin_of_what_a_refit_masks_is_left_out(tmp_path, monkeypatch):
+    """F = gain L: an error of the sensitivity and a leak of L into F are one response, with one gain."""
+    rng = np.random.default_rng(1)
+    L = rng.permutation(np.linspace(-90.0, 90.0, 60))
+    frame = pd.DataFrame({"t": np.arange(60) * 1.0, "L": L, "F": 0.95 * L + rng.normal(0, 0.5, 60)})
+    text = cell_case(0.005) + '[[recording.run]]\nfile = "r0.csv"\n'
+    case = read_case(write_case(tmp_path, text, simulator=CELL, r0__csv=frame, r1__csv=None))
+    problem = problem_of(case, model_of(case, None, None))
+    twins = [each for each in candidates(problem) if each.name in ("crosstalk", "sensitivity_error")]
+    monkeypatch.setattr(screen_step, "PRIORS", replace(screen_step.PRIORS, masked=1))
+    names = {key[0] for key in masked(problem, fit(problem), twins)}
+    assert names == {"crosstalk", "sensitivity_error"}

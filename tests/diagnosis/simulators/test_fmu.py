@@ -145,6 +145,7 @@ def test_uneven_rows_are_refused_where_the_unit_takes_one_step(tmp_path: Path) -
         model_of(case, None).simulate(case.runs[0], {"mass": 95.0, "c": 200.0}, ())
 
 
+@pytest.mark.campaign("a whole diagnosis by a unit: what it simulates is held in every run")
 def test_friction_that_the_unit_leaves_out_is_named(tmp_path: Path) -> None:
     # The recordings have 20 N of dry friction; the unit has none.
     answer = diagnose(read_case(case_of(tmp_path)), None).diagnosis

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.simulators import integrate as integration
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
 
 TIGHT = 1e-9
@@ -26,29 +25,6 @@ def test_a_stiff_equation_is_handed_on_and_still_right():
     )
     exact = (rate**2 * np.cos(t) + rate * np.sin(t)) / (rate**2 + 1)
     np.testing.assert_allclose(made[0, 5:], exact[5:], atol=1e-4)
-
-
-def test_what_is_stiff_for_a_while_is_tried_ever_more_seldom_and_is_right_before_and_after(monkeypatch):
-    tried = []
-
-    def advance(rate, at, *others):
-        tried.append(at)
-        return explicit(rate, at, *others)
-
-    explicit = integration._advance
-    monkeypatch.setattr(integration, "_advance", advance)
-
-    def followed(at, x):
-        # It follows x = sin(t), whatever the rate by which it does.
-        return np.array([np.cos(at) - (1e6 if 1 < at < 6 else 1.0) * (x[0] - np.sin(at))])
-
-    t = np.arange(201) * 0.05
-    x = integrate(followed, t, np.array([0.0]), np.full(1, TIGHT))[0]
-    # A global error is the local tolerance times the number of steps.
-    np.testing.assert_allclose(x, np.sin(t), atol=len(t) * integration.RTOL)
-    stiff = [i for i, at in enumerate(t) if at in tried and 0.99 < at < 5.99]
-    assert np.diff(stiff).tolist() == [2, 4, 8, 16, 32]
-    assert set(t[150:200]) < set(tried)  # and no more when it is over
 
 
 def test_a_ramp_input_is_integrated_to_its_kink():

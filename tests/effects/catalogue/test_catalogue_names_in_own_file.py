@@ -32,7 +32,7 @@ OTHER_MEANINGS = {
     ),
     "lab/plans/plan_session.py": ({"creep"}, "as in the planning"),
     "lab/plans/protocol_plan.py": (PULL, "what a test is planned for"),
-    "cli/plan_runs.py": ({"conicity"}, "examples of what a test is planned for"),
+    "cli/plan.py": ({"conicity"}, "examples of what a test is planned for"),
     "simulation/plan_file.py": (
         PULL,
         "the tire's own pull, by the keys of [tire], and an example of --effect",

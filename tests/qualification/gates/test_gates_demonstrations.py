@@ -31,7 +31,7 @@ NO_GATE = {
     "record-id": "a text that is no id",
     "not-writable": "a folder without write permission",
     "instrument-case": "a name that some file systems take for another's",
-    "ledger-moved": "a decision while a document is issued: tests/calibration/registry/test_issuing.py",
+    "ledger-moved": "a decision while a document is issued: tests/lab/signatures/test_issuing.py",
     "not-signed": "a decision without a key where people are: tests/calibration/registry/test_signatures.py",
     "not-allowed": "people who may not decide: tests/calibration/registry/test_signatures.py",
     "people-log": "a forged log of people: tests/calibration/registry/test_signatures.py",

@@ -215,7 +215,7 @@ def test_no_module_writes_html_by_string():
     for module in [*read_package(), read_module(PROOF / "page.py")]:
         texts = [
             node.value
-            for node in ast.walk(module.tree)
+            for node in module.nodes
             if isinstance(node, ast.Constant) and isinstance(node.value, str)
         ]
         assert not [text for text in texts if tag.search(text)], module.path

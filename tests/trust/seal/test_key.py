@@ -12,7 +12,9 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from tests.trust.seal.authority import make_authority, to_pem, to_pkcs12
 from tests.trust.seal.seal_factory import DAY, NOW, authority, key
 from toolkit.errors import TrustError
-from toolkit.trust.seal.key import open_key
+from toolkit.lab.signatures.sealing import open_sealing
+from toolkit.trust.seal.key import SealKey, open_key
+from toolkit.trust.seal.x509 import Trust
 
 
 def _never(_key: Path) -> str:
@@ -70,6 +72,36 @@ def test_a_certificate_that_is_not_valid_today_does_not_seal(
     with pytest.raises(TrustError) as caught:
         open_key(path, ask=_never)
     assert caught.value.rule == "seal-certificate"
+
+
+def test_a_certificate_that_the_home_knows_to_be_revoked_does_not_seal(tmp_path: Path) -> None:
+    signer = authority().issue("Tire laboratory")
+    lists = (authority().revoke(signer, on=NOW - DAY),)
+    path = _written(tmp_path, to_pem(signer))
+    for roots in ((authority().certificate,), ()):  # a list counts beside its issuer, and without
+        with pytest.raises(TrustError, match="was revoked on") as caught:
+            open_key(path, ask=_never, trust=Trust(certificates=roots, revocations=lists))
+        assert caught.value.rule == "seal-certificate"
+    assert open_key(path, ask=_never, trust=Trust(certificates=(authority().certificate,)))
+
+
+def test_a_certificate_below_one_that_was_revoked_does_not_seal(tmp_path: Path) -> None:
+    between = make_authority("Between", above=authority())
+    signer = between.issue("Tire laboratory")
+    lists = (authority().revoke(SealKey(private=None, certificate=between.certificate), on=NOW - DAY),)
+    known = Trust(certificates=(authority().certificate,), revocations=lists)
+    with pytest.raises(TrustError, match="Between was revoked on"):
+        open_key(_written(tmp_path, to_pem(signer)), ask=_never, trust=known)
+
+
+def test_the_revocation_list_of_a_home_is_asked_before_anything_is_sealed(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    (home / "trust" / "certificates").mkdir(parents=True)
+    signer = authority().issue("Tire laboratory")
+    listed = authority().revoke(signer, on=NOW - DAY).public_bytes(Encoding.PEM)
+    (home / "trust" / "certificates" / "lists.crl").write_bytes(listed)
+    with pytest.raises(TrustError, match="was revoked on"):
+        open_sealing(_written(tmp_path, to_pem(signer)), home, ask=_never)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ None of them changes the fit. Recommendations of another model are notes.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -18,11 +18,12 @@ from toolkit.calibration.fit.diagnostics import lack_of_fit, load_levels, loadin
 from toolkit.calibration.fit.printed_digits import copies, own_scatter
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import contradicting, deviating
-from toolkit.calibration.fit.run_scale import RunScale, run_scales
 from toolkit.calibration.fit.scatter_findings import (
+    RunScale,
     difference_findings,
     method_findings,
     run_findings,
+    run_scales,
     scatter_findings,
     stated_findings,
 )
@@ -30,16 +31,12 @@ from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, fit_sess
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.fit.statement_findings import statement_findings
 from toolkit.calibration.session.known_errors import undeclared_standard
+from toolkit.calibration.session.read import Session
 from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
+from toolkit.calibration.session.table import Table
 from toolkit.errors import SessionError
 from toolkit.findings import Finding
 from toolkit.recording.hidden import hidden_findings
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from toolkit.calibration.session.read import Session
-    from toolkit.calibration.session.table import Table
 
 FEW_POINTS = 30
 REPEATED = 0.1

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.arrays import Array
 from toolkit.calibration.fit.adequacy import check_adequate
@@ -15,7 +15,6 @@ from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.printed_digits import rounding_alone
-from toolkit.calibration.fit.reading_steps import with_steps
 from toolkit.calibration.fit.regression import (
     Factor,
     TermFit,
@@ -24,21 +23,17 @@ from toolkit.calibration.fit.regression import (
     fit_terms,
     raw_coefficients,
 )
-from toolkit.calibration.fit.rounding import Rounding
+from toolkit.calibration.fit.rounding import Rounding, with_steps
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.fit.session_scatter import FittedRows, scatter_of_rows
 from toolkit.calibration.records.record import ROUNDING
 from toolkit.calibration.records.scatter import RunScatter
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
+from toolkit.calibration.session.read import LoadSetting, Session
 from toolkit.calibration.session.settings import wrong
 from toolkit.calibration.session.statements import Statements, parse_statements
 from toolkit.calibration.terms import term_matrix
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.session.read import LoadSetting, Session
 
 # Generalised least squares: reference loads that share errors, with a known covariance.
 

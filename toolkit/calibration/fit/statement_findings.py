@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.arrays import Array
 from toolkit.calibration.fit.printed_digits import own_scatter
 from toolkit.calibration.fit.session_fit import SessionFit, session_statements
+from toolkit.calibration.session.read import CellSetting
+from toolkit.calibration.session.table import Table
 from toolkit.findings import Finding
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.session.read import CellSetting
-    from toolkit.calibration.session.table import Table
 
 FIRST_YEAR = 1938  # of bonded strain gauges (Simmons, Ruge)
 _OFF_STEP = 0.02  # of a resolution: what the conversion of units may move a reading

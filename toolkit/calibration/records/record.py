@@ -38,7 +38,7 @@ class Indication:
 
     ``column_unit`` is the unit of the stored data where they were converted to ``unit`` by the cell's
     excitation or scale (`session.bridge`); None: the data are in ``unit``. ``step`` is the step of the
-    readings, in ``unit``, that counts as the resolution where none is stated (`fit.reading_steps`).
+    readings, in ``unit``, that counts as the resolution where none is stated (`fit.rounding`).
     """
 
     name: str

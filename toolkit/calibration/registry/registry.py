@@ -15,10 +15,9 @@ from pathlib import Path
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry import settled
 from toolkit.calibration.registry.clock import day_of, now, today
-from toolkit.calibration.registry.conformity import check_conforms
+from toolkit.calibration.registry.conformity import check_conforms, load_reproduced
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, decisions
 from toolkit.calibration.registry.life import check_line, misplaced
-from toolkit.calibration.registry.loading import load_reproduced
 from toolkit.calibration.registry.people_log import FOLDER, PeopleLog, instruments_of, read_people
 from toolkit.calibration.registry.signatures import revoked, signature_line, unproved
 from toolkit.calibration.registry.status import RecordStatus, status_of

@@ -12,15 +12,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
 from toolkit.calibration.terms import evaluate, parse_term, term_matrix
 from toolkit.units import unit
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
 
 MAIN = 0.1  # of the largest load: an indication that moves a load by more is one of its main ones
 _TOLERANCE = 1e-3  # of the largest load, where none is stated

@@ -54,7 +54,7 @@ class CellSetting:
     """One indication: the unit of the fit, serial number, and resolution in that unit (None: not stated).
 
     ``column_unit`` is the unit in the file where it was converted (`bridge`), None where it is ``unit``;
-    ``step`` what the fit finds in the readings where none is stated (`fit.reading_steps`).
+    ``step`` what the fit finds in the readings where none is stated (`fit.rounding`).
     """
 
     name: str

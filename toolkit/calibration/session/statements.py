@@ -141,7 +141,7 @@ class Reference:
 class CellStatement:
     """One indication. ``resolution`` and ``u`` (standard) in its unit, as stated.
 
-    ``found``: the resolution is not stated, it is the step that the readings show (`fit.reading_steps`).
+    ``found``: the resolution is not stated, it is the step that the readings show (`fit.rounding`).
     ``span_per_K`` [1/K] and ``zero_per_K`` [unit/K] are its temperature coefficients, None where not stated.
     ``column_unit`` is the unit of the stored data.
     """

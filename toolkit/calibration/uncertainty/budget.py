@@ -15,22 +15,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.session.statements import statements_of
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
 from toolkit.calibration.uncertainty.model import Budget, Temperature
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 from toolkit.errors import SessionError
 from toolkit.estimate import coverage_factor, effective_dof
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.session.table import Table
 
 PROBABILITY = 0.95
 

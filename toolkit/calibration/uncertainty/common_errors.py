@@ -72,9 +72,8 @@ def indication_errors(record: CalibrationRecord, statements: Statements) -> tupl
 
 def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[float]) -> Array:
     """Return d load / d indication (indications,) at a point, by central differences."""
-    steps = np.array(
-        [_STEP * _extent(cell.minimum, cell.maximum, x) for cell, x in zip(record.cells, point, strict=True)]
-    )
+    sizes = [(abs(cell.minimum or 0.0), abs(cell.maximum or 0.0)) for cell in record.cells]
+    steps = _STEP * np.array([max(*ends, abs(x)) or 1.0 for ends, x in zip(sizes, point, strict=True)])
     at = np.asarray(point, dtype=np.float64)[:, None]
     moved = np.hstack([at + np.diag(steps), at - np.diag(steps)])
     values = term_matrix(load.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
@@ -147,10 +146,6 @@ def _middle(record: CalibrationRecord) -> tuple[float, ...]:
     return tuple(((cell.minimum or 0.0) + (cell.maximum or 0.0)) / 2 for cell in record.cells)
 
 
-def _extent(low: float | None, high: float | None, x: float) -> float:
-    return max(abs(low or 0.0), abs(high or 0.0), abs(x)) or 1.0
-
-
 def record_covariance(record: CalibrationRecord) -> dict[str, Array]:
     """Return load -> covariance of its coefficients (terms, terms), with what the session stated.
 
@@ -186,8 +181,7 @@ def offset_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -
     tared = left_at_zero(record, load) / math.sqrt(3.0)
     if not any(stated) and isinstance(drift, str):
         return tared
-    middle = [((c.minimum or 0.0) + (c.maximum or 0.0)) / 2 for c in record.cells]
-    slope = sensitivities(record, load, middle)
+    slope = sensitivities(record, load, _middle(record))
     moved = 0.0 if isinstance(drift, str) else float(slope @ np.asarray(drift)) / math.sqrt(3.0)
     return math.hypot(tared, float(np.linalg.norm(slope * np.asarray(stated))), moved)
 

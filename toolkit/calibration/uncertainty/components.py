@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.records.scatter import UNTOLD
 from toolkit.calibration.session.known_errors import row_uncertainty
+from toolkit.calibration.session.statements import Statements
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.common_errors import (
     creep,
@@ -21,11 +23,6 @@ from toolkit.calibration.uncertainty.common_errors import (
 )
 from toolkit.calibration.uncertainty.model import Component, Distribution, Evaluation, Temperature
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
-
-if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.session.statements import Statements
-    from toolkit.calibration.session.table import Table
 
 ROOT3 = math.sqrt(3.0)
 _READING = np.array([1.0, 0.0, 0.0, 0.0])

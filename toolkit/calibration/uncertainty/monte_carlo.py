@@ -15,30 +15,26 @@ adaptive: batches until twice the standard deviation of the mean of y, u(y) and 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
 from toolkit.arrays import Array
+from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.session.statements import statements_of
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
-from toolkit.calibration.uncertainty.common_errors import indication_errors
+from toolkit.calibration.uncertainty.common_errors import IndicationError, indication_errors
+from toolkit.calibration.uncertainty.model import Budget, Component
 from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.declared import Entry, derived
 from toolkit.errors import SessionError
 from toolkit.estimate import last_place
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.session.table import Table
-    from toolkit.calibration.uncertainty.common_errors import IndicationError
-    from toolkit.calibration.uncertainty.model import Budget, Component
-
-    Draw = Callable[[np.random.Generator, int], Array]
-    Refit = Callable[[np.random.Generator, int, Array], Array]
+Draw = Callable[[np.random.Generator, int], Array]
+Refit = Callable[[np.random.Generator, int, Array], Array]
 
 BATCH = 20_000
 MOST_BATCHES = 500

@@ -9,8 +9,8 @@ alone would give them.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,15 +20,11 @@ from toolkit.calibration.fit.rounding import rounding_of
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.run_scatter import estimate, spread
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.records.scatter import UNTOLD, UNTOLD_DOF, Rows, RunScatter
 from toolkit.calibration.session.statements import statements_of
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.session.table import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

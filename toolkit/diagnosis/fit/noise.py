@@ -138,20 +138,25 @@ def fit_noise(
     best, best_score = 0, math.log(max(variance, 1e-300))
     usable = _telling(where)
     if usable:
-        forward = [residual[segment].copy() for segment in usable]
-        backward = [residual[segment].copy() for segment in usable]
+        # One segment behind the other, as a recording may have hundreds: what a segment's first values would
+        # take from the one before is none.
+        lengths = np.array([segment.stop - segment.start for segment in usable])
+        starts = np.cumsum(lengths) - lengths
+        forward = backward = np.concatenate([residual[segment] for segment in usable])
         innovation = variance
         for order in range(1, NOISE.orders + 1):
-            top = bottom = 0.0
-            for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
-                forward[i], backward[i] = f[1:], b[:-1]
-                top += float(forward[i] @ backward[i])
-                bottom += float(forward[i] @ forward[i]) + float(backward[i] @ backward[i])
-            if bottom <= 0 or sum(map(len, forward)) < NOISE.fewest - order:
+            forward, backward = forward[1:], backward[:-1]
+            if len(starts) > 1:
+                forward, backward = forward.copy(), backward.copy()
+                before, first = starts - order, starts - 1
+                backward[before[before >= 0]] = 0.0
+                forward[first[(first >= 0) & (first < len(forward))]] = 0.0
+            top = float(forward @ backward)
+            bottom = float(forward @ forward) + float(backward @ backward)
+            if bottom <= 0 or int(np.maximum(lengths - order, 0).sum()) < NOISE.fewest - order:
                 break
             k = max(min(2 * top / bottom, 0.9999), -0.9999)
-            for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
-                forward[i], backward[i] = f - k * b, b - k * f
+            forward, backward = forward - k * backward, backward - k * forward
             reflection.append(k)
             innovation *= 1 - k * k
             score = math.log(max(innovation, 1e-300)) + order * math.log(n) / n
@@ -199,16 +204,15 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) ->
     early = _early(noise)
     starts = np.array([segment.start for segment in where.segments], dtype=np.intp)
     rows = np.array([segment.stop for segment in where.segments], dtype=np.intp) - starts
-    # A recording with a gap in every day has hundreds of segments: the first two orders, whose products have
-    # one term at most, are taken of all at once.
-    for k in range(min(p, 2)):
-        at = starts[rows > k] + k
-        past = orders[k][0] * values[at - 1] if k else 0.0
-        innovations[at] = (values[at] - past) * early[k]
-    for start, count in zip(starts.tolist(), rows.tolist(), strict=True):
-        for k in range(2, min(p, count)):
-            past = orders[k] @ values[start : start + k][::-1]
-            innovations[start + k] = (values[start + k] - past) * early[k]
+    # A recording with a gap in every day has hundreds of segments: the first values of all are taken at once.
+    lower = np.diag(early)
+    for k in range(1, p):
+        lower[k, :k] = -early[k] * orders[k][::-1]
+    within = np.arange(p)
+    at, there = starts[:, None] + within, within < rows[:, None]
+    columns = values if values.ndim > 1 else values[:, None]
+    first = (lower @ columns[np.minimum(at, len(values) - 1)])[there]
+    innovations[at[there]] = first if values.ndim > 1 else first[:, 0]
     return innovations / noise.sd
 
 

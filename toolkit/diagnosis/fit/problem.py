@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -245,8 +245,9 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
     counted = {}
     for name, r in residual.items():
         good = problem.kept[name].copy()
-        for rows in problem.slices:
-            places = np.flatnonzero(good[rows]) + rows.start
+        for order, beside in _neighbours(problem):
+            counting = good[order]
+            places = order[counting]
             if len(places) < ROWS.fewest_for_outliers:
                 continue
             values = r[places]
@@ -254,13 +255,26 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
             scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
             far = np.abs(away) > ROWS.isolated * max(scale, steps, 1e-300)
-            beside = _moved_sharply(problem, rows)[places - rows.start]
-            if _answers(beside, far):
-                far &= ~beside
+            if _answers(beside[counting], far):
+                far &= ~beside[counting]
             if 0 < far.sum() <= max(1, ROWS.outliers * len(places)):
                 good[places[far]] = False
         counted[name] = good
     return replace(problem, kept=counted)
+
+
+def _neighbours(problem: Problem) -> Iterator[tuple[NDArray[np.intp], NDArray[np.bool_]]]:
+    """Give rows as neighbours of each other, and which of them stand beside a sharp move of an input.
+
+    Of time they are those of a run. Readings without an order are neighbours in their inputs, of whatever
+    run: repeats of a load are what a reading at that load is far off, and they follow no move.
+    """
+    if not problem.case.has_order:
+        order = np.lexsort(problem.drivers[::-1])
+        yield order, np.zeros(len(order), dtype=bool)
+        return
+    for rows in problem.slices:
+        yield np.arange(rows.start, rows.stop), _moved_sharply(problem, rows)
 
 
 def _answers(beside: NDArray[np.bool_], far: NDArray[np.bool_]) -> bool:

@@ -46,7 +46,7 @@ def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
         n = int(problem.kept[output].sum())
         listed: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
         most = int(n / STRUCTURE.rows_per_column)
-        for name, x in [*variables, (output, base.simulated[output])]:
+        for name, x in [*variables, (output, filled(base.simulated[output]))]:
             columns = _spline(x, most)
             if columns is not None:
                 listed.append(((name,), columns))
@@ -63,6 +63,16 @@ def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
             if columns.shape[1] * STRUCTURE.rows_per_column <= n:
                 dependences.append(SmoothDependence(output=output, variables=names, columns=columns))
     return dependences
+
+
+def filled(simulated: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a simulated output with a value in every row, the mean where it has none.
+
+    What acts on recorded readings leaves a simulation open where these were not recorded: rows that no
+    output has either.
+    """
+    known = np.isfinite(simulated)
+    return simulated if known.all() else np.where(known, simulated, np.mean(simulated[known]))
 
 
 def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.fit.structure import filled
 from toolkit.diagnosis.law.shapes import (
     MODE,
     ONE,
@@ -203,7 +204,7 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
                 with_rate(channel.name, channel.name, values, channel.unit)
                 if timed and is_speed(channel.unit):
                     listed.append(_way(problem, channel.name, channel.unit, values))
-    with_rate(ITSELF, output, base.simulated[output], channel_unit(case, problem.model, output))
+    with_rate(ITSELF, output, filled(base.simulated[output]), channel_unit(case, problem.model, output))
     if timed:
         times = np.concatenate([run.t for run in problem.runs])
         listed.append(Signal(written="[time]", name="time", unit="s", values=times, steady=False))

@@ -12,7 +12,7 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, noise_of
 from toolkit.diagnosis.fit.noise import log_likelihood
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.policy import PRIORS, SCREENING, STEP
+from toolkit.diagnosis.policy import PRIORS, SCREENING, STEP, VERDICT
 from toolkit.diagnosis.search.candidates import CandidateEffect
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
 from toolkit.effects.applied import EffectKey
@@ -215,4 +215,8 @@ def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -
     screen = LinearisedFit.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
     screen.prepare(candidates)
     ranked = best_of([score for candidate in candidates for score in screen.score(candidate)])
-    return frozenset(trial.candidate.key for trial in ranked[: PRIORS.masked])
+    if not ranked:
+        return frozenset()
+    # The last of them takes along what says the same: none is left out by its place among equals.
+    least = ranked[: PRIORS.masked][-1].gain - VERDICT.close
+    return frozenset(trial.candidate.key for trial in ranked if trial.gain >= least)

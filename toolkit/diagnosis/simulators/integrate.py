@@ -2,8 +2,7 @@
 
 Inputs are linear between rows, so that the equation is smooth within an interval and has a kink at each row:
 steps end on rows, and no step ever looks across one. The rate itself has no jump there: that of a step's end
-is that of the next one's beginning. What was stiff between two rows is mostly stiff between the next two, and
-is given to LSODA at once there, for ever more rows.
+is that of the next one's beginning.
 
 Source: Dormand, Prince, J. Comp. Appl. Math. 6 (1980) 19.
 """
@@ -29,7 +28,6 @@ OFF = 1e100  # in no unit is a state of any plant as large
 _HUGE = 1e300
 SLOW = 100.0  # tolerances of a velocity, by which a body is at its turn
 MANY = 60  # steps within one interval: the equation is stiff there
-_LONGEST = 6  # stiff intervals in turn: the next 63 are taken for stiff before one is tried again
 TURNING = 240  # the same where bristles slide: each body that turns takes a run of short steps
 
 # The tableau, row by row: C, A; the fifth order's weights B; what they are off the fourth order's, E.
@@ -79,15 +77,8 @@ def integrate(
         raise IntegrationError(wrong_rates(rates, start.size))
     _check_numbers(float(t[0]), start, rates)
     absolute, k = atol.tolist(), rates.tolist()
-    stiff = waiting = 0  # intervals that were stiff in turn, and those taken for stiff as they were
     for i in range(len(t) - 1):
-        at = float(t[i])
-        if waiting:
-            waiting -= 1
-        else:
-            x, k, step, at = _advance(rate, at, float(t[i + 1]), x, k, absolute, step, slides)
-            stiff = min(stiff + 1, _LONGEST) if at < t[i + 1] and not slides else 0
-            waiting = 2**stiff - 1
+        x, k, step, at = _advance(rate, float(t[i]), float(t[i + 1]), x, k, absolute, step, slides)
         if at < t[i + 1]:
             x = _stiff(rate, at, float(t[i + 1]), x, atol)
             k = rate(float(t[i + 1]), x).tolist()

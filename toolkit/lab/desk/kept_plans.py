@@ -89,7 +89,7 @@ def read_plan(folder: Path) -> KeptPlan:
 
 def titles_of(kept: KeptPlan) -> dict[str, str]:
     """Return what the characteristics of a test's plan are called, by the names of its demands."""
-    from toolkit.planning.printed_units import title_of
+    from toolkit.planning.demands import title_of
 
     return {value["name"]: title_of(value["name"]) for value in kept.answer.get("values", ())}
 

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
     from toolkit.findings import Finding
-    from toolkit.planning.criteria import Criterion
     from toolkit.planning.fixtures import FeasibleLoads
+    from toolkit.planning.row_exchange import Criterion
     from toolkit.report.word.package import Template
 
 

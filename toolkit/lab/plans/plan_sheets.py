@@ -11,7 +11,7 @@ from toolkit.declared import Entry
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import DeliveredDocument, Timing
 from toolkit.lab.home import PLAN
-from toolkit.planning.printed_units import PrintedUnits, title_of
+from toolkit.planning.demands import PrintedUnits, title_of
 from toolkit.planning.sweep_plan import sweep_lines
 from toolkit.report.content import Curve, Plot
 from toolkit.report.plan.content import Expected, PlanSheet, Step

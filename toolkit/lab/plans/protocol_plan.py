@@ -17,15 +17,13 @@ from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.findings import FindingEntry
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
-from toolkit.lab.plans.planned_loads import load_of, nominal_loads
 from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
+from toolkit.planning.demands import Demand, PrintedUnits, load_of, nominal_loads
 from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
-    from toolkit.planning.demands import Demand
     from toolkit.planning.expectation import EarlierTest
-    from toolkit.planning.printed_units import PrintedUnits
     from toolkit.report.word.package import Template
     from toolkit.simulation.plan import Plan
 
@@ -86,11 +84,9 @@ def plan_test(
     from datetime import date
 
     from toolkit.lab.plans.plan_sheets import protocol_sheet, sheet_text, write_plan
-    from toolkit.planning.demands import parse_demand
-    from toolkit.planning.printed_units import units_of
+    from toolkit.planning.demands import parse_demand, parse_spread, units_of
     from toolkit.planning.protocol_plan import plan_protocol
     from toolkit.planning.protocol_search import shared_loads
-    from toolkit.planning.tire_class import parse_spread
     from toolkit.planning.tread import Tread
 
     spread = parse_spread(order.spread)
@@ -151,8 +147,8 @@ def _tires(
     order: ProtocolOrder, spread: Mapping[str, tuple[float, float]]
 ) -> tuple[tuple[EarlierTest, ...], str, Path | None]:
     """Return the earlier test of each tire of the class, what they are called, and the first's tire file."""
+    from toolkit.planning.demands import PASSENGER, members
     from toolkit.planning.protocol_search import shared_loads
-    from toolkit.planning.tire_class import PASSENGER, members
 
     known = [_earlier(order, like) for like in order.like or (None,)]
     if not order.like and not order.spread:
@@ -385,7 +381,7 @@ def plan_text(plan: ProtocolPlan, files: Mapping[str, str], units: PrintedUnits)
     """Return a plan for people: what to measure, what it reaches, what it rests on and gives up."""
     from toolkit.estimate import plus_minus, round_uncertainty
     from toolkit.lab.answers import table
-    from toolkit.planning.printed_units import title_of
+    from toolkit.planning.demands import title_of
 
     own, design, several = plan.protocol, plan.plan, len(plan.tires) > 1
 

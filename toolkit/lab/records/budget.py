@@ -200,24 +200,15 @@ def _not_validated(record: CalibrationRecord, budget: Budget, result: MonteCarlo
 def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarloCheck | None) -> LoadBudget:
     from toolkit.estimate import round_uncertainty
 
-    return {
-        "unit": budget.unit,
-        "value": budget.at,
-        "indications": list(budget.indications),
-        "components": [
+    return entry_of(
+        LoadBudget, budget,
+        value=budget.at, U_rounded=round_uncertainty(budget.U), monte_carlo=result,
+        components=[
             entry_of(BudgetComponent, component, share=budget.share(component))
             for component in budget.components
         ],
-        "u": budget.u,
-        "dof": budget.dof,
-        "k": budget.k,
-        "U": budget.U,
-        "U_rounded": round_uncertainty(budget.U),
-        "probability": budget.probability,
-        "not_stated": list(budget.not_stated),
-        "range": [{"value": point.at, "u": point.u, "k": point.k, "U": point.U} for point in curve],
-        "monte_carlo": result,
-    }  # fmt: skip
+        range=[entry_of(RangePoint, point, value=point.at) for point in curve],
+    )  # fmt: skip
 
 
 def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarloCheck | None) -> list[str]:

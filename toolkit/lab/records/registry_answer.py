@@ -261,14 +261,9 @@ def history(ledger: Ledger, instrument: str, name: str) -> tuple[HistoryAnswer, 
 
 
 def _event(entry: LedgerEntry) -> Event:
-    event: Event = {
-        "seq": entry.seq, "id": entry.id, "event": entry.event, "time": entry.time, "by": entry.by,
-        "approved_by": entry.approved_by, "known_on": _iso(entry.known_on), "since": _iso(entry.since),
-        "reason": entry.reason, "note": entry.note, "recall": entry.recall,
-        "unverifiable": list(entry.unverifiable), "evidence": list(entry.evidence), "sha256": entry.sha256,
-    }  # fmt: skip
-    if entry.clock:
-        event["clock"] = entry.clock
+    event = entry_of(Event, entry)
+    if not entry.clock:
+        del event["clock"]
     if entry.signatures:
         event["signed_by"] = [row["by"] for row in entry.signatures]
     return event
@@ -318,10 +313,6 @@ def _plainly(value: object) -> object:
     return "; ".join(map(str, value)) if isinstance(value, list) else value
 
 
-def _iso(day: dt.date | None) -> str | None:
-    return None if day is None else day.isoformat()
-
-
 def void_day(status: RecordStatus) -> str | None:
     """Return the first day on which a record is void; None without one."""
     # A record that was never in force is void from the beginning of time: no date to print.
@@ -332,25 +323,9 @@ def void_day(status: RecordStatus) -> str | None:
 
 def record_row(record: CalibrationRecord, status: RecordStatus, signature: str) -> RecordRow:
     """Return a record and what its ledger tells of it, as one row of the list."""
-    return {
-        "id": record.id,
-        "instrument": record.instrument,
-        "sha256": record.sha256,
-        "status": status.state,
-        "verified": record.verified,
-        "date": record.date,
-        "in_force_from": _iso(status.in_force_from),
-        "void_from": void_day(status),
-        "void_always": status.void_always,
-        "entered_by": status.entered_by,
-        "checked_by": status.checked_by,
-        "approved_by": status.approved_by,
-        "reason": status.reason,
-        "unverifiable": list(status.unverifiable),
-        "recall": status.recall,
-        "approved_later": _iso(status.approved_later),
-        "signature": signature,
-    }
+    return entry_of(
+        RecordRow, status, record, status=status.state, void_from=void_day(status), signature=signature
+    )
 
 
 def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent, list[str]]:

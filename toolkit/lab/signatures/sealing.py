@@ -59,7 +59,7 @@ def open_sealing(
     Raises
     ------
     TrustError
-        the key cannot be used
+        the key cannot be used, or a file among the trusted certificates holds none
     ConfigError
         ``usage``: a draft is never sealed, a time stamp never stands alone
     """
@@ -78,7 +78,8 @@ def open_sealing(
             "a draft is never sealed", where="--draft, --seal", got="both", expected="one of the two",
             next_step="approve the record first, or leave out --seal; nothing was made", rule="usage",
         )  # fmt: skip
-    key = open_key(path, ask=ask, chain=home / TRUST / "laboratory.pem", home=home)
+    folder = home / TRUST
+    key = open_key(path, ask=ask, chain=folder / "laboratory.pem", home=home, trust=trusted(folder))
     return Sealing(key=key, stamps=stamps)
 
 

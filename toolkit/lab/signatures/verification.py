@@ -266,10 +266,14 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
             raise _unreadable(path, "an output without name and sha256") from error
         if Path(name).name != name:
             raise _unreadable(path, f"an output outside its folder: {name}")
-        if (actual := sha256_bytes(_content(path.parent / name))) != digest:
-            return Verdict(
-                file=str(path), kind="manifest", why=f"{name} was changed: its hash is {actual[:12]}"
-            )
+        try:
+            actual = sha256_bytes(_content(path.parent / name))
+        except TrustError as error:
+            why = f"{name}, which it lists, cannot be read beside it: {error.got}"
+            return Verdict(file=str(path), kind="manifest", why=why)
+        if actual != digest:
+            why = f"{name} was changed: its hash is {actual[:12]}"
+            return Verdict(file=str(path), kind="manifest", why=why)
         hashes[name] = digest
     for name in hashes:
         if not name.lower().endswith(".pdf"):

@@ -219,22 +219,14 @@ def _entry(entry: Entry) -> ComparedEntry:
 
 def _difference(difference: Difference) -> DifferenceEntry:
     base = difference.reference.value
-    return {
-        "table": difference.part,
-        "quantity": difference.name,
-        "rotation": difference.rotation,
-        "SA_rad": difference.SA_rad,
-        "load_N": difference.load_N,
-        "label": difference.label,
-        "reference": estimate_keys(difference.reference),
-        "other": estimate_keys(difference.other),
-        "difference": estimate_keys(difference.difference),
-        "difference_percent": 100 * difference.difference.value / abs(base) if base else None,
-        "standard_uncertainty_if_nothing_were_shared": difference.u_apart,
-        "p": difference.p,
-        "p_holm": difference.p_holm,
-        "significant": difference.significant,
-    }
+    return entry_of(
+        DifferenceEntry, difference,
+        table=difference.part, quantity=difference.name,
+        reference=estimate_keys(difference.reference), other=estimate_keys(difference.other),
+        difference=estimate_keys(difference.difference),
+        difference_percent=100 * difference.difference.value / abs(base) if base else None,
+        standard_uncertainty_if_nothing_were_shared=difference.u_apart,
+    )  # fmt: skip
 
 
 def _repeats(repeats: Repeats) -> RepeatsEntry:

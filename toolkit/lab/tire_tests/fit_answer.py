@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+from typing import Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import UsedRecord
+from toolkit.declared.answers import entry_of
 from toolkit.estimate import Estimate, plus_minus
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import Timing, draft_keys, findings_text, mark_words, signature_words, table
+from toolkit.lab.tire_tests.fit_models import Fitted
+from toolkit.tires.comparison import Comparison
+from toolkit.tires.global_model import GlobalFit
+from toolkit.tires.model import CurveFit
+from toolkit.tires.sweeps import Sweeps
 from toolkit.tires.table_fit import slope_sign
 from toolkit.units import printed
-
-if TYPE_CHECKING:
-    from toolkit.lab.tire_tests.fit_models import Fitted
-    from toolkit.tires.comparison import Comparison
-    from toolkit.tires.global_model import GlobalFit
-    from toolkit.tires.model import CurveFit
-    from toolkit.tires.sweeps import Sweeps
 
 
 class Slope(TypedDict):
@@ -205,53 +204,27 @@ def curve_payload(fit: CurveFit, rotation: str | None = None) -> CurveEntry:
 
 def global_payload(fit: GlobalFit) -> SurfaceEntry:
     """Return a channel of a model over all loads; the contract's keys, and what is said of each load."""
-    loads: list[LoadFit] = [
-        {
-            "load_N": load.load_N,
-            "n": load.n,
-            "error_percent": load.error_percent,
-            "prediction_error_percent": load.prediction_error_percent,
-            "stiffness": _estimate(load.stiffness, fit),
-        }
-        for load in fit.loads
-    ]
-    return {
+    return entry_of(
+        SurfaceEntry,
+        fit,
         **_common(fit, None),
-        "units": {p.name: p.unit for p in fit.parameters},
-        "parameter_axes": fit.parameter_axes,
-        "nominal_load_N": fit.nominal_load_N,
-        "fixed": dict(fit.fixed),
-        "prediction_error_percent": fit.prediction_error_percent,
-        "loads": loads,
-        "weights": fit.weights,
-        "starts": fit.starts,
-        "starts_agreeing": fit.starts_agreeing,
-    }
+        units={p.name: p.unit for p in fit.parameters},
+        loads=[entry_of(LoadFit, load, stiffness=_estimate(load.stiffness, fit)) for load in fit.loads],
+    )
 
 
 def _common(fit: CurveFit | GlobalFit, rotation: str | None) -> FitKeys:
     stiffness = _estimate(fit.slope_at_zero, fit)
-    return {
-        "model": fit.model,
-        "channel": fit.channel,
-        "load_N": fit.load_N,
-        "rotation": rotation,
-        "axes": fit.axes,
-        "n": fit.n,
-        "dof": fit.dof,
-        "parameters": {p.name: p.value for p in fit.parameters},
-        "standard_errors": {p.name: p.standard_error for p in fit.parameters},
-        "intervals95": {p.name: p.interval95 for p in fit.parameters},
-        "not_determined": list(fit.not_determined),
-        "at_bound": list(fit.at_bound),
-        "error_percent": fit.error_percent,
-        "scatter_floor_percent": fit.scatter_floor_percent,
-        "cornering_stiffness_N_per_rad": stiffness if fit.channel == "FY" else None,
-        "aligning_stiffness_Nm_per_rad": stiffness if fit.channel == "MZ" else None,
-        "loss": fit.loss,
-        "converged": fit.converged,
-        "message": fit.message,
-    }
+    return entry_of(
+        FitKeys,
+        fit,
+        rotation=rotation,
+        parameters={p.name: p.value for p in fit.parameters},
+        standard_errors={p.name: p.standard_error for p in fit.parameters},
+        intervals95={p.name: p.interval95 for p in fit.parameters},
+        cornering_stiffness_N_per_rad=stiffness if fit.channel == "FY" else None,
+        aligning_stiffness_Nm_per_rad=stiffness if fit.channel == "MZ" else None,
+    )
 
 
 def _estimate(slope: Estimate | None, fit: CurveFit | GlobalFit) -> Slope | None:

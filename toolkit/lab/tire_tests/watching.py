@@ -13,17 +13,15 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from toolkit.declared import Entry, plain, read_text
 from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import real_path, same_file, sha256_bytes
 from toolkit.inputs import RESULT_FILE, read_regular
+from toolkit.lab.tire_tests.reports import MadeReport
+from toolkit.lab.tire_tests.resolve import Resolved
 from toolkit.version import __version__
-
-if TYPE_CHECKING:
-    from toolkit.lab.tire_tests.reports import MadeReport
-    from toolkit.lab.tire_tests.resolve import Resolved
 
 STATE = "watch.json"
 BATCH = 16

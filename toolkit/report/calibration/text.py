@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from toolkit.calibration.fit.balance_report import BalanceReport
+from toolkit.calibration.fit.report import FitReport
 from toolkit.estimate import plus_minus, round_uncertainty
-
-if TYPE_CHECKING:
-    from toolkit.calibration.fit.balance_report import BalanceReport
-    from toolkit.calibration.fit.report import FitReport
 
 # Cook's distance over 4/n and a leverage over twice the mean are looked at (Cook and Weisberg, 1982).
 _MOST_ROWS = 12

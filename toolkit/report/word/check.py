@@ -14,11 +14,17 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
-from toolkit.report.word.cut import cut_in_two
-from toolkit.report.word.lint import RULES, LintFinding, at_element, missing_fonts, surroundings
+from toolkit.report.word.lint import (
+    RULES,
+    LintFinding,
+    at_element,
+    cut_in_two,
+    missing_fonts,
+    surroundings,
+    unprinted,
+)
 from toolkit.report.word.look import must_be_read, unreadable
 from toolkit.report.word.package import Template, open_package
-from toolkit.report.word.required import unprinted
 from toolkit.report.word.scan import (
     LITERAL,
     Site,

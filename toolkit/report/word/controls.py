@@ -34,6 +34,8 @@ P_PR, R_PR, TC_PR = q("w:pPr"), q("w:rPr"), q("w:tcPr")
 def fill_control(sdt: Element, text: str, *, iso_date: str | None = None) -> None:
     """Put a text into a control at run, paragraph or cell level; tag and lock stay, the placeholder goes."""
     run = new_run(text, run_properties(sdt))
+    if run.find(q("w:br")) is not None:
+        hold_anything(sdt)  # LibreOffice 7.4 drops line breaks of plain text: two words would be one
     settle(sdt, iso_date)
     replace_content(sdt, run)
 
@@ -57,6 +59,8 @@ def settle(sdt: Element, iso_date: str | None = None) -> None:
 def hold_anything(sdt: Element) -> None:
     """Make a control one of rich text: one of a picture or of plain text may not hold a chart."""
     properties = sdt.find(SDT_PR)
+    if properties is None:
+        return
     for kind in ("w:picture", "w:text"):
         for element in properties.findall(q(kind)):
             properties.remove(element)

@@ -1,10 +1,17 @@
-"""What the template lint says: its rules, and a finding with its rule and place."""
+"""What the template lint says: its rules, and a finding with its rule and place.
+
+A condition may cut in two what it stands around, a field or a section: where it is not fulfilled, its control
+goes with all that is in it. Half a field left behind takes
+all the text after it; a section's break that goes alone gives its pages the paper of the next section.
+
+What a document must show is printed whatever the test has, and however long it is.
+"""
 
 from __future__ import annotations
 
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -13,9 +20,22 @@ from urllib.parse import unquote
 from lxml import etree
 
 from toolkit.report.style import Style
-from toolkit.report.word.scan import LITERAL, control_tag, place_of
+from toolkit.report.word.pages import headers_shown
+from toolkit.report.word.scan import LITERAL, Site, control_tag, place_of
 from toolkit.report.word.toc import can_update, contents_fields
-from toolkit.report.word.xml import NS, W_P, W_SDT, Element, Story, ancestor, parser, q, walk_fields
+from toolkit.report.word.xml import (
+    NS,
+    SDT_CONTENT,
+    W_P,
+    W_SDT,
+    W_TBL,
+    Element,
+    Story,
+    ancestor,
+    parser,
+    q,
+    walk_fields,
+)
 
 RULES = {
     "no-tags": "the template has no tag of the toolkit",
@@ -314,3 +334,109 @@ def _theme(main: object) -> dict[str, str]:
                 if (latin := root.find(f".//a:{kind}Font/a:latin", NS)) is not None
             }
     return {}
+
+
+_CHANGES = {"begin": 1, "end": -1}
+_BLOCKS = (W_P, W_TBL, W_SDT)
+
+
+def cut_in_two(sites: list[Site]) -> Iterator[LintFinding]:
+    """Yield an error for each condition that holds a part of a field, or the break of a section it is in."""
+    for site in sites:
+        if site.tag.family != "if" or site.form != "control":
+            continue
+        if _holds_half_a_field(site.element):
+            message = (
+                f"{site.tag} holds one end of a field, and the other is outside: take the whole field in"
+            )
+            yield at_element("cut-by-condition", site.story, site.element, message, "error")
+        if _holds_the_break_of_what_is_before(site.element):
+            message = (
+                f"{site.tag} holds the break of a section that begins before it: without it the section "
+                "takes the paper and the headers of the next one: take the whole section in, or none of it"
+            )
+            yield at_element("cut-by-condition", site.story, site.element, message, "error")
+
+
+def _holds_half_a_field(control: Element) -> bool:
+    depth = 0
+    for mark in control.iter(q("w:fldChar")):
+        kind = mark.get(q("w:fldCharType")) or ""
+        if depth == 0 and kind != "begin":
+            return True
+        depth += _CHANGES.get(kind, 0)
+    return depth != 0
+
+
+def _holds_the_break_of_what_is_before(control: Element) -> bool:
+    if next(_breaks(control), None) is None:
+        return False
+    before = _block_before(control)
+    return before is not None and not _ends_a_section(before)
+
+
+def _breaks(element: Element) -> Iterator[Element]:
+    return (section for section in element.iter(q("w:sectPr")) if ancestor(section, W_P) is not None)
+
+
+def _block_before(control: Element) -> Element | None:
+    """Return what stands before a control in the body, through the controls around it."""
+    element = control
+    while element is not None:
+        for sibling in element.itersiblings(preceding=True):
+            if sibling.tag in _BLOCKS:
+                return sibling
+        element = element.getparent()
+        if element is None or element.tag not in (SDT_CONTENT, W_SDT):
+            return None
+    return None
+
+
+def _ends_a_section(block: Element) -> bool:
+    """Tell whether a block ends with a section's break; a control's properties are none."""
+    paragraphs = [block] if block.tag == W_P else list(block.iter(W_P))
+    return bool(paragraphs) and next(_breaks(paragraphs[-1]), None) is not None
+
+
+def conditions_around(element: Element) -> Iterator[str]:
+    """Yield the names of the ``tk:if`` controls around an element, the nearest first."""
+    for control in element.iterancestors(W_SDT):
+        tag = control_tag(control)
+        if tag is not None and tag.family == "if":
+            yield tag.name
+
+
+def unprinted(
+    package: Any, parts: list[Story], sites: Sequence[Site], tags: Sequence[str]
+) -> Iterator[LintFinding]:
+    """Yield an error for each demanded tag that stands only where a report may not print it.
+
+    A condition that asks for the tag itself keeps it wherever there is something to print. A header that
+    depends on the number of pages alone is judged when a report is made.
+    """
+    sections = [
+        section
+        for section in package.main_document_part.element.iter(q("w:sectPr"))
+        if not any(conditions_around(section))
+    ]
+    never, _ = headers_shown(package, parts, sections)
+    for tag in tags:
+        places = [site for site in sites if f"tk:{site.tag.path}" == tag]
+        reasons = [_why(site, never) for site in places]
+        if places and all(reasons):
+            site = places[0]
+            yield LintFinding(
+                rule="unprinted-required", level="error", part=site.story.name, place=site.place,
+                message=f"{tag} is required, and may not be printed: it stands {reasons[0]}",
+            )  # fmt: skip
+
+
+def _why(site: Site, never: Sequence[str]) -> str:
+    path = site.tag.path
+    own = (path, site.tag.name)
+    condition = next((name for name in conditions_around(site.element) if name not in own), None)
+    if condition is not None:
+        return f"in tk:if.{condition}, which goes where the test has no such result"
+    return (
+        f"in {site.story.name}, which no page shows without a condition" if site.story.name in never else ""
+    )

@@ -25,7 +25,7 @@ from cryptography.hazmat.primitives.serialization import (
 from toolkit.errors import TrustError
 from toolkit.files import real_path
 from toolkit.inputs import CERTIFICATE_FILE, read_regular
-from toolkit.trust.seal.x509 import read_certificates, subject, weak_certificate
+from toolkit.trust.seal.x509 import Trust, objection, read_certificates, subject
 
 Ask = Callable[[Path], str]
 """Asks a person for the passphrase of a key file."""
@@ -50,7 +50,9 @@ class SealKey:
         return subject(self.certificate)
 
 
-def open_key(path: Path, *, ask: Ask, chain: Path | None = None, home: Path | None = None) -> SealKey:
+def open_key(
+    path: Path, *, ask: Ask, chain: Path | None = None, home: Path | None = None, trust: Trust | None = None
+) -> SealKey:
     """Read a key file and the certificate that belongs to it.
 
     Parameters
@@ -58,12 +60,13 @@ def open_key(path: Path, *, ask: Ask, chain: Path | None = None, home: Path | No
     ask : asked once, where the file is encrypted
     chain : PEM with the certificate, where the key file holds none
     home : the laboratory's home, in which no key may lie: homes are copied
+    trust : what the home trusts, and which certificates it knows to be revoked
 
     Raises
     ------
     TrustError
         ``seal-key``: the file cannot be read, or lies in the home; ``seal-certificate``: no certificate
-        belongs to the key, or one that has expired, or too weak a key
+        belongs to the key, or one that has expired or was revoked, or too weak a key
     """
     if home is not None and real_path(path).is_relative_to(real_path(home)):
         raise _refused(
@@ -104,25 +107,15 @@ def open_key(path: Path, *, ask: Ask, chain: Path | None = None, home: Path | No
             "the key is of a kind that cannot seal both PDF and XML", path, type(private).__name__,
             "an RSA key, or one of an elliptic curve", "ask for a certificate of such a key", "seal-key",
         )  # fmt: skip
-    _check(certificate, path, dt.datetime.now(dt.UTC))
     others = tuple(c for c in certificates if c != certificate)
-    return SealKey(private=private, certificate=certificate, others=others)
-
-
-def _check(certificate: x509.Certificate, path: Path, now: dt.datetime) -> None:
-    first, last = certificate.not_valid_before_utc, certificate.not_valid_after_utc
-    if not first <= now <= last:
+    if reason := objection(certificate, others, trust or Trust(), now=dt.datetime.now(dt.UTC)):
         raise _refused(
-            "the laboratory's certificate is not valid today", path,
-            f"{subject(certificate)}: from {first:%Y-%m-%d} to {last:%Y-%m-%d}", f"{now:%Y-%m-%d} in it",
+            "the laboratory's certificate cannot seal today", path, reason,
+            "a certificate that is valid today and not revoked: RSA from 3072 bits or a curve from 256, "
+            "signed by SHA-256 or better",
             "ask for a new certificate; nothing was sealed", "seal-certificate",
         )  # fmt: skip
-    if weakness := weak_certificate(certificate):
-        raise _refused(
-            "the laboratory's certificate is too weak", path, weakness,
-            "RSA from 3072 bits or a curve from 256, signed by SHA-256 or better",
-            "ask for another certificate; nothing was sealed", "seal-certificate",
-        )  # fmt: skip
+    return SealKey(private=private, certificate=certificate, others=others)
 
 
 def _parts(data: bytes, passphrase: bytes | None) -> tuple[Any, tuple[x509.Certificate, ...]]:

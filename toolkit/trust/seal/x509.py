@@ -157,6 +157,26 @@ def judge(
     return Judgement(state="valid", why=f"trusted by {_name(path[0])}", path=path)
 
 
+def objection(
+    signer: x509.Certificate, others: Sequence[x509.Certificate], trust: Trust, *, now: dt.datetime
+) -> str:
+    """Return why what a signer seals now would not be trusted, else nothing.
+
+    Where no path leads to a trusted certificate the signer's alone is asked: whom others trust, they know.
+    """
+    found = _path(signer, others, trust, now)
+    path = (signer,) if isinstance(found, str) else found
+    for certificate in path:
+        reason = (
+            weak_certificate(certificate, anchor=certificate in trust.certificates)
+            or _outside(certificate, now)
+            or _revoked(certificate, path, trust, now, stamped=False)
+        )
+        if reason:
+            return reason
+    return ""
+
+
 def weak_certificate(certificate: x509.Certificate, *, anchor: bool = False) -> str:
     """Return why a certificate is too weak, else nothing; nobody uses the self-signature of an ``anchor``."""
     try:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
 import pytest
 
-from tests.calibration.calibration_factory import hub_data
+from tests.calibration.calibration_factory import hub_data, write_session
 from tests.calibration.registry.test_signatures import (
     KEYS,
     RECORD,
@@ -25,10 +24,10 @@ from toolkit.calibration.control.calibrate import rehearse
 from toolkit.calibration.registry import store
 from toolkit.calibration.registry.approval import withdraw
 from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.issuing import issue, issuers
 from toolkit.calibration.registry.people_log import enrol
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError, RegistryError, TrustError
+from toolkit.lab.signatures.issuing import issue, issuers
 from toolkit.trust.people import Demand, Policy
 from toolkit.trust.requested import Requested
 from toolkit.trust.requests import Request, read_request
@@ -106,14 +105,14 @@ def test_an_issue_changes_nothing_that_an_audit_rests_on_and_a_lost_key_does(hom
     assert _registry(home).digest("m15-virtual") != changed
 
 
-def test_a_session_can_be_tried_where_lines_are_signed(
-    tmp_path: Path, make_session: Callable[..., Path]
-) -> None:
+def test_a_session_can_be_tried_where_lines_are_signed(tmp_path: Path) -> None:
     (tmp_path / "calibrations").mkdir()
     _found(tmp_path)
-    calibrate(make_session(), _registry(tmp_path, "carl"))
+    calibrate(write_session(tmp_path), _registry(tmp_path, "carl"))
     before = _registry(tmp_path).digest("hub")
-    tried = rehearse(make_session(hub_data(40, 5), name="second", date="2026-02-05"), _registry(tmp_path))
+    tried = rehearse(
+        write_session(tmp_path, hub_data(40, 5), name="second", date="2026-02-05"), _registry(tmp_path)
+    )
     assert tried.record.id == "hub-r2"
     assert _registry(tmp_path).digest("hub") == before
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from toolkit.planning.fixtures import FeasibleLoads
-from toolkit.planning.sequence import in_order, visits
+from toolkit.planning.session_plan import in_order, visits
 
 
 def hanging(amounts: list[float], mounts: list[str]) -> FeasibleLoads:

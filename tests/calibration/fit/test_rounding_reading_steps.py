@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.campaigns.rounded_readings import FULL, covered, session
-from toolkit.calibration.fit.reading_steps import reading_step
+from toolkit.calibration.fit.rounding import reading_step
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolkit.planning.criteria import CRITERIA, Criterion, criterion, together, with_each_row
+from toolkit.planning.row_exchange import CRITERIA, Criterion, criterion, together, with_each_row
 
 
 @pytest.mark.parametrize("by", CRITERIA)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolkit.calibration.fit.inverse import StraightLine, x_from_y
 from toolkit.calibration.fit.regression import fit_terms
+from toolkit.qualification.numbers import StraightLine, x_from_y
 
 # ISO/TS 28037:2010, the examples with equal and with unequal weights, as quoted with the GUM Tree Calculator.
 EQUAL = StraightLine(a=1.866667, b=1.757143, u_a=0.4654747, u_b=0.1195229, cov_ab=-0.050)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from toolkit.tires.evaluate import limit_slope, stiffness
 from toolkit.tires.global_data import measured
 from toolkit.tires.global_fit import fit_global
 from toolkit.tires.global_model import GlobalModel, make_rows
 from toolkit.tires.models import find, model_names
-from toolkit.tires.slopes import limit_slope, stiffness
 
 F0, FZ = 4000.0, 3000.0
 RADIUS = 0.3

@@ -4,7 +4,7 @@ import pytest
 
 from toolkit.channels import CHANNELS
 from toolkit.declared import Quantity
-from toolkit.reduction.conditions import CONDITIONS, condition_finding, condition_of
+from toolkit.reduction.limits import CONDITIONS, condition_finding, condition_of
 from toolkit.units import to_si, unit
 
 # What laboratories test: none of it may be told.

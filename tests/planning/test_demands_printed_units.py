@@ -9,7 +9,7 @@ import pytest
 
 from tests.characteristics.tire_factory import M15
 from toolkit.characteristics.catalogue import by_name
-from toolkit.planning.printed_units import PrintedUnits, title_of, units_of
+from toolkit.planning.demands import PrintedUnits, title_of, units_of
 
 POUNDS = PrintedUnits(force="lbf", moment="lbf*ft")
 LBF, FOOT = 4.4482216152605, 0.3048  # N, exact by definition; m
