@@ -203,11 +203,7 @@ class _Scatter:
     fewest: int = _set(2, "runs held out", "one alone has no scatter that could be told from a mismatch")
     least: float = _set(0.3, "sd of what a run shows of its own zero", "a smaller scatter changes no score")
     intervals: int = _set(3, "runs", "whose zeros and gains enter values and intervals; two tell no scatter")
-    loudness: tuple[float, ...] = _set(
-        tuple(2.0**k for k in range(12)),
-        "degrees of freedom",
-        "of how loud runs are: from twice to 2 % apart",
-    )
+    loudness: tuple[float, ...] = _set(tuple(2.0**k for k in range(12)), "degrees", "from twice to 2 % apart")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -423,6 +419,9 @@ class _Laws:
     fitted: int = _set(5, "laws", "fitted jointly, of those that are ranked first")
     judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
+    same: float = _set(
+        0.95, "of what laws take of the held-out mean square", "by effects: the laws are their own formulas"
+    )
     outdoes: float = _set(2.0, "times what effects take", "of unseen rows: they are the smaller part")
     kept: float = _set(
         0.5, "of its size", "by which an effect may be smaller or larger beside laws and be the same effect"
@@ -454,9 +453,7 @@ class _Verdict:
     close: float = _set(3.0, "of the log-likelihood", "within which the data prefer neither of two effects")
     mostly: float = _set(0.5, "of the log-likelihood", "named effects explain it, beside what stays unknown")
     nearly: float = _set(
-        0.9,
-        "of the held-out mean square above the noise, or of what laws take of it",
-        "effects that take it stay, whatever the rest is",
+        0.9, "of the held-out mean square above the noise", "effects that take it stay, whatever the rest is"
     )
     taken: float = _set(
         2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"

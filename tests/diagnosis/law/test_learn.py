@@ -178,7 +178,8 @@ def test_an_event_of_one_run_is_told_and_predicts_nothing(learned):
     assert law["evidence"]["held_out_log_score_gain"] is None
     assert law["parameters"][0]["runs"] == ["r1.csv"]
     assert law["parameters"][0]["value"] == pytest.approx(10, rel=0.05)
-    assert "from 12" in answer["depends_on"][0]["variables"][0]
+    assert answer["depends_on"][0]["variables"] == ["time"]
+    assert "from 12" in answer["depends_on"][0]["reason"]
 
 
 @pytest.mark.campaign(

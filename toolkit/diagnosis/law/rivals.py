@@ -37,9 +37,9 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
 
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
     stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
-    there rings, coloured noise takes it up, and no structure shows. What takes nearly all that the laws take
-    keeps its name, whatever they make of the rest. Any other loses it where all that is named has another
-    size beside the laws, or where it leaves more than the sensor's noise and they do not.
+    there rings, coloured noise takes it up, and no structure shows. In an equation a name that leaves more
+    than the sensor's noise where laws do not is lost: it imitates them. Else what takes nearly all that the
+    laws take keeps its name, and any other loses it where all that is named has another size beside them.
     """
     predicting = any(law.predicts for law in laws.listed)
     is_asked = predicting or _leaves_process_noise(search)
@@ -53,10 +53,11 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     alone = learned(bare, withdrawn=False, budget=budget)
     if not any(law.predicts for law in alone.listed):
         return search, laws if alone.complete else replace(laws, complete=False)
-    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out):
-        return search, laws
     if bare.problem.shown_sd and _leaves_process_noise(search) and not _process_noise(search, alone.fit):
         return bare, alone
+    least = LAWS.same if _leaves_process_noise(search) else VERDICT.nearly
+    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out, least=least):
+        return search, laws
     if any(_holds_beside(laws, step) for step in search.steps):
         if _parameters(alone.fit) >= _parameters(laws.fit):
             return search, laws
@@ -154,12 +155,15 @@ def _error(problem: Problem, held_out: HeldOut, name: str) -> float:
     return float(np.mean(away**2))
 
 
-def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> bool:
+def _same(
+    problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut, *, least: float = LAWS.same
+) -> bool:
     """Tell whether effects take nearly all that laws in their place take: these are then their own formulas.
 
     Parameters
     ----------
     without, named, laws : unseen rows with neither, with the effects, and with the laws in their place
+    least : share of what the laws take
     """
 
     outputs = [name for name in problem.names if problem.kept[name].any()]
@@ -167,7 +171,7 @@ def _same(problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut) -> 
         tuple(_error(problem, without, name) - _error(problem, each, name) for each in (named, laws))
         for name in outputs
     ]
-    return all(by_effects >= VERDICT.nearly * by_laws for by_effects, by_laws in taken)
+    return all(by_effects >= least * by_laws for by_effects, by_laws in taken)
 
 
 def _parameters(fit: Fit) -> int:
