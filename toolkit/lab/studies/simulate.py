@@ -143,8 +143,8 @@ def _test(
     plan: Plan, out: Path, registry: Registry | None, csv: Path | None, case: Path | None
 ) -> tuple[SimulatedTest, str]:
     from toolkit.publication import publication
-    from toolkit.simulation.program import other_programs
     from toolkit.simulation.case import CASE, RUNS, TIRE, check_case, run_names, write_case, write_runs
+    from toolkit.simulation.program import other_programs
     from toolkit.simulation.run import simulate
     from toolkit.simulation.write import TEST, TRUTH, check_folder, test_names, write_test
 
