@@ -84,9 +84,10 @@ def plan_test(
     from datetime import date
 
     from toolkit.lab.plans.plan_sheets import protocol_sheet, sheet_text, write_plan
-    from toolkit.planning.demands import parse_demand, parse_spread, units_of
+    from toolkit.planning.demands import parse_demand, units_of
     from toolkit.planning.protocol_plan import plan_protocol
     from toolkit.planning.protocol_search import shared_loads
+    from toolkit.planning.tire_class import parse_spread
     from toolkit.planning.tread import Tread
 
     spread = parse_spread(order.spread)
@@ -147,8 +148,8 @@ def _tires(
     order: ProtocolOrder, spread: Mapping[str, tuple[float, float]]
 ) -> tuple[tuple[EarlierTest, ...], str, Path | None]:
     """Return the earlier test of each tire of the class, what they are called, and the first's tire file."""
-    from toolkit.planning.demands import PASSENGER, members
     from toolkit.planning.protocol_search import shared_loads
+    from toolkit.planning.tire_class import PASSENGER, members
 
     known = [_earlier(order, like) for like in order.like or (None,)]
     if not order.like and not order.spread:

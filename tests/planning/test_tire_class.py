@@ -11,9 +11,10 @@ import pytest
 from tests.characteristics.tire_factory import M15
 from tests.planning.planning_factory import LOADS, earlier
 from toolkit.errors import ConfigError
-from toolkit.planning.demands import PASSENGER, members, parse_demand, parse_spread
+from toolkit.planning.demands import parse_demand
 from toolkit.planning.design import pace_of, standard
 from toolkit.planning.protocol_search import Question, least_plan
+from toolkit.planning.tire_class import PASSENGER, members, parse_spread
 from toolkit.planning.tread import Tread
 from toolkit.simulation.tire import lateral_force
 
