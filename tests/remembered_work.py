@@ -7,6 +7,7 @@ has imported it before, and asks it anew.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator, Mapping
@@ -25,6 +26,7 @@ def remembered_work() -> Iterator[None]:
     """Have commands reduce a test, fit the tire of one and draw a figure once, whoever asks."""
     process = _remembered(pipeline.process)
 
+    @functools.wraps(process.__wrapped__)
     def processed(folder: Any, recordings: Any, record: Any, *, protocol: Any = None, use: Any = None) -> Any:
         # The machine's definition is a file: a test of the same name and rows may be on another machine.
         machine = pipeline.machine_of(folder, protocol)
@@ -42,6 +44,7 @@ def _remembered(ask: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that answers the same question by a copy of its first answer."""
     answers: dict[bytes, bytes] = {}
 
+    @functools.wraps(ask)
     def asked(*given: Any, beside: object = None, **named: Any) -> Any:
         key = hashlib.sha256(pickle.dumps((given, sorted(named.items()), beside))).digest()
         if key not in answers:

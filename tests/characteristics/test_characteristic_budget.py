@@ -172,11 +172,7 @@ def test_the_pressure_goes_in_proportion_and_only_where_the_test_says_it() -> No
         assert part(row, "pressure") == pytest.approx(expected, rel=1e-12)
 
 
-MORE = pytest.mark.campaign("200 trials in place of 60")
-
-
-@pytest.mark.parametrize(("count", "within"), [(60, 0.4), pytest.param(200, 0.2, marks=MORE)])
-def test_the_scatter_of_the_rows_goes_through_the_fit(count: int, within: float) -> None:
+def test_the_scatter_of_the_rows_goes_through_the_fit() -> None:
     """Trials: each condition scatters by its own u; the spread of what is read off is the part."""
     u = (8.0, 0.3)
     bare = rows(reduced_test(u=u))
@@ -184,7 +180,7 @@ def test_the_scatter_of_the_rows_goes_through_the_fit(count: int, within: float)
     base = reduced_test()
     trials: dict[Key, list[float]] = {key: [] for key in bare}
     drawn = []
-    for _ in range(count):
+    for _ in range(200):
         noise = rng.normal(size=(len(base.conditions), 2)) * u
         drawn.append(dataclasses.replace(base, conditions=tuple(
             dataclasses.replace(c, FY_common=c.FY_common + float(e), MZ_common=c.MZ_common + float(f))
@@ -195,8 +191,8 @@ def test_the_scatter_of_the_rows_goes_through_the_fit(count: int, within: float)
             trials[key].append(row.number.value)
     for key, row in bare.items():
         sd = float(np.std(trials[key], ddof=1))
-        # 60 trials know a standard deviation to 9 %, 200 to 5 %: four of them; the fit bends by little more.
-        assert dict(row.number.by_source())["repeatability"] == pytest.approx(sd, rel=within), key
+        # 200 trials know a standard deviation to 5 %; the fit bends by a little more.
+        assert dict(row.number.by_source())["repeatability"] == pytest.approx(sd, rel=0.2), key
 
 
 def test_many_tests_fitted_together_are_each_as_fitted_alone() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from pathlib import Path
 
 import pytest
 
 from tests.campaigns import physics_gate as campaign
+from toolkit import pipeline
 from toolkit.cli.main import run
 from toolkit.lab.home import packaged_home
 from toolkit.reduction.physics import RULES
@@ -67,6 +69,8 @@ def test_a_reduced_test_of_before_the_gate_is_held_against_it(
 ) -> None:
     with monkeypatch.context() as before:
         before.setattr("toolkit.reduction.reduce.physics_findings", lambda *_, **__: [])
+        # Not what was remembered of the test with its gate.
+        before.setattr(pipeline, "process", inspect.unwrap(pipeline.process))
         _, document = answer(capsys, "process", turned, "--out", tmp_path / "old.xlsx")
     assert document["impossible"] == []
     code, document = answer(capsys, "process", tmp_path / "old.xlsx")

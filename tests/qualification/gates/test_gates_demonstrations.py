@@ -24,6 +24,7 @@ ROOT = Path(toolkit.__file__).parent
 SOURCES = [
     *sorted((ROOT / "calibration" / "registry").glob("*.py")),
     *sorted((ROOT / "reduction").glob("*.py")),
+    ROOT / "lab" / "signatures" / "issuing.py",
 ]
 
 # Refusals of a command that is misused: no gate between a wrong number and its reader.
@@ -39,6 +40,7 @@ NO_GATE = {
     "request": "a signing request: tests/trust/forgeries",
     "locked": "another writer, or the lock file of one that ended",
     "no-locks": "a file system that keeps no writers apart",
+    "usage": "options that exclude each other: tests/cli/test_cli_draft.py",
     "unknown-machine": "a machine definition of another instrument is named",
     "session": "a file of polarity readings that has none",
     "unit-dimension": "a legacy file's units, refused when it is read",
@@ -185,8 +187,8 @@ def shown(stock: bench.Bench, folder: Path, name: str) -> Check:
         ("candidate", "check_begun", None, "session in the future"),
         ("store", "check_after", None, "ledger entry before the one before it"),
         ("standing", "_reasons", (), "candidate"),
-        ("loading", "check_reproduces", None, "coefficient negated, every hash computed anew"),
-        ("loading", "check_agrees", None, "date changed, every hash computed anew"),
+        ("conformity", "check_reproduces", None, "coefficient negated, every hash computed anew"),
+        ("conformity", "check_agrees", None, "date changed, every hash computed anew"),
     ],
 )
 def test_a_gate_that_is_switched_off_fails_its_row(
