@@ -40,7 +40,7 @@ NO_GATE = {
     "request": "a signing request: tests/trust/forgeries",
     "locked": "another writer, or the lock file of one that ended",
     "no-locks": "a file system that keeps no writers apart",
-    "usage": "options that exclude each other: tests/cli/test_cli_draft.py",
+    "usage": "options that exclude each other: tests/cli/test_calibration_results_certificate.py",
     "unknown-machine": "a machine definition of another instrument is named",
     "session": "a file of polarity readings that has none",
     "unit-dimension": "a legacy file's units, refused when it is read",
