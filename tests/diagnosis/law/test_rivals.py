@@ -154,6 +154,21 @@ def test_a_name_of_the_larger_part_stands(
     assert (without_untested(search, late).steps == ()) is goes
 
 
+@pytest.mark.parametrize(("by_law", "by_name", "goes"), [(61.0, 9.0, True), (61.0, 31.0, False)])
+def test_a_name_goes_where_a_law_as_simple_is_better_in_its_place(
+    outdone_name: tuple[Search, Laws], by_law: float, by_name: float, *, goes: bool
+) -> None:
+    """What each takes of the score beside the other: the flight of a ball has drag, and no bent channel."""
+    search, laws = outdone_name
+    applied = laws.listed[0].applied
+    bare = fit(search.problem, (applied,), start=laws.fit.p)
+    alone = hold_out(search.problem, search.folds, bare.active, bare).total
+    named = replace(search.held_augmented, scores=(alone + by_name - by_law,))
+    both = replace(laws.held_out, scores=(alone + by_name,))
+    kept, _ = without_imitations(replace(search, held_augmented=named), replace(laws, held_out=both), BUDGET)
+    assert (kept.steps == ()) is goes
+
+
 def test_sizes_are_told_from_none_together(outdone_name: tuple[Search, Laws]) -> None:
     """Square and cube of one sign pull on the same gain: each may be none, and both together are not."""
     made = outdone_name[0].augmented

@@ -182,9 +182,10 @@ def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[
     """Return a search and its laws without the effects that the laws made superfluous.
 
     Part of a law's answer looks like this effect or that one, and the search has only effects to name. One is
-    dropped where the held-out score of the laws beside refitted parameters is as good without it. One that
-    takes nearly all that the laws take in its place keeps its name: they mend its form (a leak of the load
-    into a force, before or after the filter).
+    dropped where the held-out score of the laws beside refitted parameters is as good without it, or where
+    laws as simple are better in its place and it is the small part of both. One that takes nearly all that
+    the laws take in its place keeps its name: they mend its form (a leak of the load into a force, before or
+    after the filter).
     """
     if not any(law.predicts for law in laws.listed):
         return search, laws
@@ -205,6 +206,22 @@ def _choices(steps: tuple[Step, ...]) -> Iterator[tuple[Step, ...]]:
         yield from itertools.combinations(steps, count)
 
 
+def _is_minor(search: Search, laws: Laws, bare: Fit, alone: HeldOut) -> bool:
+    """Tell whether laws with no more parameters than all effects foretell better in their place, and are the
+    larger part of both: any bend is nearly a polynomial, and what that leaves is much.
+
+    Parameters
+    ----------
+    bare, alone : the laws without the effects, and their held-out rows
+    """
+    both, named = laws.held_out.total, search.held_augmented.total
+    return (
+        2 * _parameters(bare) <= _parameters(laws.fit)
+        and alone.total - named >= STEP.least_gain
+        and both - named > LAWS.outdoes * (both - alone.total)
+    )
+
+
 def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Search, Laws] | None:
     """Return both without some effects, None where they are needed."""
     problem = search.problem
@@ -221,7 +238,8 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
         bare = fit(problem, listed, start=laws.fit.p)
         scores = hold_out(problem, search.folds, bare.active, bare)
         idle = outdone(search, laws) and all(_is_idle(laws.fit, step) for step in dropped)
-        if laws.held_out.total - scores.total >= STEP.least_gain and not idle:
+        needed = laws.held_out.total - scores.total >= STEP.least_gain
+        if needed and not idle and not (dropped == search.steps and _is_minor(search, laws, bare, scores)):
             return None
         steps = tuple(step for step in search.steps if step not in dropped)
         if steps:
