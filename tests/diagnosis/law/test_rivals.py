@@ -50,7 +50,11 @@ def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(
     assert force.augmented_rmse < 0.05 * force.refitted_rmse
 
 
-BUDGET = TimeBudget(600.0, lambda _: None, alarm=False)
+def ample() -> TimeBudget:
+    """Return a budget that begins when it is asked for: of the module it would be spent by the tests before."""
+    return TimeBudget(600.0, lambda _: None, alarm=False)
+
+
 DIVIDER = """schema = 1
 [simulation]
 kind = "python"
@@ -130,8 +134,8 @@ def test_no_name_stands_beside_a_law_that_outdoes_it(outdone_name: tuple[Search,
     # Where the laws leave it no size of its own, it goes, whatever its score.
     idle = replace(laws.fit, covariance=1e9 * laws.fit.covariance)
     better = replace(laws.held_out, scores=(1e3, *laws.held_out.scores[1:]))
-    assert without_imitations(search, replace(laws, held_out=better), BUDGET)[0].steps == search.steps
-    dropped, alone = without_imitations(search, replace(laws, fit=idle, held_out=better), BUDGET)
+    assert without_imitations(search, replace(laws, held_out=better), ample())[0].steps == search.steps
+    dropped, alone = without_imitations(search, replace(laws, fit=idle, held_out=better), ample())
     assert dropped.steps == ()
     assert [applied.effect.name for applied in alone.fit.active] == [laws.listed[0].applied.effect.name]
 
@@ -165,7 +169,7 @@ def test_a_name_goes_where_a_law_as_simple_is_better_in_its_place(
     alone = hold_out(search.problem, search.folds, bare.active, bare).total
     named = replace(search.held_augmented, scores=(alone + by_name - by_law,))
     both = replace(laws.held_out, scores=(alone + by_name,))
-    kept, _ = without_imitations(replace(search, held_augmented=named), replace(laws, held_out=both), BUDGET)
+    kept, _ = without_imitations(replace(search, held_augmented=named), replace(laws, held_out=both), ample())
     assert (kept.steps == ()) is goes
 
 
@@ -220,6 +224,6 @@ def test_a_name_that_takes_nearly_all_that_laws_take_stays(
     monkeypatch.setattr(rivals, "_process_noise", lambda _, fit: process_noise and fit is not alone_fit)
     monkeypatch.setattr(rivals, "_leaves_process_noise", lambda _: process_noise)
     monkeypatch.setattr(rivals, "_holds_beside", lambda *_: not process_noise)
-    judged, listed = judged_by_laws(search, beside, seed=1, budget=BUDGET)
+    judged, listed = judged_by_laws(search, beside, seed=1, budget=ample())
     assert (judged.steps == search.steps) is stays
     assert listed is (beside if stays else alone)
