@@ -51,7 +51,7 @@ def test_a_leak_of_the_load_keeps_its_name_where_the_law_acts_behind_the_filter(
 
 
 def ample() -> TimeBudget:
-    """Return a budget that begins when it is asked for: of the module it would be spent by the tests before."""
+    """Return a budget that begins with the test: the module's would be spent by the tests before."""
     return TimeBudget(600.0, lambda _: None, alarm=False)
 
 
