@@ -373,6 +373,15 @@ def ratio_of_units(ratio: float, text: str) -> str | None:
     return None
 
 
+def with_unit(number: str, text: str) -> str:
+    """Return a printed number with its unit; a ratio has none.
+
+    >>> with_unit("0.11", "1"), with_unit("2.5", "N*m")
+    ('0.11', '2.5 N*m')
+    """
+    return number if text in ("", "1") else f"{number} {text}"
+
+
 def printed(text: str) -> str:
     """Return a unit as it is printed for people.
 

@@ -307,6 +307,14 @@ def test_the_first_line_has_the_cause_its_size_and_what_it_explains(dragged):
     assert line.split("(")[0] in words_of(dragged)
 
 
+def test_a_ratio_has_no_unit_and_keeps_its_last_digit(dragged):
+    (effect,) = dragged.diagnosis.effects
+    size = dataclasses.replace(effect.parameters[0], value=0.11, unit="1", ci95=None)
+    bare = dataclasses.replace(effect, parameters=(size,))
+    line = cause(dataclasses.replace(dragged.diagnosis, effects=(bare,)))
+    assert re.search(rf"{size.name} 0\.110*(?!\d| 1)", line)
+
+
 def test_a_spent_budget_is_not_the_recordings_fault(dragged):
     late = dataclasses.replace(
         dragged.diagnosis, verdict="untestable", effects=(), complete=False, skipped=("refit",)

@@ -20,6 +20,7 @@ from toolkit.lab.answers import (
     finding_lines,
     table,
 )
+from toolkit.units import with_unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
@@ -266,9 +267,9 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
             value, interval = rounded(parameter.value, parameter.ci95)
             reach = f"  (95 %: {interval})" if interval else ""
             if value == UNRESOLVED:
-                lines.append(f"  {parameter.name}: {value}, {interval} {parameter.unit}")
+                lines.append(with_unit(f"  {parameter.name}: {value}, {interval}", parameter.unit))
                 continue
-            lines.append(f"  {parameter.name} = {value} {parameter.unit}{reach}")
+            lines.append(f"  {parameter.name} = {with_unit(value, parameter.unit)}{reach}")
         if effect.equivalent_to:
             lines.append(f"  this recording cannot tell it from: {', '.join(effect.equivalent_to)}")
         lines.append(
@@ -282,7 +283,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
                 continue
             value, interval = rounded(parameter.value, parameter.ci95)
             lines.append(
-                f"  {parameter.name} = {value} {parameter.unit}"
+                f"  {parameter.name} = {with_unit(value, parameter.unit)}"
                 + (f"  (95 %: {interval})" if interval else "")
             )
         lines += [f"  {law.likeness}"] if law.resembles else []
@@ -301,7 +302,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
             extent = "over all of" if at.whole else "mostly where"
             lines.append(
                 f"{place.channel}: mismatch {extent} {at.variable}{',' if at.whole else ' is'} "
-                f"{at.ends('{:.4g}'.format)} {at.unit}".rstrip()
+                + with_unit(at.ends("{:.4g}".format), at.unit)
             )
     rows = [
         [

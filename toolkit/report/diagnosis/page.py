@@ -15,6 +15,7 @@ from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.figures import size_maps
 from toolkit.report.diagnosis.numbers import chance, few, over, rounded
 from toolkit.report.pages.kit import Figure, Table, number, page_parts, table
+from toolkit.units import with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -123,7 +124,7 @@ def cause(diagnosis: Diagnosis) -> str | None:
     names = []
     for effect in diagnosis.effects:
         sizes = [
-            f"{parameter.name} {value}{f' ({interval})' if interval else ''} {parameter.unit}".rstrip(" 1")
+            with_unit(f"{parameter.name} {value}{f' ({interval})' if interval else ''}", parameter.unit)
             for parameter in effect.parameters[:1]
             if not isinstance(parameter.value, str)
             for value, interval in (rounded(parameter.value, parameter.ci95),)
@@ -367,7 +368,7 @@ def _place_sentence(mismatch: ChannelMismatch) -> str:
     for place in mismatch.where[:1]:
         ends = place.ends(lambda value: few(value, 4))
         extent = f"over all of {place.variable}," if place.whole else f"most of it where {place.variable} is"
-        text += f", {extent} {ends} {place.unit}".rstrip()
+        text += with_unit(f", {extent} {ends}", place.unit)
     return f"{text} ({chance(mismatch.p_value)})."
 
 
