@@ -264,10 +264,12 @@ def scattered_scores(runs: Sequence[UnseenRun], *, by_run: bool) -> tuple[float,
         return likeliest_sizes(runs, lambda zero, gain: sum(_scores(runs, zero, gain, freedom)))
 
     sizes = likeliest(even)
-    freedom = max((even, *SCATTER.loudness), key=lambda each: sum(_scores(runs, *sizes, each)))
-    if freedom < even:
-        sizes = likeliest(freedom)
-    return _scores(runs, *sizes, freedom)
+    scores = _scores(runs, *sizes, even)
+    freedom = max(SCATTER.loudness, key=lambda each: sum(_scores(runs, *sizes, each)))
+    # Each of the degrees is as likely before: what is chosen among so many has to be worth the choice.
+    choice = math.log(len(SCATTER.loudness)) / len(runs)
+    uneven = tuple(score - choice for score in _scores(runs, *likeliest(freedom), freedom))
+    return max(scores, uneven, key=sum)
 
 
 def _scores(
