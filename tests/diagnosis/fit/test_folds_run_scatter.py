@@ -1,12 +1,14 @@
 """Scores of unseen runs against the multivariate normal density, written out as a full matrix."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 from scipy.stats import multivariate_normal, multivariate_t
 
+from toolkit.diagnosis.fit import folds
 from toolkit.diagnosis.fit.folds import UnseenRun, _scores, scattered_scores
 from toolkit.diagnosis.fit.noise import Autoregression, autocovariance, layout, log_likelihood
 
@@ -134,3 +136,16 @@ def test_an_effect_that_halves_the_errors_of_quiet_runs_is_not_lost_to_a_loud_on
     # By the noise of each run it gains log 3 of every value of the quiet ones. Its training rows do not tell
     # how quiet they are, which may cost it a part, and not all.
     assert scores[1] - scores[0] > 0.5 * ROWS * 2 * math.log(3)
+
+
+def test_loudness_that_differs_by_chance_alone_keeps_the_score_of_one_noise(monkeypatch):
+    """A degree chosen among twelve has to be worth the logarithm of twelve: 1.5 against 1 in 40 rows is not."""
+    noise = Autoregression(reflection=(), sd=1.0)
+    simulated, residuals, _ = runs((0.0,) * 3, (0.0,) * 3, noise)
+    listed = [
+        unseen(size * r / np.std(r), simulated, noise)
+        for size, r in zip((1.2, 1.1, 1.3), residuals, strict=True)
+    ]
+    chosen = scattered_scores(listed, by_run=True)
+    monkeypatch.setattr(folds, "SCATTER", replace(folds.SCATTER, loudness=(math.inf,)))
+    assert chosen == scattered_scores(listed, by_run=True)
