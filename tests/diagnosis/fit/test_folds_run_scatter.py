@@ -139,7 +139,7 @@ def test_an_effect_that_halves_the_errors_of_quiet_runs_is_not_lost_to_a_loud_on
 
 
 def test_loudness_that_differs_by_chance_alone_keeps_the_score_of_one_noise(monkeypatch):
-    """A degree chosen among twelve has to be worth the logarithm of twelve: 1.5 against 1 in 40 rows is not."""
+    """A degree chosen among twelve has to be worth the logarithm of twelve: 1.5 to 1 in 40 rows is not."""
     noise = Autoregression(reflection=(), sd=1.0)
     simulated, residuals, _ = runs((0.0,) * 3, (0.0,) * 3, noise)
     listed = [
