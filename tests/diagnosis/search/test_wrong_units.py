@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.case_text import case_text
-from tests.diagnosis.cases import write_case
+from tests.diagnosis.cases import CELL, cell_case, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
@@ -186,3 +186,20 @@ def test_a_unit_is_named_where_its_factor_is_certain_and_nothing_else_is_left(
     assert judged.active.effect.name == ("unit_error" if named else "sensitivity_error")
     if named:
         assert factor_of(judged.active) == pytest.approx(1000 / 60, rel=1e-12)
+
+
+def test_a_steep_bend_is_no_factor(tmp_path):
+    """F = L + 0.008 L^2 up to 9 kN: a factor takes most of the error, and leaves 3 000 times the noise."""
+    text = cell_case(0.001).replace('role = "output"', 'role = "output", sd = 0.4')
+    frames = {}
+    for k in range(2):
+        t = np.arange(90) * 2.0
+        L = 1000 * np.abs(np.sin(0.021 * t + k)) + 100 * (np.arange(90) // 15 % 3)
+        noise = np.random.default_rng(k).normal(0, 0.4, t.size)
+        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "L": L, "F": L + 0.008 * L**2 + noise})
+        text += f'[[recording.run]]\nfile = "r{k}.csv"\n'
+    case = read_case(write_case(tmp_path, text, simulator=CELL, **frames))
+    (effect,) = diagnose(case, None, limits=None).diagnosis.effects
+    assert effect.name == "nonlinearity"
+    (quadratic,) = [size for size in effect.parameters if size.name == "quadratic"]
+    assert quadratic.ci95[0] < 0.008 < quadratic.ci95[1]

@@ -155,8 +155,11 @@ def with_units_judged(
 
 def _may_be_exact(problem: Problem, made: Fit, structured: bool) -> bool:
     """Tell whether so little is left beside a factor that it may be known to all its digits."""
-    if not structured:
-        return True
+    return not structured or leaves_noise(problem, made)
+
+
+def leaves_noise(problem: Problem, made: Fit) -> bool:
+    """Tell whether a fit leaves little more than the sensors' own noise in every output."""
     parts = [noise_parts(problem, made, name) for name in problem.names if problem.kept[name].any()]
     return all(each.total_sd <= UNITS.near * each.sensor_sd for each in parts)
 

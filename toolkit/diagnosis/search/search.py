@@ -18,7 +18,7 @@ from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.fit.run_scatter import RunScatter, held_out_beside_scatter, with_run_scatter
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.channel_factors import with_units_judged
+from toolkit.diagnosis.search.channel_factors import leaves_noise, with_units_judged
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise
@@ -203,14 +203,15 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 before = structure
             if turn == STEP.most_effects:
                 break
+            unit = None
             if turn == 0 and wrong:
                 budget.check(f"step {turn + 1}: wrong units")
-                outcome = unit_step(problem, folds, base, held_base, wrong)
-                if outcome is not None:
-                    base, held_base, step = outcome
+                unit = unit_step(problem, folds, base, held_base, wrong)
+                if unit is not None and leaves_noise(problem, unit[0]):
+                    base, held_base, step = unit
                     steps.append(step)
                     continue
-            if led is not None and led.outcome is not None:
+            if unit is None and led is not None and led.outcome is not None:
                 base, held_base, more = beside_rivals(
                     problem, folds, base, held_base, led, led.outcome, view,
                     least=share, refitted=held_refitted, tell=fitting,
@@ -233,6 +234,9 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 outcome = best_step(problem, folds, base, held_base, joint, p_of, least, held_refitted)
                 if outcome is not None:
                     break
+            # A factor takes most of any steep bend: where more than noise stays beside it, it is one of many.
+            if unit is not None and (outcome is None or outcome[1].total < unit[1].total):
+                outcome = unit
             if outcome is not None:
                 base, held_base, step = outcome
                 if not _is_nuisance(step, steps):
