@@ -144,7 +144,7 @@ def test_loudness_that_differs_by_chance_alone_keeps_the_score_of_one_noise(monk
     simulated, residuals, _ = runs((0.0,) * 3, (0.0,) * 3, noise)
     listed = [
         unseen(size * r / np.std(r), simulated, noise)
-        for size, r in zip((1.2, 1.1, 1.3), residuals, strict=True)
+        for size, r in zip((1.0, 1.0, 1.5), residuals, strict=True)
     ]
     chosen = scattered_scores(listed, by_run=True)
     monkeypatch.setattr(folds, "SCATTER", replace(folds.SCATTER, loudness=(math.inf,)))
