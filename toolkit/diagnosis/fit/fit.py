@@ -266,6 +266,12 @@ def _solve(
     x = descend(space, layouts, x, weights, derivatives)
     simulated = space.simulated(x)
     residual = space.residual(simulated)
+    for name, where in layouts.items():
+        if not np.isfinite(residual[name][where.index]).all():
+            raise FitError(
+                "the simulation gives no usable output", where=name, rule="simulator", got="no number",
+                expected="a number in every row that counts", next_step="look at the sizes of its effects",
+            )  # fmt: skip
     noise = noise_of(space.problem, residual, layouts, used=len(x))
     return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
 
