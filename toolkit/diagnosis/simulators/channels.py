@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,7 +61,7 @@ def input_places(effect: Effect, inputs: Sequence[tuple[str, str]]) -> list[tupl
 
 
 def true_inputs(
-    run: Run, active: Sequence[AppliedEffect], inputs: set[str], setting: Setting
+    run: Run, active: Sequence[AppliedEffect], inputs: Set[str], setting: Setting
 ) -> dict[str, NDArray[np.float64]]:
     """Return the inputs of a run that were recorded with an effect in them, as they are without it."""
     true: dict[str, NDArray[np.float64]] = {}

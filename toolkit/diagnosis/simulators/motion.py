@@ -12,17 +12,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.channels import slopes
 from toolkit.diagnosis.simulators.linear_response import integrated
 from toolkit.diagnosis.simulators.rates import Track, reach_of, usual_speed
 from toolkit.diagnosis.simulators.setting import dimension, is_speed
-from toolkit.diagnosis.simulators.simulator import Moving
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.forward import resisting
@@ -36,7 +33,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Largest, Pattern
     from toolkit.effects.facts import ForceHook, Values
-    from toolkit.effects.signals import Setting
 
 _LENGTHS = ("length", "angle")
 _SUBSTEPS = 4
@@ -201,46 +197,6 @@ class Motion:
         if is_position and self.velocity in result:
             result[str(self.velocity)] = v
         return result
-
-
-class AlongMotion(ABC):
-    """A simulation of which only inputs and outputs are known: what moves in it stands in its recordings."""
-
-    motion: Motion | None
-
-    @abstractmethod
-    def setting(self, run: Run) -> Setting:
-        """Return a run's setting."""
-
-    @abstractmethod
-    def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return every output of a run with effects in it."""
-
-    def moving(self) -> Moving | None:
-        """Return what moves along the recordings, None where their units show no motion."""
-        motion = self.motion
-        if motion is None:
-            return None
-
-        def sizes(channel: str | None, largest: Largest) -> MotionSizes:
-            return motion.sizes(largest(channel), largest)
-
-        def pushed(
-            run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], _: str | None, pattern: Pattern
-        ) -> dict[str, NDArray[np.float64]]:
-            simulated = self.simulate(
-                run, p, [applied for applied in active if applied.effect.channel is None]
-            )
-            shown = slopes(simulated, active, run, self.setting(run), run.columns)
-            responses = motion.pushed(simulated, run, pattern)
-            return {name: shown[name][:, None] * column for name, column in responses.items()}
-
-        return Moving(
-            integrates=False, sizes=sizes, units=lambda _: motion.units(), way=lambda _: motion.way(),
-            position=lambda _: motion.position, states=(), pushed=pushed,
-        )  # fmt: skip
 
 
 def _step(
