@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 TOO_LARGE = "more than its stated noise"
 BEYOND_REPEATS = "more than repeats of a run differ by"
-LINE = "a line at "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -283,7 +282,7 @@ class StructureFound:
     could imitate, and no effect beside it is withdrawn because of it. ``columns`` are the parameters of a
     smooth dependence; a line and a rest have none. ``noise_sd`` is what the output's noise is known to be
     where the structure shows that it is not the residual; None where it shows nothing of it. ``reason`` says
-    which line or event of its variable it is, or why it counts where no variable foretells it; else empty.
+    which ``line`` or event of its variable it is, or why it counts where no variable foretells it.
     """
 
     output: str
@@ -293,6 +292,7 @@ class StructureFound:
     rest: bool = False
     columns: int = 0
     noise_sd: float | None = None
+    line: Line | None = None
     reason: str = ""
 
     @property
@@ -338,10 +338,11 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
         line = narrowest_line(problem, name, base.residual[name])
         if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            over, text = line.angle or "time", f"{LINE}{line.told}"
-            findings.append(
-                StructureFound(output=name, variables=(over,), reason=text, gain=gain, p_value=line.p_value)
+            over, text = (line.angle or "time",), f"a line at {line.told}"
+            of_line = StructureFound(
+                output=name, variables=over, line=line, reason=text, gain=gain, p_value=line.p_value
             )
+            findings.append(of_line)
         event = _event(problem, screen, base, name)
         findings += [] if event is None else [event]
         beyond = _beyond_noise(problem, base, name)
