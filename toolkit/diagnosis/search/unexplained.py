@@ -20,8 +20,7 @@ from toolkit.diagnosis.search.screen_step import search_p_values
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import CaseChannel
 
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
@@ -45,7 +44,7 @@ class Line:
     width: float
     angle: str = ""
 
-    def courses(self, problem: Problem) -> list[NDArray[np.float64]]:
+    def courses(self, problem: Problem) -> list[Array]:
         """Return what it is a line over in every run, (n_run,): time [s], or turns."""
         over = (turns_of(problem, each) for each in problem.case.drivers if each.name == self.angle)
         return next(over, None) or [run.t for run in problem.runs]
@@ -56,7 +55,7 @@ class Line:
         return f"{self.frequency:.4g} {'per turn' if self.angle else 'Hz'}"
 
 
-def narrowest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
+def narrowest_line(problem: Problem, name: str, residual: Array) -> Line | None:
     """Return the strongest line of an output's residual, over a recorded angle unless time's is narrower.
 
     What is of a shaft keeps its number per turn while the speed changes, and smears over time. As much in
@@ -71,7 +70,7 @@ def narrowest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
     return best
 
 
-def turns_of(problem: Problem, channel: CaseChannel) -> list[NDArray[np.float64]] | None:
+def turns_of(problem: Problem, channel: CaseChannel) -> list[Array] | None:
     """Return the turns of a recorded angle in every run, (n_run,); None where it does not turn in one way."""
     if unit(channel.unit).dimension != "angle":
         return None
@@ -88,9 +87,9 @@ def turns_of(problem: Problem, channel: CaseChannel) -> list[NDArray[np.float64]
 def strongest_line(
     problem: Problem,
     name: str,
-    residual: NDArray[np.float64],
+    residual: Array,
     *,
-    over: Sequence[NDArray[np.float64]] | None = None,
+    over: Sequence[Array] | None = None,
 ) -> Line | None:
     """Return the strongest line of an output's residual, None where no run is long and even enough.
 
@@ -138,13 +137,13 @@ def strongest_line(
     return Line(frequency=k / (n * step), p_value=p, share=share, width=1 / (n * step))
 
 
-def _level(power: NDArray[np.float64], k: int) -> float:
+def _level(power: Array, k: int) -> float:
     low, high = max(1, k - STRUCTURE.line_around), min(len(power), k + STRUCTURE.line_around + 1)
     around = np.concatenate([power[low : max(low, k - 2)], power[min(high, k + 3) : high]])
     return float(np.median(around)) if len(around) else 0.0
 
 
-def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], line: Line) -> float:
+def beyond_its_past(problem: Problem, name: str, residual: Array, line: Line) -> float:
     """Return the chance that coloured noise has waves as large, each run's of its own phase.
 
     Noise that came through a resonance of the plant has a peak in its spectrum as well, as narrow as the line
@@ -198,7 +197,7 @@ class Event:
     end: float
     looked: int
 
-    def columns(self, problem: Problem) -> NDArray[np.float64]:
+    def columns(self, problem: Problem) -> Array:
         """Return one in its rows and zero elsewhere, (rows, 1)."""
         inside = [
             (run.t >= self.start) & (run.t <= self.end) & (run.name == self.run) for run in problem.runs
@@ -206,7 +205,7 @@ class Event:
         return np.concatenate(inside).astype(np.float64)[:, None]
 
 
-def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64]) -> tuple[Event, ...]:
+def strongest_events(problem: Problem, name: str, residual: Array) -> tuple[Event, ...]:
     """Return for every run the stretch of its time that stands off the rest most clearly.
 
     None of a run in which other stretches as long are off as well: that is what wanders, not what happened.
@@ -235,7 +234,7 @@ def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64])
     return tuple(events)
 
 
-def _stands_out(values: NDArray[np.float64], first: int, last: int) -> bool:
+def _stands_out(values: Array, first: int, last: int) -> bool:
     """Tell whether the mean of some rows is far beyond those of all other stretches of as many."""
     rows = last - first
     total = np.concatenate([[0.0], np.cumsum(values)])

@@ -20,9 +20,9 @@ from toolkit.effects.effect import Effect
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from toolkit.arrays import Array
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.diagnosis.simulators.simulator import Arrays, Largest, Pattern
+    from toolkit.diagnosis.simulators.simulator import Largest, Pattern
     from toolkit.effects.signals import Setting
     from toolkit.effects.surroundings import MotionSizes
     from toolkit.findings import Finding

@@ -19,13 +19,10 @@ from toolkit.worker.posix import Limits
 from toolkit.worker.worker import DiedError, Worker
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.worker.serve import Handlers
 
-    Arrays = dict[str, NDArray[np.float64]]
     Shapes = Mapping[str, tuple[int, ...]]
 
 

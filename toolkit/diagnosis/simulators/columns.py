@@ -25,9 +25,8 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from toolkit.arrays import Array
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.diagnosis.simulators.simulator import Arrays
 
 
 class ColumnsModel(AlongRecordings):

@@ -28,8 +28,7 @@ from toolkit.effects.surroundings import MotionSizes
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Largest, Pattern
     from toolkit.effects.facts import ForceHook, Values
@@ -52,7 +51,7 @@ class Motion:
     position: str | None
     velocity: str | None
     speed: float = 0.0
-    _rates: dict[Run, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
+    _rates: dict[Run, Array] = dataclasses.field(default_factory=dict)
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the output that a dynamic effect could enter."""
@@ -90,7 +89,7 @@ class Motion:
         length = output if self.kind == "position" else f"{output}*s"
         return f"{length}/s^2", f"{length}/s", length
 
-    def speeds(self, run: Run) -> NDArray[np.float64]:
+    def speeds(self, run: Run) -> Array:
         """Return the velocity of a run beside a force, (n,): as recorded, or the rate of its position."""
         if self.velocity is not None:
             return run.columns[self.velocity]
@@ -131,10 +130,10 @@ class Motion:
 
     def pushed(
         self,
-        simulated: Mapping[str, NDArray[np.float64]],
+        simulated: Mapping[str, Array],
         run: Run,
         pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:
+    ) -> dict[str, Array]:
         """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
         x = simulated.get(str(self.position), run.columns.get(str(self.position)))
         if x is None:
@@ -148,8 +147,8 @@ class Motion:
         return {name: pushes if name == self.output else none for name in simulated}
 
     def disturbed(
-        self, simulated: Mapping[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
-    ) -> dict[str, NDArray[np.float64]]:
+        self, simulated: Mapping[str, Array], forces: Sequence[AppliedEffect], run: Run
+    ) -> dict[str, Array]:
         """Return the outputs with force-like terms in the equation of motion."""
         result = dict(simulated)
         if self.kind == "force":
@@ -161,8 +160,8 @@ class Motion:
         return self._moved(result, forces, run)
 
     def _moved(
-        self, simulated: dict[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
-    ) -> dict[str, NDArray[np.float64]]:
+        self, simulated: dict[str, Array], forces: Sequence[AppliedEffect], run: Run
+    ) -> dict[str, Array]:
         from scipy.interpolate import CubicSpline
 
         if run.rows < 4:

@@ -21,10 +21,9 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from toolkit.arrays import Array
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
-    from toolkit.diagnosis.simulators.simulator import Arrays
     from toolkit.worker.serve import Handlers
 
     Answer = Callable[[Run, Mapping[str, float], Mapping[str, Array]], Arrays]
