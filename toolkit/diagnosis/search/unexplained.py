@@ -54,6 +54,11 @@ class Line:
         """Return the frequency with its unit."""
         return f"{self.frequency:.4g} {'per turn' if self.angle else 'Hz'}"
 
+    @property
+    def reason(self) -> str:
+        """Return which line of its variable it is, as the answer says it."""
+        return f"a line at {self.told}"
+
 
 def narrowest_line(problem: Problem, name: str, residual: Array) -> Line | None:
     """Return the strongest line of an output's residual, over a recorded angle unless time's is narrower.
@@ -337,9 +342,9 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
         line = narrowest_line(problem, name, base.residual[name])
         if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            over, text = (line.angle or "time",), f"a line at {line.told}"
+            over = (line.angle or "time",)
             of_line = StructureFound(
-                output=name, variables=over, line=line, reason=text, gain=gain, p_value=line.p_value
+                output=name, variables=over, line=line, reason=line.reason, gain=gain, p_value=line.p_value
             )
             findings.append(of_line)
         event = _event(problem, screen, base, name)
