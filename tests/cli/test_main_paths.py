@@ -23,6 +23,7 @@ from tests.fuzz.corpus import _model
 from toolkit.cli.main import command_tree, run
 from toolkit.inputs import raise_limits
 from toolkit.lab.home import packaged_home
+from toolkit.report.word import tag_sheet
 
 RECORD = "m15-virtual-r1"
 DECIDED = "--reason x --by anna"
@@ -209,6 +210,12 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return home
 
 
+@pytest.fixture
+def sheet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sheet of tags that takes no time to write: where it goes is asked for, eight times."""
+    monkeypatch.setattr(tag_sheet, "tag_sheet", lambda *_given, **_named: b"a sheet")
+
+
 def _put(kind: str, place: Path) -> None:
     if kind in ("below", "nul", "long"):
         return
@@ -240,7 +247,12 @@ def _put(kind: str, place: Path) -> None:
     ("name", "parameter"), PATHS, ids=[f"{name} {parameter.opts[0]}" for name, parameter in PATHS]
 )
 def test_a_path_to_nowhere_is_refused_by_its_name(
-    home: Path, name: str, parameter: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    home: Path,
+    sheet: None,
+    name: str,
+    parameter: Any,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(home)
     if name in ("report", "watch") and shutil.which("soffice") is None:
