@@ -212,8 +212,15 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def sheet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sheet of tags that takes no time to write: where it goes is asked for, eight times."""
-    monkeypatch.setattr(tag_sheet, "tag_sheet", lambda *_given, **_named: b"a sheet")
+    """One sheet of tags for all places where it cannot be written: it takes a second each time."""
+    write, sheets = tag_sheet.tag_sheet, []
+
+    def written(*given: Any, **named: Any) -> bytes:
+        if not sheets:
+            sheets.append(write(*given, **named))
+        return sheets[0]
+
+    monkeypatch.setattr(tag_sheet, "tag_sheet", written)
 
 
 def _put(kind: str, place: Path) -> None:
