@@ -18,6 +18,7 @@ from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
 from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
+from toolkit.diagnosis.search.wandering import may_wander, outdoes_wandering
 from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.errors import FitError
 
@@ -176,6 +177,8 @@ def best_step(
         if trial.score - base.log_posterior < STEP.least_gain or drifts_faster(problem, base, made):
             continue
         if only_bends(problem, made):
+            continue
+        if may_wander(problem, made.active[-1]) and not outdoes_wandering(problem, base, made):
             continue
         scores = trial.held_out(problem, folds)
         if scores is None:
