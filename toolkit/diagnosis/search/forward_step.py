@@ -31,6 +31,15 @@ class Rival:
     difference: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterInPlace:
+    """A parameter of the simulation that does what an effect does, by the recording alone."""
+
+    name: str
+    value: float
+    sd: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
     """An effect that was found: its evidence, and what else would explain the same."""
@@ -40,6 +49,7 @@ class Step:
     held_out_gain: float
     gain: float
     rivals: tuple[Rival, ...]
+    parameter: ParameterInPlace | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
