@@ -48,6 +48,32 @@ def test_a_parameter_that_its_prior_holds_back_is_told(tmp_path):
     assert "+4.0 sd refitted" in findings["parameter-at-bound"].message
 
 
+def test_a_parameter_that_does_what_a_name_does_is_of_its_class(tmp_path):
+    """A gain of 1.06 is what was drawn: that the sensor has it, only the declared 1 +- 0.01 says."""
+    findings, answer = told(
+        tmp_path, cell_case(0.01), CELL, [table(k, gain=1.06).drop(columns="T") for k in range(2)]
+    )
+    (effect,) = answer.effects
+    assert (answer.verdict, effect.name, effect.equivalent_to[-1]) == (
+        "equivalent", "sensitivity_error", "gain"
+    )  # fmt: skip
+    value, rest = findings["parameter-alike"].message.split(" ", 1)
+    assert abs(float(value) - 1.06) < 0.02
+    assert f"declared 1 with one of 0.01: sensitivity_error on {effect.channel} says the same" in rest
+    assert any("a measurement of gain by itself (gain)" in text for text in answer.next_measurements)
+
+
+def test_a_parameter_that_does_something_else_is_of_no_class(tmp_path):
+    frames = [table(k).drop(columns="T") for k in range(2)]
+    for frame in frames:
+        frame["F"] += 6.0  # a zero, and the load swings about 20: no gain of the model does that
+    findings, answer = told(tmp_path, cell_case(0.01), CELL, frames)
+    (effect,) = answer.effects
+    assert effect.name == "zero_offset"
+    assert "gain" not in effect.equivalent_to
+    assert "parameter-alike" not in findings
+
+
 def test_a_refit_that_makes_unseen_rows_worse_is_told(tmp_path):
     # Next to no warmth in the first run: what is fitted there of its influence is noise, and prior.
     text = cell_case(10.0, T="K").replace("gain", "warm")

@@ -18,10 +18,11 @@ from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import HeldOut, folds_of, hold_out
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.search import proposals as along
-from toolkit.diagnosis.search import search
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.search.superfluous import pruned, told_from_none
+from toolkit.diagnosis.search.superfluous import without as remaining
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.facts import Values
 
@@ -107,7 +108,7 @@ def test_what_the_form_of_a_drag_may_leave_is_dropped_beside_it(tmp_path: Path) 
     )
     folds = folds_of(problem, made)
     without = hold_out(problem, folds_of(problem, refitted), (), refitted)
-    _, kept_unseen, kept = search._pruned(problem, folds, made, unseen, without, steps)
+    _, kept_unseen, kept = pruned(problem, folds, made, unseen, without, steps)
     assert names(steps) == ["periodic_ripple", "quadratic_drag"]
     assert unseen.total > kept_unseen.total + 1.5  # the score alone would have kept it
     assert names(kept) == ["quadratic_drag"]
@@ -125,11 +126,11 @@ def test_an_effect_stays_where_the_likelihood_falls_without_it_whatever_the_curv
     )
     folds = folds_of(problem, made)
     wide = replace(made, covariance=made.covariance * 1e9)
-    told, _, kept = search._told_from_none(problem, folds, wide, unseen, steps)
+    told, _, kept = told_from_none(problem, folds, wide, unseen, steps)
     assert names(kept) == ["periodic_ripple", "quadratic_drag"]
     # Its standard deviation is the one at which a normal likelihood falls as far from the size to none.
     drag = dict(made.active[0].values)["drag"]
-    bare = fit(problem, search.without(made.active, made.active[0]), start=made.p)
+    bare = fit(problem, remaining(made.active, made.active[0]), start=made.p)
     lost = made.log_posterior - bare.log_posterior
     at = len(problem.free)
     assert 0.5 * drag**2 / told.covariance[at, at] == pytest.approx(lost, rel=1e-6)

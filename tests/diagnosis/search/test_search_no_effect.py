@@ -12,7 +12,7 @@ from toolkit.diagnosis.fit.fit import fit, replace_effects
 from toolkit.diagnosis.fit.noise import fit_noise, layout
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.search.forward_step import Step
-from toolkit.diagnosis.search.search import _with_a_size
+from toolkit.diagnosis.search.superfluous import with_a_size
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
@@ -57,7 +57,7 @@ def test_an_effect_that_nothing_shows_is_dropped_and_the_others_keep_their_covar
     )
     both = replace_effects(problem, plain, (shown, unseen))
     steps = [Step(active=one, p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=()) for one in (shown, unseen)]
-    made, left = _with_a_size(problem, both, steps)
+    made, left = with_a_size(problem, both, steps)
     assert [one.active.effect.name for one in left] == ["zero_offset"]
     assert [one.effect.name for one in made.active] == ["zero_offset"]
     # mass, damping, offset; the offset was not fitted

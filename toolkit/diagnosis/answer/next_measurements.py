@@ -31,9 +31,10 @@ _OF_LOADS = ("force", "moment", "mass", "bridge_ratio")
 
 
 def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
-    """Return the other names that explain a step as well, without the step's own."""
+    """Return the other names that explain a step as well, without its own; a parameter comes last."""
     names = [rival.active.effect.name for rival in step.rivals if rival.difference > -VERDICT.close]
     names += _always(problem, step.active)
+    names += [] if step.parameter is None else [step.parameter.name]
     own = step.active.effect.name
     return tuple(dict.fromkeys(name for name in names if name != own))
 
@@ -42,7 +43,9 @@ def apart(effect: DiagnosedEffect) -> str:
     """Return the measurements that would tell an effect from its class, and of which names each speaks."""
     statements: dict[str, list[str]] = {}
     for name in (effect.name, *effect.equivalent_to):
-        statements.setdefault(catalogue()[name].separates, []).append(name)
+        known = catalogue().get(name)  # a parameter of the simulation has none
+        separates = f"a measurement of {name} by itself" if known is None else known.separates
+        statements.setdefault(separates, []).append(name)
     return "; ".join(f"{text} ({', '.join(names)})" for text, names in statements.items() if text)
 
 

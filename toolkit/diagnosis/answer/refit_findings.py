@@ -18,8 +18,30 @@ if TYPE_CHECKING:
 def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
     """Return what is told of parameters at their bounds, runs that differ, and a refit that does harm."""
     return (
-        *_at_bounds(case, search), *_scatter(case, search), *_worse(case, search), *_drifting(case, search)
+        *_at_bounds(case, search), *_alike(case, search), *_scatter(case, search), *_worse(case, search),
+        *_drifting(case, search),
     )  # fmt: skip
+
+
+def _alike(case: Case, search: Search) -> tuple[Finding, ...]:
+    listed = {parameter.name: parameter for parameter in search.problem.free}
+    findings = []
+    for step in search.steps:
+        if step.parameter is None:
+            continue
+        parameter, label = listed[step.parameter.name], step.active.key.label
+        found = f"{step.parameter.value:.4g} {parameter.unit}"
+        sd, declared, prior = f"{step.parameter.sd:.2g}", f"{parameter.value:.4g}", f"{parameter.sd:.2g}"
+        findings.append(
+            Finding(
+                rule="parameter-alike",
+                where=f"{case.path.name}: {parameter.name}",
+                level="warning",
+                message=f"{found} from the recording with a standard deviation of {sd}, declared {declared} "
+                f"with one of {prior}: {label} says the same",
+            )
+        )
+    return tuple(findings)
 
 
 def confounded_findings(

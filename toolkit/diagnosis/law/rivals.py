@@ -19,7 +19,7 @@ from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import before_nothing
 from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.policy import LAWS, STEP, VERDICT
-from toolkit.diagnosis.search.search import without
+from toolkit.diagnosis.search.superfluous import without
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
 

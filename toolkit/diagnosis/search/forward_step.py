@@ -18,6 +18,7 @@ from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
 from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
+from toolkit.diagnosis.search.wandering import may_wander, outdoes_wandering
 from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.errors import FitError
 
@@ -30,6 +31,15 @@ class Rival:
     difference: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterInPlace:
+    """A parameter of the simulation that does what an effect does, by the recording alone."""
+
+    name: str
+    value: float
+    sd: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
     """An effect that was found: its evidence, and what else would explain the same."""
@@ -39,6 +49,7 @@ class Step:
     held_out_gain: float
     gain: float
     rivals: tuple[Rival, ...]
+    parameter: ParameterInPlace | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -176,6 +187,8 @@ def best_step(
         if trial.score - base.log_posterior < STEP.least_gain or drifts_faster(problem, base, made):
             continue
         if only_bends(problem, made):
+            continue
+        if may_wander(problem, made.active[-1]) and not outdoes_wandering(problem, base, made):
             continue
         scores = trial.held_out(problem, folds)
         if scores is None:

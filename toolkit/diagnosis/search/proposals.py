@@ -92,28 +92,11 @@ NONE = Proposals((), (), {}, frozenset())
 
 def proposals(problem: Problem, base: Fit) -> Proposals:
     """Return what the prediction errors of a fit propose; nothing where its equation cannot be followed."""
-    moving = problem.model.capability.motion
-    led_along = None if moving is None else moving.followed
-    if led_along is None or not problem.names:
+    if not problem.names:
         return NONE
-    p = dict(problem.known) | {
-        parameter.name: value for parameter, value in zip(problem.free, base.p, strict=True)
-    }
-    asked = Following(
-        steps={parameter.name: PARAMETER_STEP * (parameter.sd or 1.0) for parameter in problem.free},
-        sensor={name: noise_parts(problem, base, name).sensor_sd or 1.0 for name in problem.names},
-        unread={
-            name: tuple(np.flatnonzero(~kept & np.isfinite(problem.observed[name])).tolist())
-            for name, kept in problem.kept.items()
-        },
-    )
 
     def errors_along(steadier: float) -> _PredictionErrors | None:
-        try:
-            followed, answers = led_along(problem.runs, p, base.active, replace(asked, steadier=steadier))
-        except FitError:
-            return None
-        return _PredictionErrors(problem, base, followed, answers / PARAMETER_STEP)
+        return _errors_along(problem, base, steadier)
 
     usual = errors_along(1.0)
     if usual is None:
@@ -134,6 +117,41 @@ def proposals(problem: Problem, base: Fit) -> Proposals:
             if likelihood > likeliest:
                 steadiest, likeliest = made, likelihood
     return steadiest if likeliest > plain else found
+
+
+def likelihood_along(problem: Problem, base: Fit) -> float | None:
+    """Return how likely a recording is to a fit's equation that wanders as is likeliest, but for a constant.
+
+    The logarithm, with the priors in it and the parameters at their best; None where no equation can be led
+    along its recording.
+    """
+    errors = _errors_along(problem, base, 1.0)
+    return None if errors is None else errors.likelihood
+
+
+def _errors_along(problem: Problem, base: Fit, steadier: float) -> _PredictionErrors | None:
+    """Return the prediction errors of a fit's equation; None where it cannot be followed."""
+    moving = problem.model.capability.motion
+    led_along = None if moving is None else moving.followed
+    if led_along is None:
+        return None
+    p = dict(problem.known) | {
+        parameter.name: value for parameter, value in zip(problem.free, base.p, strict=True)
+    }
+    asked = Following(
+        steps={parameter.name: PARAMETER_STEP * (parameter.sd or 1.0) for parameter in problem.free},
+        sensor={name: noise_parts(problem, base, name).sensor_sd or 1.0 for name in problem.names},
+        unread={
+            name: tuple(np.flatnonzero(~kept & np.isfinite(problem.observed[name])).tolist())
+            for name, kept in problem.kept.items()
+        },
+        steadier=steadier,
+    )
+    try:
+        followed, answers = led_along(problem.runs, p, base.active, asked)
+    except FitError:
+        return None
+    return _PredictionErrors(problem, base, followed, answers / PARAMETER_STEP)
 
 
 def _shown(errors: _PredictionErrors) -> Proposals:

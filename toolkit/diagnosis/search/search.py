@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.drift import judged_by_rates
-from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects, sizes_off
-from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, folds_of, hold_out, matters
+from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
+from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.fit.run_scatter import RunScatter, held_out_beside_scatter, with_run_scatter
 from toolkit.diagnosis.policy import STEP, VERDICT
@@ -27,6 +27,7 @@ from toolkit.diagnosis.search.proposals import NONE, proposals
 from toolkit.diagnosis.search.proposed_step import beside_rivals, proposed_step
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import from_declared, look, masked
+from toolkit.diagnosis.search.superfluous import pruned, told_from_none, with_a_size, without
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.diagnosis.search.unseen_runs import does_harm, shown_on_unseen_runs
@@ -66,16 +67,6 @@ def refined(
     for applied in base.active:
         base = _better(problem, base, _with_noise(base, applied), STEP.band_noise)
     return base, held_out
-
-
-def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[AppliedEffect, ...]:
-    """Return effects without one of them; a drift with the temperature goes with its zero."""
-
-    def goes(applied: AppliedEffect) -> bool:
-        its_zero = effect.effect.frees_zero and applied.effect.is_zero
-        return applied.key == effect.key or (its_zero and applied.key[1:] == (effect.channel, None, None))
-
-    return tuple(applied for applied in active if not goes(applied))
 
 
 def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | None, least: float) -> Fit:
@@ -174,7 +165,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     try:
         for turn in range(STEP.most_effects + 1):
             share = STEP.later if turn else STEP.first
-            base, steps = _with_a_size(problem, base, steps)
+            base, steps = with_a_size(problem, base, steps)
 
             def fitting(scored: Sequence[Scored], turn: int = turn) -> None:
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in scored))
@@ -260,16 +251,16 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
-            base, held_base, steps = _pruned(problem, folds, base, held_base, held_refitted, steps)
+            base, held_base, steps = pruned(problem, folds, base, held_base, held_refitted, steps)
     except BudgetSpentError as error:
         skipped.append(str(error))
-    base, steps = _with_a_size(problem, base, steps)
+    base, steps = with_a_size(problem, base, steps)
     if not steps:
         structure += proposed.unconfirmed(problem)
     with contextlib.suppress(BudgetSpentError):
         named, (base, held_base, steps) = (
             steps,
-            _told_from_none(problem, folds, base, held_base, steps),
+            told_from_none(problem, folds, base, held_base, steps),
         )
         structure = structure if steps or not named else before
     scatter: tuple[RunScatter, ...] = ()
@@ -354,92 +345,6 @@ def _stepped(
 
 def _rounded(values: NDArray[np.float64], step: float, origin: float) -> NDArray[np.float64]:
     return np.asarray(step * np.round((values - origin) / step) + origin)
-
-
-def _pruned(
-    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, refitted: HeldOut, steps: list[Step]
-) -> tuple[Fit, HeldOut, list[Step]]:
-    """Drop effects that the others make superfluous: of which too little is left to say beside them.
-
-    Their held-out score is as good without, or what it takes is no more than the others' own forms are off.
-
-    Parameters
-    ----------
-    refitted : the held-out rows without any effect
-    """
-    for i in range(len(steps) - 1):
-        if len(base.active) < 2:
-            break
-        remaining = without(base.active, steps[i].active)
-        try:
-            pruned = fit(problem, remaining, start=base.p)
-            scores = hold_out(problem, folds, pruned.active, pruned)
-        except FitError:  # what is left cannot be simulated: the effect is needed
-            continue
-        form = max((applied.effect.form_error for applied in remaining), default=0.0)
-        if held_base.total - scores.total < STEP.least_gain or not beyond_form(
-            problem, refitted, scores, held_base, form
-        ):
-            base, held_base = pruned, scores
-            keys = {applied.key for applied in remaining}
-            steps = [step for step in steps if step.active.key in keys]
-            return _pruned(problem, folds, base, held_base, refitted, steps)
-    return base, held_base, steps
-
-
-def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
-    """Return a hypothesis without effects that a later one left nothing to do."""
-    for step in steps:
-        remaining = without(base.active, step.active)
-        try:
-            bare = problem.simulate(base.p, remaining)
-        except (FitError, BudgetSpentError):  # the simulation needs it, or there is no time to look
-            continue
-        moved = {name: column - bare[name] for name, column in base.simulated.items()}
-        if all(
-            float(np.abs(change[problem.kept[name]]).max(initial=0.0))
-            < STEP.visible * base.noise[name].marginal_sd
-            for name, change in moved.items()
-        ):
-            keys = {applied.key for applied in remaining}
-            remaining_steps = [step for step in steps if step.active.key in keys]
-            return _with_a_size(problem, replace_effects(problem, base, remaining), remaining_steps)
-    return base, steps
-
-
-def _told_from_none(
-    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
-) -> tuple[Fit, HeldOut, list[Step]]:
-    """Return a hypothesis without effects whose sizes, all together, may be none.
-
-    The curvature of a fit says where to ask, and the fit without it decides: where friction holds, slides or
-    stops, an interval of the curvature reaches to zero for an effect without which nothing is foretold. Then
-    the likelihood's own chord from there to none is the sizes' standard deviation (profile likelihood).
-    """
-    from scipy.stats import chi2
-
-    for applied in base.active:
-        away, own = sizes_off(base, applied)
-        reach = float(chi2.ppf(VERDICT.interval, len(own))) if own else 0.0
-        listed = [step for step in steps if step.active.key != applied.key]
-        if not away < reach or len(listed) == len(steps):
-            continue
-        try:
-            bare = fit(problem, without(base.active, applied), start=base.p)
-        except FitError:  # the simulation needs it
-            continue
-        lost = base.log_posterior - bare.log_posterior
-        if lost > reach / 2:  # the likelihood ratio of their interval
-            scale = np.ones(len(base.covariance))
-            scale[own] = math.sqrt(away / (2 * lost))
-            base = replace(base, covariance=base.covariance * np.outer(scale, scale))
-            continue
-        try:
-            scores = hold_out(problem, folds, bare.active, bare)
-        except FitError:  # so does a part of it
-            continue
-        return _told_from_none(problem, folds, bare, scores, listed)
-    return base, held_base, steps
 
 
 def _beside_scatter(

@@ -1,0 +1,125 @@
+"""Effects without which nothing is lost: beside others, beside their own interval, beside what wanders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.fit import fit, replace_effects, sizes_off
+from toolkit.diagnosis.fit.folds import beyond_form, hold_out
+from toolkit.diagnosis.policy import STEP, VERDICT
+from toolkit.diagnosis.search.time_budget import BudgetSpentError
+from toolkit.diagnosis.search.wandering import may_wander, outdoes_wandering
+from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.fit import Fit
+    from toolkit.diagnosis.fit.folds import Folds, HeldOut
+    from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.diagnosis.search.forward_step import Step
+    from toolkit.effects.applied import AppliedEffect
+
+
+def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[AppliedEffect, ...]:
+    """Return effects without one of them; a drift with the temperature goes with its zero."""
+
+    def goes(applied: AppliedEffect) -> bool:
+        its_zero = effect.effect.frees_zero and applied.effect.is_zero
+        return applied.key == effect.key or (its_zero and applied.key[1:] == (effect.channel, None, None))
+
+    return tuple(applied for applied in active if not goes(applied))
+
+
+def pruned(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, refitted: HeldOut, steps: list[Step]
+) -> tuple[Fit, HeldOut, list[Step]]:
+    """Drop effects that the others make superfluous: of which too little is left to say beside them.
+
+    Their held-out score is as good without, or what it takes is no more than the others' own forms are off.
+
+    Parameters
+    ----------
+    refitted : the held-out rows without any effect
+    """
+    for i in range(len(steps) - 1):
+        if len(base.active) < 2:
+            break
+        remaining = without(base.active, steps[i].active)
+        try:
+            fewer = fit(problem, remaining, start=base.p)
+            scores = hold_out(problem, folds, fewer.active, fewer)
+        except FitError:  # what is left cannot be simulated: the effect is needed
+            continue
+        form = max((applied.effect.form_error for applied in remaining), default=0.0)
+        if held_base.total - scores.total < STEP.least_gain or not beyond_form(
+            problem, refitted, scores, held_base, form
+        ):
+            base, held_base = fewer, scores
+            keys = {applied.key for applied in remaining}
+            steps = [step for step in steps if step.active.key in keys]
+            return pruned(problem, folds, base, held_base, refitted, steps)
+    return base, held_base, steps
+
+
+def with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
+    """Return a hypothesis without effects that a later one left nothing to do."""
+    for step in steps:
+        remaining = without(base.active, step.active)
+        try:
+            bare = problem.simulate(base.p, remaining)
+        except (FitError, BudgetSpentError):  # the simulation needs it, or there is no time to look
+            continue
+        moved = {name: column - bare[name] for name, column in base.simulated.items()}
+        if all(
+            float(np.abs(change[problem.kept[name]]).max(initial=0.0))
+            < STEP.visible * base.noise[name].marginal_sd
+            for name, change in moved.items()
+        ):
+            keys = {applied.key for applied in remaining}
+            remaining_steps = [step for step in steps if step.active.key in keys]
+            return with_a_size(problem, replace_effects(problem, base, remaining), remaining_steps)
+    return base, steps
+
+
+def told_from_none(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+) -> tuple[Fit, HeldOut, list[Step]]:
+    """Return a hypothesis without effects whose sizes, all together, may be none.
+
+    The curvature of a fit says where to ask, and the fit without it decides: where friction holds, slides or
+    stops, an interval of the curvature reaches to zero for an effect without which nothing is foretold. Then
+    the likelihood's own chord from there to none is the sizes' standard deviation (profile likelihood). A
+    constant in an equation has to be more than the mean of a plant that wanders, by whatever step it came.
+    """
+    from scipy.stats import chi2
+
+    for applied in base.active:
+        away, own = sizes_off(base, applied)
+        reach = float(chi2.ppf(VERDICT.interval, len(own))) if own else 0.0
+        listed = [step for step in steps if step.active.key != applied.key]
+        wanders = may_wander(problem, applied)
+        if not (wanders or away < reach) or len(listed) == len(steps):
+            continue
+        try:
+            bare = fit(problem, without(base.active, applied), start=base.p)
+        except FitError:  # the simulation needs it
+            continue
+        lost = base.log_posterior - bare.log_posterior
+        wanders = wanders and not outdoes_wandering(problem, bare, base)
+        if not (wanders or away < reach):
+            continue
+        if not wanders and lost > reach / 2:  # the likelihood ratio of their interval
+            scale = np.ones(len(base.covariance))
+            scale[own] = math.sqrt(away / (2 * lost))
+            base = replace(base, covariance=base.covariance * np.outer(scale, scale))
+            continue
+        try:
+            scores = hold_out(problem, folds, bare.active, bare)
+        except FitError:  # so does a part of it
+            continue
+        return told_from_none(problem, folds, bare, scores, listed)
+    return base, held_base, steps
