@@ -228,7 +228,7 @@ def _withdrawn(
             entry.id, f"the record is {status.state} already",
             f"{status.state}: {status.reason or 'no reason stated'}", "a record that stands", "withdrawal",
         )  # fmt: skip
-    # An approval whose day had not begun when it was withdrawn is of a clock that was fast: no day follows it.
+    # An approval whose day had not begun when it was withdrawn is of a fast clock: no day follows it.
     written = moment(entry.time)
     days = [
         line.known_on
