@@ -14,7 +14,7 @@ import pytest
 from tests.calibration.control_factory import enter, write_session
 from tests.calibration.registry.test_candidate_legacy import GOOD
 from tests.trust.forgeries.laboratory import KEYS, event_of, laboratory
-from toolkit.calibration.registry import approval, candidate, clock, ledger
+from toolkit.calibration.registry import approval, candidate, clock, ledger, life
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import import_legacy
 from toolkit.calibration.registry.clock import clock_state
@@ -142,6 +142,28 @@ def test_a_withdrawal_is_entered_after_a_line_of_a_fast_clock_and_the_ledger_goe
     assert entered.status("cell-r1").state == "withdrawn"
     assert entered.ledger("cell").damage is None
     assert entered.ledger("cell").doubt is not None
+
+
+def test_an_approval_of_a_fast_clock_is_withdrawn_on_the_day_that_it_is_and_leaves_no_day(
+    entered: Registry, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    # A fast clock is wrong in both: the time of the line and the day of the decision.
+    late = dt.datetime.now(tz=dt.UTC) + dt.timedelta(days=100)
+    with monkeypatch.context() as fast:
+        fast.setattr(approval, "now", lambda: late.strftime("%Y-%m-%dT%H:%M:%SZ"))
+        fast.setattr(life, "check_begun", lambda *_words: None)
+        assert approve(
+            entered, "cell-r1", in_force_from=SESSION, checked_by="B", reason="late", known_on=late.date()
+        ).done
+    assert entered.ledger("cell").known_on() == late.date()
+    refused(entered, lambda: withdraw(entered, "cell-r1", on=late.date(), reason="fast clock", by="B"))
+    withdraw(entered, "cell-r1", on=TODAY, reason="fast clock", by="B")
+    assert entered.status("cell-r1").state == "withdrawn"
+    assert entered.id_in_force("cell", on=TODAY) is None
+    assert entered.ledger("cell").known_on() == TODAY
+    assert {row.id for row in verify_registry(entered) if not row.ok} == {LEDGER}
+    enter(entered, tmp_path / "s2", SESSION + dt.timedelta(days=1))
+    assert approve(entered, "cell-r2", in_force_from=SESSION, checked_by="B", reason="late").done
 
 
 def test_a_clock_that_was_set_back_brings_no_withdrawn_record_back(

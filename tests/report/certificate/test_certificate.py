@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import SHARED_DATA
+from toolkit.calibration.registry import approval, life
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
-from toolkit.errors import ConfigError, RecordError
+from toolkit.errors import ConfigError, RecordError, RegistryError
 from toolkit.report.certificate.collect import collect
 from toolkit.report.certificate.content import GAP, build_content
 from toolkit.report.certificate.dcc import build_dcc
@@ -203,6 +204,31 @@ def test_a_candidate_has_a_draft_at_most(tmp_path: Path) -> None:
     made = collect(registry, "pair-r1", STYLE, issued=DAY, draft=True)
     assert made.draft
     assert build_content(made).marks[0][1].startswith("DRAFT")
+
+
+def test_no_certificate_is_of_a_day_to_come(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    registry = registry_of(tmp_path)
+    late = dt.datetime.now(tz=dt.UTC) + dt.timedelta(days=100)
+    with pytest.raises(RegistryError) as caught:
+        collect(registry, "pair-r1", STYLE, issued=late.date())
+    assert caught.value.rule == "time"
+    # Another record is approved by a computer whose clock is fast: the day of its decision is none of issue.
+    session = tmp_path / "SESSION.toml"
+    session.write_text(session.read_text().replace("date = 2026-02-01", "date = 2026-02-03"))
+    calibrate(session, registry)
+    with monkeypatch.context() as fast:
+        fast.setattr(approval, "now", lambda: late.strftime("%Y-%m-%dT%H:%M:%SZ"))
+        fast.setattr(life, "check_begun", lambda *_words: None)
+        assert approve(
+            registry, "pair-r2", in_force_from=dt.date(2026, 2, 4), checked_by="B", reason="late",
+            known_on=late.date(),
+        ).done  # fmt: skip
+    made = collect(registry, "pair-r1", STYLE)
+    assert made.issued == registry.today()
+    assert [finding.where for finding in made.findings if finding.rule == "ledger-time"] == ["pair"]
+    with pytest.raises(RecordError) as unborn:
+        collect(registry, "pair-r2", STYLE)
+    assert unborn.value.rule == "certificate-candidate"
 
 
 def test_a_withdrawn_record_is_refused_and_an_earlier_paper_says_so(tmp_path: Path) -> None:

@@ -106,8 +106,10 @@ def check_begun(day: date, what: str, where: object) -> None:
         )
 
 
-def check_after(last: str | None, time: str, where: object) -> None:
+def check_after(last: str | None, time: str, where: object, way_on: str = "") -> None:
     """Refuse an entry whose time lies before that of the last one: a clock was set back.
+
+    ``way_on`` says what helps where it was the last one's clock that was fast.
 
     Raises
     ------
@@ -120,7 +122,7 @@ def check_after(last: str | None, time: str, where: object) -> None:
             where=where,
             got=time,
             expected=f"a time from {last} on",
-            next_step="correct this computer's clock; nothing was written",
+            next_step=f"correct this computer's clock; nothing was written{way_on}",
             rule="time",
         )
 

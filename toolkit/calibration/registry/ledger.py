@@ -324,7 +324,10 @@ class Ledger:
 
     @cached_property
     def _decided_on(self) -> date:
-        return max((e.known_on for e in self.decisions if e.known_on is not None), default=date.min)
+        # An approval that was ended decides nothing more: the day of one of a fast clock goes with it.
+        ended = {e.id for e in self.decisions if e.event != "approved"}
+        days = (e.known_on for e in self.decisions if e.event != "approved" or e.id not in ended)
+        return max((day for day in days if day is not None), default=date.min)
 
     @cached_property
     def _latest(self) -> Entry | None:

@@ -228,7 +228,13 @@ def _withdrawn(
             entry.id, f"the record is {status.state} already",
             f"{status.state}: {status.reason or 'no reason stated'}", "a record that stands", "withdrawal",
         )  # fmt: skip
-    days = [line.known_on for line in before if line.event == "approved" and line.known_on is not None]
+    # An approval whose day had not begun when it was withdrawn is of a fast clock: no day follows it.
+    written = moment(entry.time)
+    days = [
+        line.known_on
+        for line in before
+        if line.event == "approved" and line.known_on is not None and begun(line.known_on, written)
+    ]
     if days and entry.known_on is not None and entry.known_on < min(days):
         yield untimely(
             "a withdrawal lies before the approval that it ends", entry.id,

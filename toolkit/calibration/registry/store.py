@@ -37,6 +37,7 @@ from toolkit.trust.signing import Signing
 
 _DECIDED = ".pending.json.part"
 _NAMES = ("by", "approved_by", "recall")
+_WAY_ON = "; where the last entry was made by a fast clock, withdraw the record that it is about"
 # A folder that another writer removes while this one waits for its lock is made again.
 _ATTEMPTS = 100
 
@@ -96,7 +97,7 @@ def commit(
         event = timed_event(change.event, ledger, signing)
         last = ledger.entries[-1].time if ledger.entries else None
         if event["event"] != "withdrawn":
-            check_after(last, event["time"], folder / LEDGER)
+            check_after(last, event["time"], folder / LEDGER, _WAY_ON)
         if signing is not None:
             event = signed_event(event, ledger, signing, action=change.action, file=_text_of(change))
         line, digest = next_line(len(ledger.entries) + 1, ledger.head, event)

@@ -11,7 +11,9 @@ import re
 
 from toolkit.calibration.control.as_found import AsFound, as_found, as_found_before
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
+from toolkit.calibration.registry.clock import check_begun
 from toolkit.calibration.registry.gates import unverifiable
+from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import Reason, not_in_force, unapproved
 from toolkit.calibration.registry.status import RecordStatus
@@ -59,13 +61,18 @@ def collect(
     ------
     RegistryError, RecordError
         no such record, or one that fails a gate; ``certificate-unverified`` a legacy import;
-        ``certificate-candidate`` not approved and no draft; ``certificate-withdrawn`` withdrawn
+        ``certificate-candidate`` not approved and no draft; ``certificate-withdrawn`` withdrawn; ``time``
+        the day of issue has not begun
     ConfigError
         a statement that cannot be printed; a replacement without a reason, or the reverse
     """
     record = registry.load(record_id)
-    day = registry.ledger(record.instrument).known_on(issued)
-    status = registry.status(record_id, known_at=day)
+    ledger = registry.ledger(record.instrument)
+    if issued is not None:
+        check_begun(issued, "the day of issue", record.id)
+    # What was decided is known, also by a clock that was set back; no decision moves the day of issue.
+    day = issued or registry.today()
+    status = registry.status(record_id, known_at=ledger.known_on(issued))
     reasons = _admit(registry, record, status, day, draft)
     later = registry.status(record_id)
     statements = statements_of(record)
@@ -84,7 +91,6 @@ def collect(
         as_left=statements.phase == "as_left",
     )
     gaps = gaps_of(record, statements, stated)
-    ledger = registry.ledger(record.instrument)
     titled = registry.people().history.titled
     return Certificate(
         id=_identity(record, stated, replaces, amendment),
@@ -143,6 +149,7 @@ def collect(
             *gap_findings(record, gaps),
             *result_findings(record, results, check is None, stated),
             *state_findings(record, reasons, later, _same_number(registry, record, stated)),
+            *doubt_findings(ledger, record.instrument),
         ),
     )
 
@@ -396,3 +403,10 @@ def state_findings(
         message = f"{same} states the same certificate number: an id must be unique"
         findings.append(Finding(rule="certificate-number", where=record.id, message=message))
     return findings
+
+
+def doubt_findings(ledger: Ledger, instrument: str) -> list[Finding]:
+    """Return the finding about a ledger that a computer whose clock was fast has written to."""
+    if ledger.doubt is None:
+        return []
+    return [Finding(rule="ledger-time", where=instrument, message=f"of the ledger {ledger.doubt}")]
