@@ -211,7 +211,7 @@ def _values(problem: Problem, effect: Effect, channel: str) -> list[dict[str, fl
 def _left(
     problem: Problem, made: Fit, applied: AppliedEffect, names: Sequence[str], most: float = math.inf
 ) -> float | None:
-    """Return what is left beside a unit; None where it cannot be simulated, or where some runs leave ``most``.
+    """Return what is left beside a unit; None where it cannot be simulated, or some runs leave ``most``.
 
     A unit that is none may drive a simulation through thousands of steps from row to row, and one run of it
     says as much as all.
