@@ -15,8 +15,7 @@ def built_once(factory: pytest.TempPathFactory, name: str, build: Callable[[Path
 
     A folder whose building failed is not there: the next who asks builds it again, and sees the failure.
     """
-    base = factory.getbasetemp()
-    common = base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base
+    common = common_folder(factory)
     folder = common / f"{name}-built"
     with (common / f"{name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -25,3 +24,9 @@ def built_once(factory: pytest.TempPathFactory, name: str, build: Callable[[Path
             build(attempt)
             attempt.rename(folder)
     return folder
+
+
+def common_folder(factory: pytest.TempPathFactory) -> Path:
+    """Return the folder that all workers of a run have in common."""
+    base = factory.getbasetemp()
+    return base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import json
 from typing import Any, NamedTuple
 
 import pytest
+import typer.testing
 from click.testing import Result
 from typer.testing import CliRunner
 
 from toolkit.cli.main import _register, app, run
+
+# A runner builds the whole command line for each command, 0.1 s; the program itself builds it once.
+typer.testing._get_command = functools.cache(typer.testing._get_command)  # type: ignore[attr-defined]
 
 
 class Said(NamedTuple):

@@ -16,9 +16,10 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from tests.built_once import built_once
+from tests.built_once import built_once, common_folder
 from tests.declared_answers import hold_to_declarations
 from tests.kept_office import kept_office
+from tests.remembered import share
 from tests.remembered_fits import remember_fits
 from tests.remembered_work import remembered_work
 from toolkit.audit import workers
@@ -69,7 +70,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _office() -> Iterator[None]:
+def _office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    share(common_folder(tmp_path_factory) / "remembered")
     with kept_office(), remembered_work():
         yield
 

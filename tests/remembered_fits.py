@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import pickle
 from collections.abc import Callable
 from typing import Any
 
+from tests.remembered import once, remembered
 from toolkit.calibration.fit import readings_findings
 from toolkit.calibration.fit.findings import session_findings
 from toolkit.calibration.fit.session_fit import SessionFit, fit_session
-from toolkit.calibration.registry import candidate, judgement
+from toolkit.calibration.registry import candidate, judgement, plausible
 from toolkit.calibration.session.read import Session
-
-_answers: dict[bytes, bytes] = {}
+from toolkit.calibration.uncertainty import budget, components, monte_carlo
+from toolkit.calibration.uncertainty.scatter import scatter_of
 
 
 def remember_fits() -> None:
     """Have the registry fit and judge a session once, wherever a copy of it lies; a refusal is found anew.
 
-    The tests of the fit itself ask `fit_session` and `session_findings`, which remember nothing.
+    What the rows of a record tell of their scatter is asked by every budget and certificate of it.
+
+    Their own tests ask `fit_session`, `session_findings` and `scatter_of` themselves, which remember nothing.
     """
     for module in (candidate, judgement):
         module.fit_session = _fitted  # type: ignore[attr-defined]
     for room in (candidate, readings_findings):
         room.session_findings = _judged  # type: ignore[attr-defined]
+    for asker in (budget, components, monte_carlo, plausible):
+        asker.scatter_of = remembered(scatter_of)  # type: ignore[attr-defined]
 
 
 def _fitted(session: Session) -> SessionFit:
@@ -40,10 +43,7 @@ def _judged(fit: SessionFit) -> Any:
 
 def _once(ask: Callable[[Any], Any], given: Session | SessionFit, place: object) -> Any:
     """Return a copy of what is answered to the same content under the same name."""
-    key = hashlib.sha256(pickle.dumps((ask.__name__, place, _without_path(given)))).digest()
-    if key not in _answers:
-        _answers[key] = pickle.dumps(ask(given))
-    return pickle.loads(_answers[key])  # noqa: S301  written above
+    return once((ask.__name__, place, _without_path(given)), lambda: ask(given))
 
 
 def _without_path(given: Session | SessionFit) -> tuple[object, ...]:

@@ -8,23 +8,24 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
-import pickle
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import pytest
 
+from tests.remembered import remembered
 from toolkit import pipeline
 from toolkit.lab.tire_tests import tire_files
 from toolkit.report import drawer, figures
 from toolkit.report.content import Plot
+from toolkit.tires import global_fit, models
+from toolkit.tires.global_model import GlobalModel
 
 
 @contextlib.contextmanager
 def remembered_work() -> Iterator[None]:
     """Have commands reduce a test, fit the tire of one and draw a figure once, whoever asks."""
-    process = _remembered(pipeline.process)
+    process = remembered(pipeline.process)
 
     @functools.wraps(process.__wrapped__)
     def processed(folder: Any, recordings: Any, record: Any, *, protocol: Any = None, use: Any = None) -> Any:
@@ -34,24 +35,26 @@ def remembered_work() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pipeline, "process", processed)
-        patch.setattr(tire_files, "fit_test_tire", _remembered(tire_files.fit_test_tire))
-        patch.setattr(figures, "draw", _remembered(figures.draw))
+        patch.setattr(tire_files, "fit_test_tire", remembered(tire_files.fit_test_tire))
+        patch.setattr(global_fit, "fit_global", _fitted)
+        patch.setattr(figures, "draw", remembered(figures.draw))
         patch.setattr(drawer, "Drawer", _Here)
         yield
 
 
-def _remembered(ask: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that answers the same question by a copy of its first answer."""
-    answers: dict[bytes, bytes] = {}
+_fit = global_fit.fit_global
 
-    @functools.wraps(ask)
-    def asked(*given: Any, beside: object = None, **named: Any) -> Any:
-        key = hashlib.sha256(pickle.dumps((given, sorted(named.items()), beside))).digest()
-        if key not in answers:
-            answers[key] = pickle.dumps(ask(*given, **named))
-        return pickle.loads(answers[key])  # noqa: S301  written above
 
-    return asked
+@remembered
+def _fit_by_name(name: str, *given: Any, **named: Any) -> Any:
+    return _fit(models.find(name), *given, **named)
+
+
+@functools.wraps(_fit)
+def _fitted(model: GlobalModel, *given: Any, **named: Any) -> Any:
+    # A model is functions, which have no content: those of the catalogue are known by their names.
+    known = model.name in models.model_names() and models.find(model.name) is model
+    return _fit_by_name(model.name, *given, **named) if known else _fit(model, *given, **named)
 
 
 class _Here:

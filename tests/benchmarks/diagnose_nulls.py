@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmarks.timing import row
+from tests.diagnosis.case_text import case_text
 
 _COLOURS = (0.0, 0.9, 0.99)
 _ROWS, _STEP = 1500, 0.02  # of a run; s
@@ -27,24 +28,13 @@ def simulate(inputs, p):
     FY = -D * np.sin(1.3 * np.arctan(B * a - 0.2 * (B * a - np.arctan(B * a))))
     return pd.DataFrame({"FY": FY, "MZ": -FY * 0.03 * np.cos(1.1 * np.arctan(6 * a))})
 """
-_CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters]
-mu = { value = 1.0, unit = "1", sd = 0.05 }
-K = { value = 60000.0, unit = "N/rad", sd = 3000.0 }
-[recording]
-time = "t"
-axes = "SAE"
-[recording.channels]
-t = { unit = "s", role = "time" }
-SA = { unit = "deg", role = "input" }
-FZ = { unit = "N", role = "input" }
-V = { unit = "m/s", role = "input" }
-FY = { unit = "N", role = "output" }
-MZ = { unit = "N*m", role = "output" }
-"""
+_CASE = case_text(
+    "python",
+    parameters={"mu": (1.0, "1", 0.05), "K": (60000.0, "N/rad", 3000.0)},
+    inputs={"SA": "deg", "FZ": "N", "V": "m/s"},
+    outputs={"FY": "N", "MZ": "N*m"},
+    axes="SAE",
+)
 
 
 def run(folder: Path, pairs: int) -> list[dict[str, object]]:

@@ -12,26 +12,21 @@ from pathlib import Path
 
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import SIMULATOR, write_case
 from toolkit.cli.main import run
 
 START = "import ctypes, os, signal, sys, threading, time\nimport pandas as pd\ndef simulate(inputs, p):\n    "
 GOOD = "return pd.DataFrame({'F': p['mass'] * inputs['a'] + p['c'] * inputs['v']})\n"
-ODE = """schema = 1
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["x"]
-[simulation.parameters.k]
-value = 1.0
-unit = "1/s"
-sd = 0.1
-[recording.channels]
-t = { unit = "s", role = "time" }
-F = { unit = "N", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+ODE = case_text(
+    "ode",
+    time=None,
+    parameters={"k": (1.0, "1/s", 0.1)},
+    others={"t": {"unit": "s", "role": "time"}},
+    outputs={"F": "N"},
+    runs=1,
+    states=["x"],
+)
 EQUATION = "def rhs(t, x, u, p):\n    BODY\n    return [-p['k'] * x[0]]\n"
 EQUATION += "def outputs(x, u, p):\n    return {'F': x[0]}\ndef initial(p):\n    return [1.0]\n"
 

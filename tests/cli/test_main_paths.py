@@ -23,6 +23,7 @@ from tests.fuzz.corpus import _model
 from toolkit.cli.main import command_tree, run
 from toolkit.inputs import raise_limits
 from toolkit.lab.home import packaged_home
+from toolkit.report.word import tag_sheet
 
 RECORD = "m15-virtual-r1"
 DECIDED = "--reason x --by anna"
@@ -209,6 +210,19 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return home
 
 
+@pytest.fixture
+def sheet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One sheet of tags for all places where it cannot be written: it takes a second each time."""
+    write, sheets = tag_sheet.tag_sheet, []
+
+    def written(*given: Any, **named: Any) -> bytes:
+        if not sheets:
+            sheets.append(write(*given, **named))
+        return sheets[0]
+
+    monkeypatch.setattr(tag_sheet, "tag_sheet", written)
+
+
 def _put(kind: str, place: Path) -> None:
     if kind in ("below", "nul", "long"):
         return
@@ -240,7 +254,12 @@ def _put(kind: str, place: Path) -> None:
     ("name", "parameter"), PATHS, ids=[f"{name} {parameter.opts[0]}" for name, parameter in PATHS]
 )
 def test_a_path_to_nowhere_is_refused_by_its_name(
-    home: Path, name: str, parameter: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    home: Path,
+    sheet: None,
+    name: str,
+    parameter: Any,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(home)
     if name in ("report", "watch") and shutil.which("soffice") is None:

@@ -5,6 +5,7 @@ The ledger of the home is withdrawn from, cut short, rewritten, and forged behin
 
 from __future__ import annotations
 
+import functools
 import json
 import shutil
 import subprocess
@@ -204,10 +205,16 @@ def test_a_changed_file_is_none_of_the_issue(issued: Issued) -> None:
     assert issued.verify(pdf).code == 2
 
 
+@functools.cache
+def _plain(pdf: bytes) -> bytes:
+    """Return a document as it was before its proof was added."""
+    return subprocess.run(["pdftocairo", "-pdf", "-", "-"], input=pdf, check=True, capture_output=True).stdout
+
+
 def _with(pdf: Path, change: Callable[[dict[str, Any]], None]) -> None:
     proof = json.loads(carried_by(pdf.read_bytes())["toolkit.json"])
     change(proof)
-    plain = subprocess.run(["pdftocairo", "-pdf", str(pdf), "-"], check=True, capture_output=True).stdout
+    plain = _plain(pdf.read_bytes())
     place = Place(page=0, left=10, top=10, size=100)
     pdf.write_bytes(proved_pdf(plain, {"toolkit.json": json.dumps(proof).encode()}, b"x", place))
 

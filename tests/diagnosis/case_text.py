@@ -15,6 +15,8 @@ def case_text(
     kind: str,
     *,
     title: str | None = None,
+    time: str | None = "s",
+    axes: str | None = None,
     parameters: Named = _NONE,
     inputs: Named = _NONE,
     outputs: Named = _NONE,
@@ -22,15 +24,18 @@ def case_text(
     runs: int = 0,
     **simulation: Any,
 ) -> str:
-    """Return a case of a simulation in sim.py, over the time ``t`` [s] of the files r0.csv and on.
+    """Return a case of a simulation in sim.py, over the time ``t`` of the files r0.csv and on.
 
+    ``time`` is its unit, None for a table without one; ``axes`` those of a tire.
     A parameter is (value, unit), (value, unit, sd) or (value, unit, sd, bounds), a channel its unit or (unit,
     sd), each of them the mapping that stands in the file where it has other entries. Where there are no
     ``runs``, tables ``[[recording.run]]`` may be written behind the text.
     """
-    t = {"t": {"unit": "s", "role": "time"}}
-    channels = t | _channels("input", inputs) | dict(others) | _channels("output", outputs)
-    recording: dict[str, Any] = {"time": "t", "channels": channels}
+    t = {} if time is None else {"t": {"unit": time, "role": "time"}}
+    recording: dict[str, Any] = {} if time is None else {"time": "t"}
+    if axes is not None:
+        recording["axes"] = axes
+    recording["channels"] = t | _channels("input", inputs) | dict(others) | _channels("output", outputs)
     if runs:
         recording["run"] = [{"file": f"r{number}.csv"} for number in range(runs)]
     simulation = {"kind": kind, "path": "sim.py"} | simulation

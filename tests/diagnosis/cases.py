@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tests.diagnosis.case_text import case_text
 from tests.golden.cases import CARRIAGE_CASE as HEAD
 
 SIMULATOR = """
@@ -58,20 +59,8 @@ def simulate(inputs, p):
 """
 
 
-def cell_case(gain_sd: float, covariate: str = "") -> str:
+def cell_case(gain_sd: float, **covariates: str) -> str:
     """A load cell F under a known load L, its gain known to ``gain_sd``; without its runs."""
-    return f"""schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.gain]
-value = 1.0
-unit = "1"
-sd = {gain_sd}
-[recording]
-time = "t"
-[recording.channels]
-t = {{ unit = "s", role = "time" }}
-L = {{ unit = "N", role = "input" }}
-{covariate}F = {{ unit = "N", role = "output" }}
-"""
+    others = {name: {"unit": unit, "role": "covariate"} for name, unit in covariates.items()}
+    gain = {"gain": (1.0, "1", gain_sd)}
+    return case_text("python", parameters=gain, inputs={"L": "N"}, others=others, outputs={"F": "N"})

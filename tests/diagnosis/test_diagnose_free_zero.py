@@ -10,7 +10,7 @@ from toolkit.diagnosis.diagnose import diagnose
 
 COEFFICIENT = 0.8  # N/K
 NOISE = 1.5  # N; the zero is off by 1.2 N at the first row
-CASE = cell_case(0.002, 'T = { unit = "degC", role = "covariate" }\n')
+CASE = cell_case(0.002, T="degC")
 
 
 def recording(draw, run, zeroed=18.5):

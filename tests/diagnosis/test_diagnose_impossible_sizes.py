@@ -55,24 +55,14 @@ import pandas as pd
 def simulate(inputs, p):
     return pd.DataFrame({"y": p["source"] * np.exp(-p["absorption"] * inputs["x"])})
 """
-BLOCKS = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.source]
-value = 100.0
-unit = "1"
-sd = 50.0
-[simulation.parameters.absorption]
-value = 0.5
-unit = "1"
-sd = 0.3
-[recording.channels]
-x = { unit = "1", role = "input" }
-y = { unit = "1", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+BLOCKS = case_text(
+    "python",
+    time=None,
+    parameters={"source": (100.0, "1", 50.0), "absorption": (0.5, "1", 0.3)},
+    inputs={"x": "1"},
+    outputs={"y": "1"},
+    runs=1,
+)
 
 
 def test_a_beam_that_spreads_is_no_channel_that_bends_by_three_times_its_range(tmp_path):

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -12,27 +13,14 @@ def simulate(inputs, p):
     import pandas as pd
     return pd.DataFrame({"F": p["k"] * inputs["x"]})
 """
-CASE = """schema = 1
-title = "A spring"
-[simulation]
-kind = "python"
-path = "sim.py"
-function = "simulate"
-[simulation.parameters.k]
-value = 100.0
-unit = "N/m"
-sd = 5.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-x = { unit = "m", role = "input" }
-F = { unit = "N", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-[[recording.run]]
-file = "r1.csv"
-"""
+CASE = case_text(
+    "python",
+    title="A spring",
+    parameters={"k": (100.0, "N/m", 5.0)},
+    inputs={"x": "m"},
+    outputs={"F": "N"},
+    runs=2,
+)
 
 
 def spring(seed, sign):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import functools
 from collections.abc import Iterator, Mapping
 from itertools import product
@@ -12,7 +13,7 @@ import pytest
 from tests.report.template_factory import FOLDER
 from toolkit.diagnosis.answer import power
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG
-from toolkit.diagnosis.search.unexplained import BEYOND_REPEATS, LINE, TOO_LARGE
+from toolkit.diagnosis.search.unexplained import BEYOND_REPEATS, TOO_LARGE, Line
 from toolkit.report.diagnosis.numbers import over
 from toolkit.words.phrasebook import SOURCE, languages, phrasebook
 
@@ -96,11 +97,12 @@ def test_every_sentence_of_a_finding_has_a_translation(language: str) -> None:
 def test_why_an_effect_or_a_rest_is_told_as_it_is_has_a_translation(language: str) -> None:
     book = phrasebook(language)
     why = [text for name, text in vars(power).items() if name.isupper() and isinstance(text, str)]
+    line = Line(frequency=24.0, p_value=0.0, share=0.5, width=0.01)
     left = [over("FY", [], reason) for reason in (LARGE, LONG, TOO_LARGE, BEYOND_REPEATS)]
     left += [
         over("FY", ["time"], reason)
-        for reason in (f"{LINE}24 Hz", "an event in r0.csv from 1 to 2 s", "louder in r0.csv")
+        for reason in (line.reason, "an event in r0.csv from 1 to 2 s", "louder in r0.csv")
     ]
-    left.append(over("FY", ["angle"], f"{LINE}24 per turn"))
+    left.append(over("FY", ["angle"], dataclasses.replace(line, angle="angle").reason))
     assert len(why) >= 12
     assert [text for text in (*why, *left) if not book.knows(text)] == []

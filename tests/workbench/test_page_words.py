@@ -38,7 +38,7 @@ def test_a_catalogue_has_every_phrase_and_no_other(language: str) -> None:
     asked = phrases() | set(TERMS)
     assert set(catalogue) <= asked
     assert asked - set(catalogue) <= set(of_documents)
-    assert [phrase for phrase in catalogue if catalogue[phrase] == of_documents.get(phrase)] == []
+    assert set(catalogue) & set(of_documents) == set()  # pages and documents say a phrase in the same words
     for phrase, translated in catalogue.items():
         for source, target in zip(
             *((text,) if isinstance(text, str) else text for text in (phrase, translated)), strict=True

@@ -173,7 +173,7 @@ def _check_steps(
     """Return why corrected values contradict themselves: they step where the recorded ones go on."""
     loaded = with_load(recording, machine=context.machine, record=record)
     blocks = () if context.is_tare else split_blocks(loaded, context.machine)[0]
-    after = step_findings(loaded, new, blocks, recording.name, level="error")
+    after = step_findings(loaded, new, blocks, recording.name)
     return f"discontinuity: corrected, {after[0].message}" if after else None
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -129,7 +128,7 @@ def steps(recording: Recording, columns: Columns, blocks: Sequence[Block], where
     """Return the forces or cells of a file that step where load and slip angle stand still."""
     values: dict[str, Array] = {load: recording[load].si for load in columns.loads}
     values |= {name: columns.x[:, place] for place, name in enumerate(columns.names)}
-    return step_findings(recording, values, blocks, where, level="error")
+    return step_findings(recording, values, blocks, where)
 
 
 def step_findings(
@@ -137,8 +136,6 @@ def step_findings(
     values: Mapping[str, Array],
     blocks: Sequence[Block],
     where: str,
-    *,
-    level: Literal["error", "warning", "note"],
 ) -> tuple[Finding, ...]:
     """Return the value that steps most where load and slip angle stand still, as a finding; empty: none."""
     step = sudden_step(values, conditions_of(recording), blocks)
@@ -149,7 +146,7 @@ def step_findings(
         f"{name} steps from {before:.5g} to {after:.5g} at row {row}, where load and slip angle stand still: "
         "it was changed from there on, or a cell failed"
     )
-    return (Finding(rule="discontinuity", where=where, message=message, level=level),)
+    return (Finding(rule="discontinuity", where=where, message=message, level="error"),)
 
 
 def _impossible(recording: Recording, blocks: Sequence[Block], values: Mapping[str, Array]) -> bool:

@@ -22,7 +22,6 @@ from toolkit.errors import SessionError
 INTERCEPT = "intercept"
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _FACTOR = re.compile(r"(?:(?P<name>[A-Za-z]\w*)(?:\^(?P<power>[1-9]))?|abs\((?P<abs>[A-Za-z]\w*)\))\Z")
-MODELS = ("linear", "polynomial", "balance")
 _FEWEST_DIGITS = 5
 _ROUNDING = 1e-5  # of the largest load
 

@@ -53,7 +53,7 @@ def command(
     from toolkit.tires.table import read_table
     from toolkit.tires.tir import read_tir
 
-    table = read_table(grid, axes=axes, required=("SA", "FZ"), measured=False)
+    table = read_table(grid, axes=axes, measured=False)
     if out is not None:
         refuse_output(out, (tire, grid))
     file = read_tir(tire)

@@ -29,8 +29,7 @@ from toolkit.worker.worker import LateError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Model
     from toolkit.simulation.model_file import FittedEffect, ModelFile
@@ -57,9 +56,9 @@ class Beside:
     run: str
     output: str
     unit: str
-    x: NDArray[np.float64]
-    recorded: NDArray[np.float64]
-    simulated: NDArray[np.float64]
+    x: Array
+    recorded: Array
+    simulated: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -46,8 +46,7 @@ from toolkit.worker.posix import Limits
 from toolkit.worker.worker import LateError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
 
 
@@ -162,11 +161,11 @@ def _diagnosed(
 
 def _of_readings(
     problem: Problem,
-    declared: dict[str, NDArray[np.float64]],
+    declared: dict[str, Array],
     calibrations: Path | None,
     budget: TimeBudget,
     code: CaseCode | None,
-) -> tuple[_Posed, dict[str, NDArray[np.float64]]] | None:
+) -> tuple[_Posed, dict[str, Array]] | None:
     """Return a case without an order of rows by its inputs; None where rows have one.
 
     They have one to a simulation too whose rows are others where they stand in another order.
@@ -191,7 +190,7 @@ def _of_readings(
 
 def _of_means(
     problem: Problem,
-    declared: dict[str, NDArray[np.float64]],
+    declared: dict[str, Array],
     calibrations: Path | None,
     budget: TimeBudget,
     code: CaseCode | None,
@@ -223,7 +222,7 @@ def _values(problem: Problem) -> tuple[float, ...]:
     return tuple(parameter.value for parameter in problem.free)
 
 
-def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.float64]]:
+def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, Array]:
     """Return the simulation as declared; what cannot be simulated ends here."""
     budget.tell("the simulation as declared")
     started = time.monotonic()
@@ -271,7 +270,7 @@ def _predictions(
 def _too_late(
     case: Case,
     problem: Problem | None,
-    declared: dict[str, NDArray[np.float64]] | None,
+    declared: dict[str, Array] | None,
     findings: tuple[Finding, ...],
     at: str,
 ) -> Diagnosis:

@@ -22,9 +22,7 @@ from toolkit.channels import Axes, signs
 from toolkit.effects.facts import Alike, ChannelFacts, Correctable, History, Term, Values
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Drive, Setting, Tire
     from toolkit.effects.surroundings import Scale, Surroundings
 
@@ -33,7 +31,7 @@ STAGES: tuple[Stage, ...] = ("road", "carriage", "tire", "load_cells", "acquisit
 """In the order in which effects act."""
 
 DriveHook = Callable[["Drive", Values, "Setting", "Tire"], "Drive"]
-ChannelHook = Callable[["NDArray[np.float64]", Values, "Setting"], "NDArray[np.float64]"]
+ChannelHook = Callable[["Array", Values, "Setting"], "Array"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

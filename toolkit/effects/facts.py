@@ -7,28 +7,26 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
     from toolkit.effects.surroundings import Surroundings
 
 Values = Mapping[str, float]
-Channels = Mapping[str, "NDArray[np.float64]"]
+Channels = Mapping[str, "Array"]
 # (position, velocity, parameters) -> force-like term against the motion, of the arrays' shape or scalars
 ForceHook = Callable[[Any, Any, Values], Any]
 # (signals by name, parameters) -> force-like term against the motion, of the signals' shape or scalars
 LawHook = Callable[[Mapping[str, Any], Values], Any]
 # (time, velocity, parameters) -> the same term along a recorded motion, of a force that has a memory
-RecordedHook = Callable[["NDArray[np.float64]", "NDArray[np.float64]", Values], "NDArray[np.float64]"]
+RecordedHook = Callable[["Array", "Array", Values], "Array"]
 # (state, its spread, parameters) -> share of a rising rate that is left, of the arrays' shape or scalars
 LimitHook = Callable[[Any, float, Values], Any]
 # parameters -> size of the sliding force, and the distance over which it builds up (0: no bristle)
 BristleHook = Callable[[Values], tuple[Any, Any]]
 # (positions (n,), parameters of every start) -> forces (n, directions x starts), the directions in blocks
-PatternHook = Callable[["NDArray[np.float64]", Sequence[Values]], "NDArray[np.float64]"]
+PatternHook = Callable[["Array", Sequence[Values]], "Array"]
 # (shown (n,), parameters, setting) -> what the channel would show without the effect
-InverseHook = Callable[["NDArray[np.float64]", Values, "Setting"], "NDArray[np.float64]"]
+InverseHook = Callable[["Array", Values, "Setting"], "Array"]
 
 Where = Literal["output", "input", "cell", "program_cell", "program_load"]
 """Kinds of channels: an output; an input of a simulation; a load cell from which outputs are computed; cells
@@ -135,7 +133,7 @@ class Correctable:
     """
 
     unit: str
-    undo: Callable[[Channels, Channels, float, str | None, str | None], tuple[str, NDArray[np.float64]]]
+    undo: Callable[[Channels, Channels, float, str | None, str | None], tuple[str, Array]]
     u_slip: Callable[[float, float], float] | None = None
     channels: tuple[str, ...] = ()
     sources: tuple[str, ...] = ()

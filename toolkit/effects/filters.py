@@ -9,7 +9,9 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from toolkit.arrays import Array
 
 
 _FINER = 4
@@ -20,15 +22,13 @@ PAST = "_past"
 would have left it, in units of the range of what it follows. What came before that row is not recorded."""
 
 
-def begun(x: NDArray[np.float64], values: Mapping[str, float]) -> float | None:
+def begun(x: Array, values: Mapping[str, float]) -> float | None:
     """Return where a state that follows a signal was at the first row, None for at rest on it."""
     past = values.get(PAST, 0.0)
     return float(x[0] + past * np.ptp(x)) if past and len(x) else None
 
 
-def lag(
-    t: NDArray[np.float64], x: NDArray[np.float64], time_constant: ArrayLike, start: float | None = None
-) -> NDArray[np.float64]:
+def lag(t: Array, x: Array, time_constant: ArrayLike, start: float | None = None) -> Array:
     """Return y of ``time_constant`` dy/dt + y = x, shape (n,), exact for an x that is linear between rows.
 
     Parameters
@@ -61,9 +61,7 @@ def lag(
     return y
 
 
-def delayed(
-    t: NDArray[np.float64], x: NDArray[np.float64], delay: float, *, straight: bool = False, past: float = 0.0
-) -> NDArray[np.float64]:
+def delayed(t: Array, x: Array, delay: float, *, straight: bool = False, past: float = 0.0) -> Array:
     """Return x(t - delay), cubic between rows; beyond the ends the end value.
 
     With a ``past`` it goes on in a straight line there, which is off by so much of the range a delay away.
@@ -80,13 +78,13 @@ def delayed(
 
 
 def filtered(
-    t: NDArray[np.float64],
-    x: NDArray[np.float64],
+    t: Array,
+    x: Array,
     time_constant: float,
     *,
     straight: bool = False,
     start: float | None = None,
-) -> NDArray[np.float64]:
+) -> Array:
     """Return a signal behind a first-order filter, cubic as in `delayed`, from a ``start`` as in `lag`."""
     if straight or len(t) < 3 or not time_constant > 0:
         return lag(t, x, time_constant, start)
@@ -94,9 +92,7 @@ def filtered(
     return lag(fine, _between(t, x, fine), time_constant, start)[::_FINER]
 
 
-def followed(
-    t: NDArray[np.float64], command: NDArray[np.float64], time_constant: float, start: float | None = None
-) -> NDArray[np.float64]:
+def followed(t: Array, command: Array, time_constant: float, start: float | None = None) -> Array:
     """Return what follows a command with a time constant; ``start`` as in `lag`.
 
     A command of steps and ramps is straight between its rows; one without corners is cubic, as in `filtered`.
@@ -106,7 +102,7 @@ def followed(
     return filtered(t, command, time_constant, straight=bool(corners), start=start)
 
 
-def _between(t: NDArray[np.float64], x: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+def _between(t: Array, x: Array, at: Array) -> Array:
     """Return x at other times by Hermite's cubics, their slopes from the rows on both sides."""
     if len(t) < 3 or not np.isfinite(x).all():
         return np.interp(at, t, x)
@@ -115,7 +111,7 @@ def _between(t: NDArray[np.float64], x: NDArray[np.float64], at: NDArray[np.floa
     return np.asarray(CubicHermiteSpline(t, x, np.gradient(x, t))(at))
 
 
-def play(x: NDArray[np.float64], width: float, past: float = 0.0) -> NDArray[np.float64]:
+def play(x: Array, width: float, past: float = 0.0) -> Array:
     """Return the play operator's output for a gap of full ``width``.
 
     It starts in the middle of the gap, or off it by the share ``past`` of half the gap.
@@ -129,7 +125,7 @@ def play(x: NDArray[np.float64], width: float, past: float = 0.0) -> NDArray[np.
     return y
 
 
-def plays(x: NDArray[np.float64], halves: NDArray[np.float64], past: float = 0.0) -> NDArray[np.float64]:
+def plays(x: Array, halves: Array, past: float = 0.0) -> Array:
     """Return the mean of play operators with several half gaps, loaded from zero for the first time.
 
     With a ``past`` each has gone by this share of the way from there to the farther end of its gap.

@@ -19,19 +19,18 @@ from toolkit.effects.signals import Drive, TireForces
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.effect import ChannelHook
     from toolkit.effects.facts import Values
     from toolkit.effects.signals import Setting, Tire
 
-    Signals = dict[str, NDArray[np.float64]]
-    View = Callable[[str, NDArray[np.float64]], NDArray[np.float64]]
+    Signals = dict[str, Array]
+    View = Callable[[str, Array], Array]
 
 # A steady tire under other friction, stiffness and trail: the similarity method, for any tire as it is.
 
 
-Steady = Callable[["NDArray[np.float64]", Drive], TireForces]
+Steady = Callable[["Array", Drive], TireForces]
 
 
 def similar(steady: Steady, drive: Drive) -> TireForces:
@@ -73,16 +72,16 @@ def tire_forces(
     return tire(driven(start, effects, setting, tire))
 
 
-def _as_it_is(_: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _as_it_is(_: str, values: Array) -> Array:
     return values
 
 
 def through(
-    signals: Mapping[str, NDArray[np.float64]],
+    signals: Mapping[str, Array],
     effects: Iterable[AppliedEffect],
     setting: Setting,
     *,
-    recorded: Mapping[str, NDArray[np.float64]] | None = None,
+    recorded: Mapping[str, Array] | None = None,
     shown: View = _as_it_is,
     stored: View = _as_it_is,
 ) -> Signals:
@@ -116,29 +115,27 @@ def through(
     return changed
 
 
-def _counted(values: NDArray[np.float64], origin: float | None) -> NDArray[np.float64]:
+def _counted(values: Array, origin: float | None) -> Array:
     return values if origin is None else values - origin
 
 
-def _acted(
-    hook: ChannelHook, y: NDArray[np.float64], values: Values, setting: Setting
-) -> NDArray[np.float64]:
+def _acted(hook: ChannelHook, y: Array, values: Values, setting: Setting) -> Array:
     """Return what a hook makes of a channel, about the origin of its scale where it has one by convention."""
     origin = values.get(ORIGIN)
     return hook(y, values, setting) if origin is None else hook(y - origin, values, setting) + origin
 
 
-def with_source(setting: Setting, values: NDArray[np.float64]) -> Setting:
+def with_source(setting: Setting, values: Array) -> Setting:
     """Return a setting with the values of the signal that an effect takes."""
     return dataclasses.replace(setting, channels={**setting.channels, "from": values})
 
 
 def undone(
-    recorded: NDArray[np.float64],
+    recorded: Array,
     applied: AppliedEffect,
     setting: Setting,
-    others: Mapping[str, NDArray[np.float64]],
-) -> NDArray[np.float64]:
+    others: Mapping[str, Array],
+) -> Array:
     """Return what a channel would have shown without an effect: its inverse, or a fixed point of its hook.
 
     Raises
@@ -194,10 +191,10 @@ def _not_undone(applied: AppliedEffect) -> FitError:
 
 def resisting(
     effects: Iterable[AppliedEffect],
-    t: NDArray[np.float64],
-    position: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    t: Array,
+    position: Array,
+    velocity: Array,
+) -> Array:
     """Return the sum of terms along a recorded motion, (n,), as it stands in the equation of the force."""
     total = np.zeros(len(position))
     for applied in effects:
@@ -216,9 +213,7 @@ def resisting(
     return total
 
 
-def corrected(
-    effects: Sequence[AppliedEffect], channels: Mapping[str, NDArray[np.float64]]
-) -> dict[str, NDArray[np.float64]]:
+def corrected(effects: Sequence[AppliedEffect], channels: Mapping[str, Array]) -> dict[str, Array]:
     """Return recorded channels, each (n,), SI and machine axes, with correctable effects taken out of them.
 
     Backwards through the stages: the loads first, then the slip angle, which a corrected moment may turn.

@@ -30,9 +30,8 @@ from toolkit.effects.filters import lag, play
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    Array = NDArray[np.float64]
     Part = Callable[[Mapping[str, Any], Mapping[str, float], Any], Any]
     from toolkit.effects.signals import Setting
 
@@ -323,7 +322,7 @@ def law_effect(name: str) -> Effect:
             next_step="take the law as a diagnosis has written it", rule="law-formula",
         )  # fmt: skip
 
-    def added(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+    def added(y: Array, values: Values, setting: Setting) -> Array:
         with np.errstate(all="ignore"):  # what is no number is told by whoever simulates
             change = np.asarray(law(_signals(law, y, values, setting), values, setting.t), dtype=np.float64)
         return y * (1 + change) if acts == "multiplies" else y + change
@@ -367,9 +366,7 @@ def _parameter(name: str) -> EffectParameter:
     )  # fmt: skip
 
 
-def _signals(
-    law: Formula, y: NDArray[np.float64], values: Values, setting: Setting
-) -> dict[str, NDArray[np.float64]]:
+def _signals(law: Formula, y: Array, values: Values, setting: Setting) -> dict[str, Array]:
     signals = {ITSELF: y, TIME: setting.t}
     for name in law.signals:
         if name in signals:

@@ -11,15 +11,14 @@ from toolkit.effects.facts import Values
 from toolkit.effects.surroundings import of_channel
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
 def harmonics(*angles: str) -> ChannelHook:
     """Return the hook that adds two harmonics of the first of these channels that was recorded [rad]."""
 
-    def ripple(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+    def ripple(y: Array, values: Values, setting: Setting) -> Array:
         angle = setting.channel(*angles)
         if angle is None:
             return y

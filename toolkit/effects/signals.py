@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -21,25 +21,25 @@ class Drive:
     ``FY`` and ``MZ`` are forces and moments that come on top [N, N·m], in the machine's axes.
     """
 
-    t: NDArray[np.float64]
-    SA: NDArray[np.float64]
-    FZ: NDArray[np.float64]
-    IA: NDArray[np.float64]
-    V: NDArray[np.float64]
-    pressure_error: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    stiffness: NDArray[np.float64]
-    trail: NDArray[np.float64]
-    FY: NDArray[np.float64]
-    MZ: NDArray[np.float64]
+    t: Array
+    SA: Array
+    FZ: Array
+    IA: Array
+    V: Array
+    pressure_error: Array
+    friction: Array
+    stiffness: Array
+    trail: Array
+    FY: Array
+    MZ: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TireForces:
     """FY [N] and MZ [N·m] in the machine's axes, each of shape (n,)."""
 
-    FY: NDArray[np.float64]
-    MZ: NDArray[np.float64]
+    FY: Array
+    MZ: Array
 
 
 Tire = Callable[[Drive], TireForces]
@@ -56,9 +56,9 @@ class Setting:
     was turned round on the hub.
     """
 
-    t: NDArray[np.float64]
-    elapsed_s: NDArray[np.float64]
-    channels: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    t: Array
+    elapsed_s: Array
+    channels: Mapping[str, Array] = field(default_factory=dict)
     conditions: Mapping[str, str] = field(default_factory=dict)
     first: Mapping[str, float] = field(default_factory=dict)
     slip_work_before_kJ: float = 0.0
@@ -67,19 +67,19 @@ class Setting:
     travel: float = 1.0
     facing: float = 1.0
 
-    def channel(self, *names: str) -> NDArray[np.float64] | None:
+    def channel(self, *names: str) -> Array | None:
         """Return the first of these channels that was recorded, None where none was."""
         return next((self.channels[name] for name in names if name in self.channels), None)
 
 
 def drive(
-    t: NDArray[np.float64],
-    SA: NDArray[np.float64],
-    FZ: NDArray[np.float64],
+    t: Array,
+    SA: Array,
+    FZ: Array,
     *,
-    IA: NDArray[np.float64] | float = 0.0,
-    V: NDArray[np.float64] | float = 2.128,
-    pressure_error: NDArray[np.float64] | float = 0.0,
+    IA: Array | float = 0.0,
+    V: Array | float = 2.128,
+    pressure_error: Array | float = 0.0,
 ) -> Drive:
     """Return a drive that no effect has touched."""
     zero, unity = np.zeros(len(t)), np.ones(len(t))

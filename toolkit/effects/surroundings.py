@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +105,7 @@ class Surroundings(Protocol):
         """
         ...
 
-    def values(self, name: str | None) -> NDArray[np.float64]:
+    def values(self, name: str | None) -> Array:
         """Return the recorded values of a channel over all runs, (n,) without gaps; none where it was not."""
         ...
 

@@ -101,7 +101,6 @@ def tire_table(
     *,
     units: Mapping[str, str] | None = None,
     axes: str = "SAE",
-    required: tuple[str, ...] = ("SA", "FZ"),
     measured: bool = True,
 ) -> TireTable:
     """Return columns of tire data as `toolkit.tires.table.read_table` returns a file, with all its checks.
@@ -131,7 +130,7 @@ def tire_table(
     _demand_alike({name: data[table[name][0]] for name in columns}, columns)
     return table_of(
         header, [column.numbers for column in columns.values()], path=Path(_DATA), axes=axes,
-        required=required, measured=measured, marks=tuple(dict.fromkeys(filter(None, texts))),
+        measured=measured, marks=tuple(dict.fromkeys(filter(None, texts))),
     )  # fmt: skip
 
 

@@ -21,7 +21,16 @@ import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.channels import Axes, signs
-from toolkit.tires.global_model import Factor, Factors, GlobalParameter, Responses, Rows, Seeds, parameters
+from toolkit.tires.global_model import (
+    Factor,
+    Factors,
+    GlobalModel,
+    GlobalParameter,
+    Responses,
+    Rows,
+    Seeds,
+    parameters,
+)
 from toolkit.tires.recorded import as_array
 from toolkit.tires.slip import State, cosine, nonzero, readers, sine, state
 
@@ -236,13 +245,38 @@ def arm(p: Mapping[str, float], q: State, *, FY: Array, UNLOADED_RADIUS: float) 
     return UNLOADED_RADIUS * share * s("LS")
 
 
-def mf_forces(parameters: Sequence[GlobalParameter], evaluator: Evaluator) -> Any:
+def magic_formula(
+    *,
+    name: str,
+    title: str,
+    reference: str,
+    valid: str,
+    parameters: tuple[GlobalParameter, ...],
+    evaluator: Evaluator,
+) -> GlobalModel:
+    """Return a version as a model over all loads; ``evaluator`` gives the forces of its tire files."""
+    return GlobalModel(
+        name=name,
+        title=title,
+        reference=reference,
+        valid=valid,
+        axes="ISO-W",
+        channels=("FX", "FY", "MZ"),
+        parameters=parameters,
+        forces=_forces(parameters, evaluator),
+        starts=_starts,
+        bounded=_bounded(parameters),
+        factors=_factors(parameters),
+    )
+
+
+def _forces(parameters: Sequence[GlobalParameter], evaluator: Evaluator) -> Any:
     """Return the function ``forces(values, rows)`` of an evaluator of tire files."""
     names = tuple(parameter.name for parameter in parameters)
 
     def forces(values: Sequence[Any], rows: Rows) -> Responses:
         p: Mapping[str, Any] = dict(zip(names, values, strict=True))
-        responses = evaluator(p, mf_state(rows), UNLOADED_RADIUS=rows.UNLOADED_RADIUS)
+        responses = evaluator(p, _state(rows), UNLOADED_RADIUS=rows.UNLOADED_RADIUS)
         return Responses(FY=responses.FY, MZ=responses.MZ, FX=responses.FX)
 
     return forces
@@ -263,7 +297,7 @@ E_x  PEX1 curvature of FX
 """
 
 
-def mf_bounded(parameters: Sequence[GlobalParameter]) -> tuple[Factor, ...]:
+def _bounded(parameters: Sequence[GlobalParameter]) -> tuple[Factor, ...]:
     """Return the factors of FX, FY and MZ that must stay within bounds (Besselink et al. 2010).
 
     Above 1 the equations take a curvature E for 1 by themselves: it cannot be too large, and a fit may rest
@@ -280,13 +314,13 @@ def mf_bounded(parameters: Sequence[GlobalParameter]) -> tuple[Factor, ...]:
     )  # fmt: skip
 
 
-def mf_factors(parameters: Sequence[GlobalParameter]) -> Factors:
+def _factors(parameters: Sequence[GlobalParameter]) -> Factors:
     """Return the function ``factors(values, rows)`` of a version; 5.2 is 6.1 without pressure."""
     names = tuple(parameter.name for parameter in parameters)
 
     def factors(values: Sequence[Any], rows: Rows) -> Mapping[str, Any]:
         p: Mapping[str, Any] = dict(zip(names, values, strict=True))
-        q, c = mf_state(rows), readers(p)[0]
+        q, c = _state(rows), readers(p)[0]
         squared, leaned = q.g * q.g, np.abs(q.g)
         return {
             "mu_y": (c("PDY1") + c("PDY2") * q.df) * (1 + c("PPY3") * q.dp + c("PPY4") * q.dp**2)
@@ -309,7 +343,7 @@ def mf_factors(parameters: Sequence[GlobalParameter]) -> Factors:
     return factors
 
 
-def mf_state(rows: Rows) -> State:
+def _state(rows: Rows) -> State:
     """Return the state of the rows: alpha* = tan(alpha), gamma* = sin(gamma), forward."""
     return state(
         {}, SA=rows.SA, FZ=rows.FZ, FNOMIN=rows.FNOMIN, IA=rows.IA, KAPPA=rows.KAPPA,
@@ -317,7 +351,7 @@ def mf_state(rows: Rows) -> State:
     )  # fmt: skip
 
 
-def mf_starts(seeds: Seeds) -> Sequence[Mapping[str, float]]:
+def _starts(seeds: Seeds) -> Sequence[Mapping[str, float]]:
     """Return starts: stiffness and friction of each load from the seeds, shape and curvature tried.
 
     PKY1 enters linearly for each PKY2 and is solved on a grid of PKY2.

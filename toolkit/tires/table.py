@@ -134,7 +134,7 @@ def table_of(
     *,
     path: Path,
     axes: str,
-    required: tuple[str, ...],
+    required: tuple[str, ...] = ("SA", "FZ"),
     measured: bool,
     marks: tuple[str, ...] = (),
     rows: Sequence[int] | None = None,

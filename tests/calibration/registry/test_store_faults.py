@@ -115,8 +115,8 @@ EACH_CALL = pytest.mark.campaign(
     ("name", "fault", "most"),
     [
         # The places where another kind of call begins: a call that follows one of its kind is as far.
-        *(("approve", fault, 6) for fault in ("full", "kill")),
-        pytest.param("approve", "eio", 6, marks=LASTS),
+        *(("approve", fault, 4) for fault in ("full", "kill")),
+        pytest.param("approve", "eio", 4, marks=LASTS),
         *(pytest.param("approve", fault, None, marks=EACH_CALL) for fault in ("full", "eio", "kill")),
         pytest.param("approve", "broken", None, marks=LASTS),
         ("first", "kill", 4),

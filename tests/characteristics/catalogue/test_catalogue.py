@@ -15,6 +15,7 @@ import pytest
 
 from tests.characteristics.sweep_factory import swept
 from tests.characteristics.tire_factory import LOAD, M15, reduced_test
+from tests.commands import said
 from tests.recipes import file_of
 from toolkit.channels import ROTATIONS
 from toolkit.characteristics.catalogue import (
@@ -251,11 +252,10 @@ def test_a_file_from_before_a_characteristic_is_read_and_keeps_its_hash(
     tmp_path: Path, virtual_test: Path
 ) -> None:
     home = ("--calibrations", packaged_home() / "calibrations", "--json")
-    empty, more = tmp_path / "none", tmp_path / "more"
-    for folder in (empty, more):
-        folder.mkdir()
+    more = tmp_path / "more"
+    more.mkdir()
     whole = tmp_path / "whole.xlsx"
-    program(empty, "process", virtual_test, "--out", whole, *home)
+    assert said("process", virtual_test, "--out", whole, *home).code in (0, 1)
     (more / "pneumatic_trail.py").write_text(file_of("Add a characteristic"))
     content = program(more, whole, code=CONTENT.replace('content.plots["trail"].alt', "None"))
     place = content["columns"].index("pneumatic_trail")

@@ -13,7 +13,7 @@ from toolkit.diagnosis.answer.naming import _is_smooth
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG
-from toolkit.diagnosis.search.unexplained import StructureFound
+from toolkit.diagnosis.search.unexplained import StructureFound, narrowest_line
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
@@ -82,10 +82,10 @@ def test_of_many_values_left_out_some_are_told_and_the_others_counted(problem):
     assert finding.message.endswith(" and 12 more")
 
 
-def left_over(problem, residual, *variables, reason="", p_value=1.0):
+def left_over(problem, residual, *variables, reason="", p_value=1.0, line=None):
     fit = SimpleNamespace(residual={"F": residual}, simulated={"F": problem.observed["F"]})
     found = StructureFound(
-        output="F", variables=variables, reason=reason, gain=9.0, p_value=p_value, rest=True
+        output="F", variables=variables, reason=reason, line=line, gain=9.0, p_value=p_value, rest=True
     )
     search = SimpleNamespace(
         problem=problem, refitted=fit, augmented=fit, steps=(), structure_before=(found,), structure=(found,)
@@ -105,7 +105,9 @@ def test_a_line_has_the_share_of_its_square(problem):
     # Amplitude 2 beside noise of 1: 2 of 3 of the mean square.
     t = np.concatenate([run.t for run in problem.runs])
     rest = 2 * np.sin(2 * np.pi * 2.5 * t) + np.random.default_rng(2).normal(size=problem.rows)
-    mismatch = left_over(problem, rest, "time", reason="a line at 2.5 Hz")
+    line = narrowest_line(problem, "F", rest)
+    assert line is not None
+    mismatch = left_over(problem, rest, "time", line=line)
     assert mismatch.share_of_variance == pytest.approx(2 / 3, abs=0.08)
 
 

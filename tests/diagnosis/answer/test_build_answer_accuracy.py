@@ -7,19 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
-CASE = """schema = 1
-title = "A cell"
-[simulation]
-kind = "python"
-path = "sim.py"
-[recording.channels]
-L = { unit = "N", role = "input" }
-F = { unit = "N", role = "output" }
-"""
+CASE = case_text("python", title="A cell", time=None, inputs={"L": "N"}, outputs={"F": "N"})
 SIMULATOR = """
 import pandas as pd
 def simulate(inputs, p):

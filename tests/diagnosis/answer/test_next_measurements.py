@@ -9,12 +9,20 @@ import pytest
 
 from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.next_measurements import apart, to_find_it
+from toolkit.diagnosis.search.unexplained import Line
 
 
-def found(*variables, inputs=("SA", "FZ"), unit="N", reason=""):
+def line(frequency, angle=""):
+    return Line(frequency=frequency, p_value=0.0, share=0.5, width=0.01, angle=angle)
+
+
+def found(*variables, inputs=("SA", "FZ"), unit="N", reason="", line=None):
     drivers = tuple(Of(name=name, unit="N", role="input") for name in inputs)
     problem = Of(case=Of(drivers=drivers), model=Of(outputs=(Of(name="FY", unit=unit),)), runs=())
-    return Of(problem=problem, structure=tuple(Of(variables=(one,), reason=reason) for one in variables))
+    return Of(
+        problem=problem,
+        structure=tuple(Of(variables=(name,), reason=reason, line=line) for name in variables),
+    )
 
 
 @pytest.mark.parametrize(
@@ -33,15 +41,15 @@ def test_the_advice_is_about_what_the_mismatch_depends_on(variable, told):
 
 
 @pytest.mark.parametrize(
-    ("reason", "told"),
+    ("reason", "line", "told"),
     [
-        ("a line at 1.55 Hz", "swings at 1.55 Hz: record what turns"),
-        ("louder in r0.csv", "Vary one input alone"),
-        ("more than its stated noise", "Vary one input alone"),
+        ("a line", line(1.55), "swings at 1.55 Hz: record what turns"),
+        ("louder in r0.csv", None, "Vary one input alone"),
+        ("more than its stated noise", None, "Vary one input alone"),
     ],
 )
-def test_a_line_and_an_event_of_time_are_no_drift(reason, told):
-    (said,) = to_find_it(found("time", reason=reason))
+def test_a_line_and_an_event_of_time_are_no_drift(reason, line, told):
+    (said,) = to_find_it(found("time", reason=reason, line=line))
     assert told in said
 
 
@@ -89,7 +97,7 @@ def test_known_loads_are_applied_to_what_carries_a_load(unit, is_load):
 )
 def test_a_line_in_step_with_a_recorded_angle_is_told_by_its_number_per_turn(speeds, wave, wrapped, told):
     t = np.arange(0, 10, 0.005)
-    search = found("time", inputs=("angle", "load"), reason="a line at 24 Hz")
+    search = found("time", inputs=("angle", "load"), reason="a line", line=line(24.0))
     search.problem.case.drivers[0].unit = "deg"
     for speed in speeds:
         turns = speed * t + wave * np.sin(2 * np.pi * 0.7 * t)
@@ -101,7 +109,7 @@ def test_a_line_in_step_with_a_recorded_angle_is_told_by_its_number_per_turn(spe
 
 
 def test_a_line_of_an_angle_is_told_by_its_number_per_turn():
-    (said,) = to_find_it(found("angle", inputs=("angle", "load"), reason="a line at 24 per turn"))
+    (said,) = to_find_it(found("angle", inputs=("angle", "load"), reason="a line", line=line(24.0, "angle")))
     assert said.startswith("The mismatch swings 24 times per turn of angle: repeat the run at another speed")
 
 

@@ -50,7 +50,7 @@ def test_a_parameter_that_its_prior_holds_back_is_told(tmp_path):
 
 def test_a_refit_that_makes_unseen_rows_worse_is_told(tmp_path):
     # Next to no warmth in the first run: what is fitted there of its influence is noise, and prior.
-    text = cell_case(10.0, 'T = { unit = "K", role = "covariate" }\n').replace("gain", "warm")
+    text = cell_case(10.0, T="K").replace("gain", "warm")
     text = text.replace("value = 1.0", "value = 0.0").replace('unit = "1"', 'unit = "N/K"')
     findings, answer = told(tmp_path, text, WARM, [table(0, warmth=0.01), table(1, warmth=20.0)])
     (output,) = answer.fit.held_out
@@ -60,7 +60,7 @@ def test_a_refit_that_makes_unseen_rows_worse_is_told(tmp_path):
 
 def test_a_refit_that_is_worse_than_standing_still_is_told(tmp_path):
     # Nothing depends on the warmth; a run with next to none of it leaves the influence where it was declared.
-    text = cell_case(10.0, 'T = { unit = "K", role = "covariate" }\n').replace("gain", "warm")
+    text = cell_case(10.0, T="K").replace("gain", "warm")
     text = text.replace("value = 1.0", "value = 5.0").replace('unit = "1"', 'unit = "N/K"')
     frames = [table(0, gain=0.0, warmth=0.01), table(1, gain=0.0, warmth=20.0)]
     findings, answer = told(tmp_path, text, WARM.replace('inputs["L"] + ', ""), frames)

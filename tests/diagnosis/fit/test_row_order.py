@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import CELL, write_case
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.case.reader import read_case
@@ -20,18 +21,9 @@ from toolkit.diagnosis.fit.row_order import by_inputs, dealt, seed_of
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
-TABLE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.gain]
-value = 1.0
-unit = "1"
-sd = 0.05
-[recording.channels]
-L = { unit = "N", role = "input" }
-F = { unit = "N", role = "output" }
-"""
+TABLE = case_text(
+    "python", time=None, parameters={"gain": (1.0, "1", 0.05)}, inputs={"L": "N"}, outputs={"F": "N"}
+)
 LOADS = np.linspace(5.0, 100.0, 36)
 
 
@@ -162,7 +154,7 @@ def test_a_simulation_that_remembers_its_rows_keeps_their_order(tmp_path: Path) 
 
 
 def test_time_is_an_order(tmp_path: Path) -> None:
-    case = TABLE.replace("[recording.channels]", '[recording]\ntime = "t"\n[recording.channels]')
+    case = TABLE.replace("[recording]\n", '[recording]\ntime = "t"\n')
     case += 't = { unit = "s", role = "time" }\n'
     assert by_inputs(opened(tmp_path, table(LOADS).assign(t=np.arange(36.0)), case=case)) is None
 

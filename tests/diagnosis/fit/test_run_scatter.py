@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
@@ -30,18 +31,7 @@ def case_of(folder, seed, *, zero_sd, gain_sd, runs=5):
         force = (1 + gain_sd * rng.normal()) * load + zero_sd * rng.normal() + RATE * t / 60
         frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "L": load, "F": force + rng.normal(0, NOISE, 80)})
         text += f'[[recording.run]]\nfile = "r{k}.csv"\n'
-    head = """schema = 1
-title = "A cell"
-[simulation]
-kind = "python"
-path = "sim.py"
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-L = { unit = "N", role = "input" }
-F = { unit = "N", role = "output" }
-"""
+    head = case_text("python", title="A cell", inputs={"L": "N"}, outputs={"F": "N"})
     return read_case(write_case(folder, head + text, simulator=SIMULATOR, **frames))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from tests.golden.cases import columns_tire
 from toolkit.diagnosis.case.reader import read_case
@@ -55,19 +56,13 @@ def ample() -> TimeBudget:
     return TimeBudget(600.0, lambda _: None, alarm=False)
 
 
-DIVIDER = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.C]
-value = 220.0
-unit = "nF"
-sd = 20.0
-[recording.channels]
-f = { unit = "Hz", role = "input" }
-R = { unit = "ohm", role = "input" }
-gain = { unit = "1", role = "output" }
-"""
+DIVIDER = case_text(
+    "python",
+    time=None,
+    parameters={"C": (220.0, "nF", 20.0)},
+    inputs={"f": "Hz", "R": "ohm"},
+    outputs={"gain": "1"},
+)
 GAIN = """
 import numpy as np
 import pandas as pd

@@ -100,8 +100,9 @@ def fitted_step(tmp_path_factory):
     case = coasts(tmp_path_factory.mktemp("force"), force=0.12)
     problem = problem_of(case, model_of(case, None, None))
     base = fit(problem)
-    view = look(problem, base, candidates(problem), turn=0, seed=1)
-    two = joint_fits(problem, base, best_of(view.scored)[:4])[:2]
+    likely = [each for each in candidates(problem) if each.name in ("constant_force", "zero_drift")]
+    view = look(problem, base, likely, turn=0, seed=1)
+    two = joint_fits(problem, base, best_of(view.scored))[:2]
     return problem, base, view, two, hold_out(problem, folds_of(problem, base), (), base)
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import Fit, fit
@@ -24,28 +25,14 @@ from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.facts import Values
 
-COASTING = """schema = 1
-title = "A wheel that coasts"
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["s", "v"]
-force_terms = { v = "N/kg" }
-[simulation.parameters.bearing]
-value = 0.03
-unit = "N/kg"
-sd = 0.01
-bounds = [0.0, 0.1]
-[simulation.parameters.v0]
-value = 22.0
-unit = "m/s"
-sd = 3.0
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-v = { unit = "m/s", role = "output" }
-"""
+COASTING = case_text(
+    "ode",
+    title="A wheel that coasts",
+    parameters={"bearing": (0.03, "N/kg", 0.01, [0.0, 0.1]), "v0": (22.0, "m/s", 3.0)},
+    outputs={"v": "m/s"},
+    states=["s", "v"],
+    force_terms={"v": "N/kg"},
+)
 COASTING_SIMULATOR = """
 def initial(p):
     return [0.0, p["v0"]]

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import HEAD, TWO, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -16,20 +17,7 @@ from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[recording]
-time = "t"
-axes = "machine"
-[recording.channels]
-t = { unit = "s", role = "time" }
-SA = { unit = "deg", role = "input" }
-FZ = { unit = "N", role = "input" }
-FY = { unit = "N", role = "output" }
-MZ = { unit = "N*m", role = "output" }
-"""
+CASE = case_text("python", inputs={"SA": "deg", "FZ": "N"}, outputs={"FY": "N", "MZ": "N*m"}, axes="machine")
 SIMULATOR = """
 import numpy as np, pandas as pd
 def simulate(inputs, p):

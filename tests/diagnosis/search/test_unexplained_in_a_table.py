@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
@@ -13,24 +14,14 @@ from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.unexplained import remainder
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.resistance]
-value = 3.2
-unit = "ohm"
-sd = 0.5
-[simulation.parameters.drop]
-value = 0.7
-unit = "V"
-sd = 0.2
-[recording.channels]
-U = { unit = "V", role = "input" }
-I = { unit = "A", role = "output" }
-[[recording.run]]
-file = "table.csv"
-"""
+CASE = case_text(
+    "python",
+    time=None,
+    parameters={"resistance": (3.2, "ohm", 0.5), "drop": (0.7, "V", 0.2)},
+    inputs={"U": "V"},
+    outputs={"I": "A"},
+    runs=1,
+)
 COIL = """
 import pandas as pd
 def simulate(inputs, p):
@@ -43,7 +34,7 @@ U = np.linspace(0.8, 9.4, 21)
 def left(tmp_path):
     def of(rest):
         table = pd.DataFrame({"U": U, "I": (U - 0.73) / 3.15 + rest})
-        files = {"table__csv": table, "r0__csv": None, "r1__csv": None}
+        files = {"r0__csv": table, "r1__csv": None}
         ordered = by_inputs(read_case(write_case(tmp_path, CASE, simulator=COIL, **files)))
         assert ordered is not None
         problem = problem_of(ordered[0], model_of(ordered[0], None, None))

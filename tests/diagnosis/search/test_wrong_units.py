@@ -70,24 +70,14 @@ def test_the_inputs_of_an_equation_are_asked_for_their_units(tmp_path):
     for i in range(1, len(t)):
         w[i] = w[i - 1] + 0.05 * (3.0 * moment[i - 1] - w[i - 1]) / 0.5
     run = pd.DataFrame({"t": t, "M": moment / (4.4482216 * 0.3048), "w": w + rng.normal(0, 0.02, len(t))})
-    head = """schema = 1
-[simulation]
-kind = "ode"
-path = "sim.py"
-states = ["w"]
-[simulation.parameters.gain]
-value = 3.0
-unit = "1/(N*m*s)"
-sd = 0.1
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-M = { unit = "N*m", role = "input" }
-w = { unit = "rad/s", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+    head = case_text(
+        "ode",
+        parameters={"gain": (3.0, "1/(N*m*s)", 0.1)},
+        inputs={"M": "N*m"},
+        outputs={"w": "rad/s"},
+        runs=1,
+        states=["w"],
+    )
     path = write_case(tmp_path, head, simulator=ROTOR, r0__csv=run, r1__csv=None)
     answer = diagnose(read_case(path), None).diagnosis
     (effect,) = answer.effects

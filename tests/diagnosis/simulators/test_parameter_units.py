@@ -7,6 +7,7 @@ import pandas as pd
 import pint
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import CELL, write_case
 from toolkit.diagnosis.answer.model_text import model_text
 from toolkit.diagnosis.case.reader import read_case
@@ -46,25 +47,9 @@ def test_a_model_of_an_output_without_unit_is_read_again(tmp_path):
         L = np.linspace(0.1, 2.0, 40)
         noise = np.random.default_rng(i).normal(0, 1e-3, 40)
         frames[f"r{i}__csv"] = pd.DataFrame({"t": np.arange(40.0), "L": L, "F": L - 0.02 * L**2 + noise})
-    text = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.gain]
-value = 1.0
-unit = "1"
-sd = 0.01
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-L = { unit = "1", role = "input" }
-F = { unit = "1", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-[[recording.run]]
-file = "r1.csv"
-"""
+    text = case_text(
+        "python", parameters={"gain": (1.0, "1", 0.01)}, inputs={"L": "1"}, outputs={"F": "1"}, runs=2
+    )
     read = read_case(write_case(tmp_path, text, simulator=CELL, **frames))
     found = diagnose(read, None)
     (bent,) = found.diagnosis.effects

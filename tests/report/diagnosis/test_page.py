@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import carriage, write_case
 from toolkit.diagnosis.answer.answer import Dependence
 from toolkit.diagnosis.case.reader import read_case
@@ -201,18 +202,7 @@ def test_time_is_told_in_the_unit_of_the_case(tmp_path):
     # A resistor that drifts over 100 days: in seconds its place would end at 8553600.
     days = np.arange(100.0)
     y = 10.0 + 0.01 * days + np.random.default_rng(1).normal(0, 1e-3, 100)
-    toml = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "day", role = "time" }
-y = { unit = "ohm", role = "output" }
-[[recording.run]]
-file = "r0.csv"
-"""
+    toml = case_text("python", time="day", outputs={"y": "ohm"}, runs=1)
     simulator = """
 def simulate(inputs, p):
     return (10.0 + 0 * inputs["t"]).to_frame("y")

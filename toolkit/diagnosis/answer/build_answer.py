@@ -37,7 +37,7 @@ from toolkit.diagnosis.search.channel_factors import factor_of, is_ratio
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.noise_floor import LARGE, LONG
 from toolkit.diagnosis.search.search import Search
-from toolkit.diagnosis.search.unexplained import LINE, narrowest_line
+from toolkit.diagnosis.search.unexplained import narrowest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect
 from toolkit.effects.unit_ratios import near_ratio
@@ -330,7 +330,7 @@ def _mismatches(search: Search, *, unknown: bool) -> tuple[ChannelMismatch, ...]
             continue
         if unknown:
             share, signal = max((share, signal), structured(search, name), key=lambda pair: pair[0])
-        if any(each.reason.startswith(LINE) for each in mine):
+        if any(each.line is not None for each in mine):
             line = narrowest_line(problem, name, before)
             share = max(share, 0.0 if line is None else line.share)
         mismatches.append(
@@ -353,7 +353,7 @@ def _depends_on(search: Search, name: str) -> tuple[str, ...]:
         key=lambda structure: structure.gain,
         default=None,
     )
-    return () if most is None or most.reason.startswith(LINE) else most.variables
+    return () if most is None or most.line is not None else most.variables
 
 
 def _outliers(case: Case, search: Search) -> tuple[Finding, ...]:

@@ -11,9 +11,7 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.effects.applied import AppliedEffect
 
@@ -21,16 +19,14 @@ if TYPE_CHECKING:
 class FailedRuns:
     """A model's ``simulate`` that counts where the simulation gave nothing: by itself, and with an effect."""
 
-    def __init__(self, simulate: Callable[..., dict[str, NDArray[np.float64]]]) -> None:
+    def __init__(self, simulate: Callable[..., dict[str, Array]]) -> None:
         self._simulate = simulate
         self._tried: set[tuple[float, ...]] = set()
         self._failed: set[tuple[float, ...]] = set()
         self._first = ""
         self._with: dict[str, list[int]] = {}  # effect -> simulations with it, and those that gave nothing
 
-    def __call__(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
-    ) -> dict[str, NDArray[np.float64]]:
+    def __call__(self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> dict[str, Array]:
         """Return the outputs of a run."""
         values = tuple(p.values())
         counted = self._with.setdefault(_told(active[-1]), [0, 0]) if active else [0, 0]

@@ -21,8 +21,7 @@ from toolkit.diagnosis.policy import LAWS, VERDICT
 from toolkit.effects.law import formula
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.law.learn import Law, Laws
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
@@ -99,7 +98,7 @@ def _memory(fitted: AppliedEffect) -> float | None:
     return None
 
 
-def _covariance(search: Search, law: Law, fitted: AppliedEffect) -> NDArray[np.float64]:
+def _covariance(search: Search, law: Law, fitted: AppliedEffect) -> Array:
     """Return the covariance of a law's parameters, in their units."""
     augmented, at = search.augmented, len(search.problem.free)
     if all(applied.key != fitted.key for applied in augmented.active):  # it explains, and is in no fit
@@ -120,9 +119,7 @@ def _quantile(search: Search) -> float:
     return float(student.ppf((1 + VERDICT.interval) / 2, degrees))
 
 
-def _curve(
-    law: Law, fitted: AppliedEffect, covariance: NDArray[np.float64], quantile: float
-) -> LawCurve | None:
+def _curve(law: Law, fitted: AppliedEffect, covariance: Array, quantile: float) -> LawCurve | None:
     """Return a law of one signal without memory over what was recorded; its band is linear in the errors."""
     trial = law.trial
     if len(trial.signals) != 1 or trial.form != "static":
@@ -134,7 +131,7 @@ def _curve(
 
     counted = replace(signal, values=x).values_in(trial.shape)
 
-    def at(values: dict[str, float]) -> NDArray[np.float64]:
+    def at(values: dict[str, float]) -> Array:
         with np.errstate(all="ignore"):
             return np.broadcast_to(curve({"x": counted}, values), LAWS.points).astype(float)
 

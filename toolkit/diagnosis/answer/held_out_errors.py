@@ -16,8 +16,7 @@ from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.parameter_units import reduced
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.law.learn import Laws
 
 
@@ -35,7 +34,7 @@ def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutChannel, .
         if not problem.kept[output.name].any():
             continue
 
-        def rmse(simulated: NDArray[np.float64], name: str = output.name) -> float:
+        def rmse(simulated: Array, name: str = output.name) -> float:
             away = problem.judged(name, problem.observed[name] - simulated)
             return math.sqrt(float(np.mean(away**2)))
 
@@ -108,7 +107,7 @@ def _floor(search: Search, name: str, sd: float | None) -> float:
     return noise
 
 
-def structured(search: Search, name: str) -> tuple[float, NDArray[np.float64]]:
+def structured(search: Search, name: str) -> tuple[float, Array]:
     """Return share and signal of the smooth structure in an output's refitted residual."""
     problem, counted = search.problem, search.problem.kept[name]
     residual = search.refitted.residual[name]

@@ -14,6 +14,7 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 def places(
     problem: Problem,
     name: str,
-    signal: NDArray[np.float64],
-    simulated: NDArray[np.float64],
+    signal: Array,
+    simulated: Array,
     depends_on: Sequence[str] = (),
 ) -> tuple[MismatchPlace, ...]:
     """Return the ranges that hold most of a mismatch: of what it depends on first, then the narrowest.
@@ -65,7 +66,7 @@ def places(
     return tuple(chosen) if chosen else tuple(place for _, place in ranges[:1])
 
 
-def _variables(problem: Problem) -> list[tuple[str, str, NDArray[np.float64]]]:
+def _variables(problem: Problem) -> list[tuple[str, str, Array]]:
     variables = []
     for channel in problem.case.drivers:
         if all(channel.name in run.columns for run in problem.runs):
@@ -84,9 +85,7 @@ def time_unit(case: Case) -> tuple[str, float]:
     return text, unit(text).factor
 
 
-def _range(
-    x: NDArray[np.float64], energy: NDArray[np.float64], rows: NDArray[np.bool_]
-) -> tuple[float, float, float] | None:
+def _range(x: Array, energy: Array, rows: NDArray[np.bool_]) -> tuple[float, float, float] | None:
     """Return the share of rows, and the ends, of the narrowest range of bins that holds most energy."""
     values = x[rows]
     edges = np.unique(np.quantile(values, np.linspace(0, 1, LOCATION.bins + 1)))
@@ -108,7 +107,7 @@ def _range(
 
 
 def _conditions(
-    problem: Problem, energy: NDArray[np.float64], rows: NDArray[np.bool_]
+    problem: Problem, energy: Array, rows: NDArray[np.bool_]
 ) -> list[tuple[float, MismatchPlace]]:
     ranges = []
     energy_sum, n = float(energy.sum()), float(rows.sum())
@@ -131,7 +130,7 @@ def _conditions(
     return ranges
 
 
-def _runs(problem: Problem, energy: NDArray[np.float64]) -> tuple[str, ...]:
+def _runs(problem: Problem, energy: Array) -> tuple[str, ...]:
     sums = np.array([float(energy[rows].sum()) for rows in problem.slices])
     if sums.sum() <= 0:
         return ()

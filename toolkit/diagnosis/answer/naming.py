@@ -16,8 +16,7 @@ from toolkit.diagnosis.policy import SCREENING, VERDICT
 from toolkit.diagnosis.search.search import Search
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
 
 
@@ -186,7 +185,7 @@ def _takes_nearly_all(search: Search) -> bool:
     return bool(shares) and min(shares) > VERDICT.nearly
 
 
-def _within_runs(problem: Problem, name: str, error: NDArray[np.float64]) -> float:
+def _within_runs(problem: Problem, name: str, error: Array) -> float:
     """Return the mean square of an error about its mean in every run; rates have no zero that moves."""
     if name in problem.rates:
         return float(np.mean(problem.judged(name, error) ** 2))

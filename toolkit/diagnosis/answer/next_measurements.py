@@ -13,13 +13,13 @@ from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
-from toolkit.diagnosis.search.unexplained import LINE
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
 from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
+    from toolkit.diagnosis.search.unexplained import Line
 
 _OF_CELLS = ("force", "moment", "pressure", "bridge_ratio", "voltage", "count", "ratio")
 """Dimensions of what strain gauges read; of a unit that is not known it may be one."""
@@ -159,17 +159,14 @@ def to_find_it(search: Search) -> list[str]:
         )
         if names:
             sentences.append(f"The mismatch depends on the size of {names}: {known}.")
-    found = dict.fromkeys(
-        (structure.variables[0], structure.reason.removeprefix(LINE))
-        for structure in search.structure
-        if structure.reason.startswith(LINE)
-    )
+    found = (structure.line for structure in search.structure if structure.line is not None)
+    swings = {(line.angle, line.told): line for line in found}.values()
     sentences += [
-        f"The mismatch swings {line.replace(' per', ' times per')} of {name}: {_AT_ANOTHER_SPEED}"
-        for name, line in found
-        if name != "time"
+        f"The mismatch swings {line.told.replace(' per', ' times per')} of {line.angle}: {_AT_ANOTHER_SPEED}"
+        for line in swings
+        if line.angle
     ]
-    lines = [line for name, line in found if name == "time"]
+    lines = [line for line in swings if not line.angle]
     if lines:
         sentences += _swinging(search.problem, lines)
     if "run" in variables:
@@ -207,17 +204,17 @@ _AT_ANOTHER_SPEED = (
 )
 
 
-def _swinging(problem: Problem, lines: Sequence[str]) -> list[str]:
+def _swinging(problem: Problem, lines: Sequence[Line]) -> list[str]:
     """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
     sentences, unturned = [], []
     for line in lines:
-        order = _order(problem, float(line.removesuffix(" Hz")))
+        order = _order(problem, line.frequency)
         if order is None:
-            unturned.append(line)
+            unturned.append(line.told)
             continue
         name, cycles = order
         sentences.append(
-            f"The mismatch swings at {line}, {cycles:.3g} times per turn of {name}: {_AT_ANOTHER_SPEED}"
+            f"The mismatch swings at {line.told}, {cycles:.3g} times per turn of {name}: {_AT_ANOTHER_SPEED}"
         )
     if unturned:
         listed = " and ".join(unturned)

@@ -19,13 +19,12 @@ from toolkit.diagnosis.policy import ROWS
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.findings import Finding
 
-    Stacked = dict[str, NDArray[np.float64]]
+    Stacked = dict[str, Array]
 
 STEPS = (
     "refit of the nominal parameters",
@@ -37,7 +36,7 @@ STEPS = (
 )
 
 
-def is_flat(values: NDArray[np.float64]) -> bool:
+def is_flat(values: Array) -> bool:
     """Tell whether recorded values are too few, or all the same."""
     return len(values) < ROWS.fewest or float(np.ptp(values)) == 0.0
 

@@ -12,9 +12,7 @@ from toolkit.declared import Above, Entry, UnitName
 from toolkit.machine.default import DEFAULT_MACHINE
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.simulation.model_file import FittedEffect
     from toolkit.simulation.plan_file import CaseParameter
 
@@ -46,11 +44,11 @@ class Run:
     """
 
     name: str
-    t: NDArray[np.float64]
-    columns: Mapping[str, NDArray[np.float64]]
+    t: Array
+    columns: Mapping[str, Array]
     conditions: Mapping[str, str]
     declared: Mapping[str, Any]
-    simulated: Mapping[str, NDArray[np.float64]]
+    simulated: Mapping[str, Array]
     filled: tuple[tuple[str, int], ...] = ()
     sha256: str = ""
     own: bool = False

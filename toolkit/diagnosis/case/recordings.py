@@ -29,7 +29,7 @@ from toolkit.spelling import nearest
 from toolkit.units import split_header, unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 _TEXT = ("text", "utf-16", "binary", "empty", "blank")  # a NUL among the numbers is told with its cell
 
@@ -64,13 +64,13 @@ def read_run(
     # Another program's output stands in the unit of the channel that it is held against.
     units = {column: units.get(output, "") for output, column in simulated.items()} | units
     table, present, own_names, hidden = _read(path, data, machine=machine, units=units)
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, Array] = {}
     for channel in channels:
         if channel.name in table:
             columns[channel.name] = table[channel.name]
         elif channel.role != "output" or (not predict):
             raise missing_column(path, channel.name, present)
-    further: dict[str, NDArray[np.float64]] = {}
+    further: dict[str, Array] = {}
     for output, column in simulated.items():
         if column not in table:
             raise missing_column(path, column, present)
@@ -108,7 +108,7 @@ def conditions(declared: Mapping[str, Any]) -> dict[str, str]:
 
 def _read(
     path: Path, data: bytes, *, machine: str, units: Mapping[str, str]
-) -> tuple[dict[str, NDArray[np.float64]], list[str], bool, tuple[int, ...]]:
+) -> tuple[dict[str, Array], list[str], bool, tuple[int, ...]]:
     """Return the wanted columns that a file has and the names of all.
 
     And whether it is the machine's own, and the rows of a worksheet that it hides.
@@ -132,7 +132,7 @@ def _is_of_machine(header: Collection[str], machine: str) -> bool:
 
 def _read_recording(
     path: Path, data: bytes, machine: Machine, units: Mapping[str, str]
-) -> tuple[dict[str, NDArray[np.float64]], tuple[int, ...]]:
+) -> tuple[dict[str, Array], tuple[int, ...]]:
     """Return a file's columns by symbol, each in the unit that the case states for it; and its hidden rows.
 
     Raises
@@ -159,7 +159,7 @@ def _read_recording(
     return columns, recording.hidden
 
 
-def _check_time(path: Path, name: str, t: NDArray[np.float64]) -> None:
+def _check_time(path: Path, name: str, t: Array) -> None:
     fault = time_fault(t)
     if fault is None:
         return
@@ -175,7 +175,7 @@ def _check_time(path: Path, name: str, t: NDArray[np.float64]) -> None:
     )
 
 
-def _filled(path: Path, name: str, t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _filled(path: Path, name: str, t: Array, x: Array) -> Array:
     good = np.isfinite(x)
     if good.all():
         return x
@@ -195,7 +195,7 @@ _MISSING = frozenset(("", "nan", "na", "n/a", "null", "none"))
 _LARGEST = 1e100  # in no unit does an instrument reach it; its square must stay a number
 
 
-def read_csv(data: bytes, units: Mapping[str, str], *, where: Path) -> dict[str, NDArray[np.float64]]:
+def read_csv(data: bytes, units: Mapping[str, str], *, where: Path) -> dict[str, Array]:
     """Return the wanted columns that the file has, each (n,), NaN where a sample is missing.
 
     Parameters
@@ -254,9 +254,7 @@ def _decimal(text: str, separator: str, where: Path) -> str:
     return decimal_sign(chain.from_iterable(rows), separator, where=where)
 
 
-def _converted(
-    values: NDArray[np.float64], stated: str | None, channel_unit: str, where: str
-) -> NDArray[np.float64]:
+def _converted(values: Array, stated: str | None, channel_unit: str, where: str) -> Array:
     if stated is None or stated == channel_unit:
         return values
     source, target = unit(stated, where=where), unit(channel_unit, where=where)
@@ -293,7 +291,7 @@ def header_of(data: bytes, columns: Collection[str] = (), *, where: Path) -> lis
         return []
 
 
-def _quick(text: str, header: list[str], separator: str) -> NDArray[np.float64] | None:
+def _quick(text: str, header: list[str], separator: str) -> Array | None:
     """Return a file of finite numbers alone, None for anything that must be looked at cell by cell."""
     start = text.find("\n")
     if start < 0 or '"' in text or "\r" in text[:start].rstrip("\r") or not text[start + 1 :].strip():
@@ -308,9 +306,7 @@ def _quick(text: str, header: list[str], separator: str) -> NDArray[np.float64] 
     return table if fits else None
 
 
-def _careful(
-    rows: Iterable[list[str]], header: list[str], columns: Collection[str], where: Path
-) -> NDArray[np.float64]:
+def _careful(rows: Iterable[list[str]], header: list[str], columns: Collection[str], where: Path) -> Array:
     table: list[list[float]] = []
     is_used = [name in columns for name in header]
     for number, row in enumerate(rows, start=2):

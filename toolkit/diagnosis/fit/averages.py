@@ -35,8 +35,7 @@ from toolkit.findings import Finding
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.fit.problem import Problem, Stacked
 
@@ -156,8 +155,8 @@ def of_kept_rows(problem: Problem, rows: int) -> Case:
 
 def is_smooth(
     problem: Problem,
-    simulated: Mapping[str, NDArray[np.float64]],
-    smooth: Mapping[str, NDArray[np.float64]],
+    simulated: Mapping[str, Array],
+    smooth: Mapping[str, Array],
     rows: int,
 ) -> bool:
     """Tell whether smooth inputs give the means of the simulation as declared, beside its mismatch.
@@ -201,11 +200,11 @@ def _all_octaves(problem: Problem, simulated: Stacked) -> dict[str, list[Octave]
     return {name: _octaves(problem, name, simulated[name]) for name in problem.names}
 
 
-def _octaves(problem: Problem, name: str, simulated: NDArray[np.float64]) -> list[Octave]:
+def _octaves(problem: Problem, name: str, simulated: Array) -> list[Octave]:
     """Return an output's octaves below half the quickest run's rate, the quickest first."""
     from scipy.signal import csd, welch
 
-    sums: dict[int, NDArray[np.float64]] = {}
+    sums: dict[int, Array] = {}
     quickest = min(usual_step(run) for run in problem.case.runs)
     for run, place in zip(problem.runs, problem.slices, strict=True):
         step = usual_step(run)

@@ -24,11 +24,9 @@ from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
 
-    Array = NDArray[np.float64]
     Stacked = dict[str, Array]
 
 _TRIALS = 12
@@ -149,7 +147,7 @@ def descend(
         return x
     weighing = Weighing(space, layouts, noise)
 
-    def slope(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slope(v: Array) -> Array:
         return weighing.slope(derivatives.at(v, weighing))
 
     for _ in range(_AGAIN):

@@ -20,8 +20,7 @@ from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -76,7 +75,7 @@ def _rows_apart(problem: Problem, base: Fit, name: str) -> int:
     return min(apart, longest)
 
 
-def _wanders(problem: Problem, residual: NDArray[np.float64], name: str) -> bool:
+def _wanders(problem: Problem, residual: Array, name: str) -> bool:
     """Tell whether most of an error is the sum of what came before, and not what happens there."""
     parts = [residual[at][problem.kept[name][at]] for at in problem.slices]
     variance = float(np.mean([part.var() for part in parts if len(part)]))
@@ -90,6 +89,6 @@ def _part(problem: Problem, name: str) -> int:
     return max(min(count for count in counts if count) // DRIFT.parts, 1)
 
 
-def _moves(problem: Problem, residual: NDArray[np.float64], name: str, apart: int) -> float:
+def _moves(problem: Problem, residual: Array, name: str, apart: int) -> float:
     parts = [residual[at][problem.kept[name][at]] for at in problem.slices]
     return float(np.mean(np.concatenate([part[apart:] - part[:-apart] for part in parts]) ** 2))

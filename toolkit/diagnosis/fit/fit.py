@@ -24,9 +24,10 @@ from toolkit.effects.applied import AppliedEffect
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
 
-    Stacked = dict[str, NDArray[np.float64]]
+    Stacked = dict[str, Array]
 
 # The covariance of a joint fit: of generalised least squares, or the sandwich of ordinary ones.
 
@@ -36,13 +37,13 @@ _OPEN = 1e12  # variance, in searched units, of what the data leave open altoget
 
 def covariance(
     J: Stacked,
-    prior: NDArray[np.float64],
-    sizes: NDArray[np.float64],
+    prior: Array,
+    sizes: Array,
     layouts: dict[str, Layout],
     noise: dict[str, Autoregression],
     *,
     plain: bool,
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the covariance of (p, effects' parameters) in their units.
 
     Of ordinary least squares it is the sandwich with the residual's autocovariance in it.
@@ -78,7 +79,7 @@ def covariance(
         return np.asarray(np.nan_to_num(inverse * np.outer(scale, scale)))
 
 
-def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
+def _correlated(columns: Array, where: Layout, noise: Autoregression) -> Array:
     """Return the noise's covariance matrix times columns, segment by segment."""
     from scipy.signal import fftconvolve
 
@@ -111,7 +112,7 @@ class Fit:
     simulated: Stacked
     noise: dict[str, Autoregression]
     log_posterior: float
-    covariance: NDArray[np.float64]
+    covariance: Array
     rows: NDArray[np.bool_] | None
     plain: bool = False
 
@@ -120,7 +121,7 @@ class Fit:
 class _Solved:
     """One solution: the searched vector, its residual, the noise of that, and the log-posterior."""
 
-    x: NDArray[np.float64]
+    x: Array
     simulated: Stacked
     residual: Stacked
     noise: dict[str, Autoregression]
@@ -192,7 +193,7 @@ def fit(
 def _coloured(
     space: Space,
     layouts: dict[str, Layout],
-    x: NDArray[np.float64],
+    x: Array,
     noise: dict[str, Autoregression] | None,
     rounds: int,
     derivatives: Derivatives,
@@ -259,7 +260,7 @@ def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> b
 def _solve(
     space: Space,
     layouts: dict[str, Layout],
-    x: NDArray[np.float64],
+    x: Array,
     weights: dict[str, Autoregression],
     derivatives: Derivatives,
 ) -> _Solved:
@@ -339,7 +340,7 @@ def log_prior(problem: Problem, p: Sequence[float]) -> float:
     )
 
 
-def jacobian(problem: Problem, fit: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+def jacobian(problem: Problem, fit: Fit) -> tuple[dict[str, Array], Array]:
     """Return d(simulated)/d(x) over all rows of each output, and the sizes of x; x = (p, effects) / sizes."""
     space = Space.of(problem, fit.active)
     return space.around(space.at(fit.p))[1], space.sizes
@@ -356,7 +357,7 @@ def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> d
 
 def _score(
     space: Space,
-    x: NDArray[np.float64],
+    x: Array,
     residual: Stacked,
     layouts: dict[str, Layout],
     noise: dict[str, Autoregression],
@@ -371,7 +372,7 @@ def _score(
 
 def _covariance(
     space: Space, solved: _Solved, alternative: _Solved | None, layouts: dict[str, Layout], *, plain: bool
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the covariance of a solution, with what the plain ``other`` disagrees with it beside.
 
     Under the right model the two differ as far as the plain one is the less sure. A parameter by which they

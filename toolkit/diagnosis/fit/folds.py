@@ -36,9 +36,8 @@ from toolkit.effects.applied import AppliedEffect
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,7 +102,7 @@ class HeldOut:
     """A hypothesis on rows that it has not seen: log score of each fold, and its simulation of those rows."""
 
     scores: tuple[float, ...]
-    simulated: dict[str, NDArray[np.float64]]
+    simulated: dict[str, Array]
     fits: tuple[Fit, ...]
 
     @property

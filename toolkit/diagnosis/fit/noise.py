@@ -18,6 +18,8 @@ from toolkit.diagnosis.policy import NOISE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Autoregression:
@@ -43,16 +45,16 @@ class Autoregression:
         return max(1.0, at_zero / max(self.marginal_sd**2, 1e-300))
 
 
-def predictor(reflection: Sequence[float]) -> list[NDArray[np.float64]]:
+def predictor(reflection: Sequence[float]) -> list[Array]:
     """Return the predictor of every order 0..p: value = sum a_j * value[-j] (Levinson's recursion)."""
-    orders: list[NDArray[np.float64]] = [np.zeros(0)]
+    orders: list[Array] = [np.zeros(0)]
     for k in reflection:
         last = orders[-1]
         orders.append(np.concatenate([last - k * last[::-1], [k]]))
     return orders
 
 
-def autocovariance(noise: Autoregression, count: int) -> NDArray[np.float64]:
+def autocovariance(noise: Autoregression, count: int) -> Array:
     """Return the noise's autocovariance at lags 0 to ``count`` - 1, shape (count,)."""
     orders = predictor(noise.reflection)
     gamma = np.zeros(count)
@@ -86,9 +88,7 @@ class Layout:
         return len(self.index)
 
 
-def layout(
-    times: Sequence[NDArray[np.float64]], counted: Sequence[NDArray[np.bool_]], *, ordered: bool = True
-) -> Layout:
+def layout(times: Sequence[Array], counted: Sequence[NDArray[np.bool_]], *, ordered: bool = True) -> Layout:
     """Return the layout of one output.
 
     Parameters
@@ -114,7 +114,7 @@ def layout(
 
 
 def fit_noise(
-    residual: NDArray[np.float64], where: Layout, *, floor: float, sd: float | None = None, used: int = 0
+    residual: Array, where: Layout, *, floor: float, sd: float | None = None, used: int = 0
 ) -> Autoregression:
     """Return the noise of a residual: Burg's method over all segments, the order by BIC.
 
@@ -189,7 +189,7 @@ def _telling(where: Layout) -> list[slice]:
     return list(where.segments) if held < NOISE.telling * where.n and (held or paused) else long
 
 
-def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
+def whiten(values: Array, where: Layout, noise: Autoregression) -> Array:
     """Return innovations over their standard deviation; ``values`` (n,) or (n, columns).
 
     Exact for a stationary autoregression: the first values of a segment are predicted by lower orders.
@@ -216,7 +216,7 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) ->
     return innovations / noise.sd
 
 
-def draws(noise: Autoregression, where: Layout, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def draws(noise: Autoregression, where: Layout, count: int, rng: np.random.Generator) -> Array:
     """Return series of a noise over a layout, (n, count): what `whiten` makes white again.
 
     Stationary from the first value of a segment on, however long its memory: nothing has to settle.
@@ -244,7 +244,7 @@ def _early(noise: Autoregression) -> list[float]:
     return [math.sqrt(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) for k in range(p)]
 
 
-def log_likelihood(residual: NDArray[np.float64], where: Layout, noise: Autoregression) -> float:
+def log_likelihood(residual: Array, where: Layout, noise: Autoregression) -> float:
     """Return the Gaussian log-likelihood of a residual under a noise (natural logarithm)."""
     white = whiten(residual, where, noise)
     p = len(noise.reflection)

@@ -13,8 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
@@ -50,7 +49,7 @@ def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> st
     fits : the simulation as declared, refitted, and augmented; None for the declared parameters
     """
     case = problem.case
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, Array] = {}
     for channel in case.channels:
         if channel.role == "time":
             columns[channel.name] = run.columns[channel.name]
@@ -61,14 +60,14 @@ def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> st
     return csv_of(columns)
 
 
-def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> str:
+def csv_of(columns: Mapping[str, Array]) -> str:
     """Return columns (n,) as CSV with full doubles; what is no finite number is an empty cell."""
     lines = [",".join(_cell(name) for name in columns)]
     lines += [",".join(_number(v) for v in row) for row in np.stack(list(columns.values()), axis=1)]
     return "\n".join(lines) + "\n"
 
 
-def _simulated(problem: Problem, run: Run, fit: Fit | None) -> Mapping[str, NDArray[np.float64]]:
+def _simulated(problem: Problem, run: Run, fit: Fit | None) -> Mapping[str, Array]:
     values = dict(problem.known)
     if fit is None:
         return problem.model.simulate(run, values, ())

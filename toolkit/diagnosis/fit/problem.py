@@ -18,11 +18,12 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Pattern
     from toolkit.simulation.plan_file import CaseParameter
 
-    Stacked = dict[str, NDArray[np.float64]]
+    Stacked = dict[str, Array]
 
 
 _QUARTERS = 2  # of a cycle, by which the columns of a pattern are apart: sine and cosine make every phase
@@ -62,7 +63,7 @@ class Problem:
         return int(self.slices[-1].stop)
 
     @property
-    def drivers(self) -> list[NDArray[np.float64]]:
+    def drivers(self) -> list[Array]:
         """What drives the runs, (rows,) each; of another program's output without inputs, that output."""
         listed = [drivers_of(self.case, run) for run in self.runs]
         return [np.concatenate([each[name] for each in listed]) for name in listed[0]]
@@ -76,7 +77,7 @@ class Problem:
             ordered=self.case.has_order,
         )
 
-    def judged(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def judged(self, name: str, values: Array) -> Array:
         """Return what counts of an output's values, (rows,): those of its kept rows, or their rates [1/s]."""
         kept, apart = self.kept[name], self.rates.get(name)
         if apart is None:
@@ -136,7 +137,7 @@ class Problem:
         pattern : positions and rates (n,) to forces (n, forces)
         """
         values = self._values(p)
-        parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in self.names}
+        parts: dict[str, list[Array]] = {name: [] for name in self.names}
         moving = self.model.capability.motion
         for run in self.runs:
             responses: Stacked = {}
@@ -146,7 +147,7 @@ class Problem:
                 column.append(responses.get(name, np.zeros((run.rows, forces))))
         return {name: np.concatenate(column) for name, column in parts.items()}
 
-    def prior_rows(self, sizes: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
+    def prior_rows(self, sizes: Array, columns: int) -> Array:
         """Return d(parameter over its prior's sd)/dx below the rows of the data, (free, columns).
 
         Parameters
@@ -159,7 +160,7 @@ class Problem:
             rows[i, i] = sizes[i] / (parameter.sd or 1.0)
         return rows
 
-    def off_priors(self, p: Sequence[float]) -> NDArray[np.float64]:
+    def off_priors(self, p: Sequence[float]) -> Array:
         """Return how far free parameters are off their declared values, in prior sd, (free,)."""
         pairs = zip(p, self.free, strict=True)
         return np.array([(value - parameter.value) / (parameter.sd or 1.0) for value, parameter in pairs])
@@ -216,7 +217,7 @@ class Problem:
 def problem_of(case: Case, model: Model) -> Problem:
     """Return the problem of a case: runs of the phase ``tare`` are no part of it."""
     runs = tuple(run for run in case.runs if run.conditions.get("phase") != "tare")
-    observed: dict[str, list[NDArray[np.float64]]] = {output.name: [] for output in model.outputs}
+    observed: dict[str, list[Array]] = {output.name: [] for output in model.outputs}
     for run in runs:
         recorded = model.observed(run)
         for name, column in observed.items():
@@ -307,12 +308,12 @@ def _moved_sharply(problem: Problem, rows: slice) -> NDArray[np.bool_]:
     return beside
 
 
-def _running_median(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _running_median(x: Array) -> Array:
     padded = np.concatenate([x[2:0:-1], x, x[-2:-4:-1]])
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
-def _resolution(column: NDArray[np.float64]) -> float:
+def _resolution(column: Array) -> float:
     """Return the standard deviation that printed digits leave: the smallest step over the root of twelve."""
     values = np.unique(column[np.isfinite(column)])
     size = float(np.abs(values).max()) if len(values) else 1.0

@@ -23,9 +23,8 @@ from toolkit.diagnosis.policy import ROWS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
-
-    Array = NDArray[np.float64]
 
 
 def by_inputs(case: Case) -> tuple[Case, tuple[NDArray[np.intp], ...]] | None:

@@ -30,12 +30,10 @@ from toolkit.diagnosis.policy import SCATTER, VERDICT
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.folds import Folds, HeldOut
     from toolkit.diagnosis.fit.problem import Problem
 
-    Array = NDArray[np.float64]
 
 _PASSES = 4  # linear about the fit of the pass before
 _BETTER = 1e-3  # of the log-likelihood: less is no other fit

@@ -17,7 +17,7 @@ import numpy as np
 from toolkit.diagnosis.policy import SCATTER
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 _GRID = 9  # sizes of a scatter that are tried first
 _STEPS = (3.0, 1.7, 1.3, 1.14, 1.07)  # factors by which it then moves
@@ -31,7 +31,7 @@ class WhitenedRun(Protocol):
         """Sum of squares of what is left."""
 
     @property
-    def inner(self) -> NDArray[np.float64]:
+    def inner(self) -> Array:
         """Products of the constant and the simulated output with themselves (2, 2)."""
 
 

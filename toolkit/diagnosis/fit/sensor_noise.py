@@ -21,8 +21,7 @@ from toolkit.diagnosis.fit.noise import fit_noise
 from toolkit.diagnosis.policy import NOISE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -117,7 +116,7 @@ def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
     return _quick_sd(problem, fit.residual[name], name)
 
 
-def _quick_sd(problem: Problem, column: NDArray[np.float64], name: str) -> float:
+def _quick_sd(problem: Problem, column: Array, name: str) -> float:
     where = problem.layout(name)
     values = column[where.index]
     if problem.case.has_order:
@@ -136,6 +135,6 @@ def spread(problem: Problem, name: str) -> float:
     return float(np.std(values)) if len(values) else 0.0
 
 
-def robust_sd(values: NDArray[np.float64]) -> float:
+def robust_sd(values: Array) -> float:
     """Return the standard deviation about zero that the median of the sizes tells, of normal values."""
     return _ROBUST * float(np.median(np.abs(values)))

@@ -15,8 +15,7 @@ import numpy as np
 from toolkit.diagnosis.policy import STRUCTURE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -30,9 +29,9 @@ class SmoothDependence:
 
     output: str
     variables: tuple[str, ...]
-    columns: NDArray[np.float64]
+    columns: Array
 
-    def directions(self, problem: Problem) -> dict[str, NDArray[np.float64]]:
+    def directions(self, problem: Problem) -> dict[str, Array]:
         """Return the columns as responses of every output: nothing in the others."""
         none = np.zeros_like(self.columns)
         return {name: self.columns if name == self.output else none for name in problem.names}
@@ -44,7 +43,7 @@ def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
     dependences: list[SmoothDependence] = []
     for output in problem.names:
         n = int(problem.kept[output].sum())
-        listed: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
+        listed: list[tuple[tuple[str, ...], Array]] = []
         most = int(n / STRUCTURE.rows_per_column)
         for name, x in [*variables, (output, filled(base.simulated[output]))]:
             columns = _spline(x, most)
@@ -65,7 +64,7 @@ def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
     return dependences
 
 
-def filled(simulated: NDArray[np.float64]) -> NDArray[np.float64]:
+def filled(simulated: Array) -> Array:
     """Return a simulated output with a value in every row, the mean where it has none.
 
     What acts on recorded readings leaves a simulation open where these were not recorded: rows that no
@@ -75,7 +74,7 @@ def filled(simulated: NDArray[np.float64]) -> NDArray[np.float64]:
     return simulated if known.all() else np.where(known, simulated, np.mean(simulated[known]))
 
 
-def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
+def _variables(problem: Problem) -> list[tuple[str, Array]]:
     variables = [
         (channel.name, np.concatenate([run.columns[channel.name] for run in problem.runs]))
         for channel in problem.case.drivers
@@ -97,7 +96,7 @@ def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
     return [*variables, *rates]
 
 
-def _spline(x: NDArray[np.float64], most: int) -> NDArray[np.float64] | None:
+def _spline(x: Array, most: int) -> Array | None:
     """Return natural splines over quantiles, centred; powers where few values occur.
 
     There are at most so many columns: a short recording has fewer knots, and is asked all the same.
@@ -115,7 +114,7 @@ def _spline(x: NDArray[np.float64], most: int) -> NDArray[np.float64] | None:
     return np.asarray(columns - columns.mean(axis=0))
 
 
-def _product(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _product(x: Array, y: Array) -> Array | None:
     if np.ptp(x) == 0 or np.ptp(y) == 0:
         return None
     u = (x - x.mean()) / (np.abs(x - x.mean()).max())
@@ -124,11 +123,11 @@ def _product(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float
     return np.asarray(columns - columns.mean(axis=0))
 
 
-def _harmonics(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def _harmonics(angle: Array) -> Array:
     return np.stack([f(k * angle) for k in (1, 2, 3, 4) for f in (np.cos, np.sin)], axis=1)
 
 
-def _run_offsets(problem: Problem) -> NDArray[np.float64]:
+def _run_offsets(problem: Problem) -> Array:
     columns = np.zeros((problem.rows, len(problem.slices)))
     for i, rows in enumerate(problem.slices):
         columns[rows, i] = 1.0

@@ -25,8 +25,7 @@ from toolkit.effects import filters
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.effects.applied import AppliedEffect
@@ -49,19 +48,19 @@ def past_gain(problem: Problem, made: Fit) -> float:
     return float(0.5 * left @ taken_by_past(response, left))
 
 
-def past_responses(problem: Problem, made: Fit) -> dict[str, NDArray[np.float64]]:
+def past_responses(problem: Problem, made: Fit) -> dict[str, Array]:
     """Return how every output answers to states at the first rows, (rows, states); {} without a memory."""
     listed = [_responses(problem, made, applied) for applied in made.active if applied.effect.remembers]
     return {name: np.hstack([each[name] for each in listed]) for name in problem.names} if listed else {}
 
 
-def taken_by_past(response: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def taken_by_past(response: Array, values: Array) -> Array:
     """Return what states at the first rows take of whitened values, (n,) or (n, columns)."""
     normal = response.T @ response + np.eye(response.shape[1]) / PAST.spread**2
     return np.asarray(response @ np.linalg.solve(normal, response.T @ values))
 
 
-def _responses(problem: Problem, made: Fit, applied: AppliedEffect) -> dict[str, NDArray[np.float64]]:
+def _responses(problem: Problem, made: Fit, applied: AppliedEffect) -> dict[str, Array]:
     """Return how every output answers to a state at the first row of each run, (rows, runs)."""
     moved = tuple(
         replace(each, values={**each.values, filters.PAST: _STEP}) if each.key == applied.key else each

@@ -29,6 +29,7 @@ from toolkit.diagnosis.search.unexplained import StructureFound
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.folds import Folds
     from toolkit.diagnosis.fit.problem import Problem
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.time_budget import TimeBudget
 
-    Array = NDArray[np.float64]
     Stacked = dict[str, Array]
 
 

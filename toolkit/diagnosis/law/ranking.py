@@ -18,14 +18,12 @@ from toolkit.effects.law import ITSELF, parts_of
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.screen import LinearisedFit
     from toolkit.effects.law import Formula
 
-    Array = NDArray[np.float64]
     Stacked = dict[str, Array]
 
 

@@ -23,8 +23,7 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem, Stacked
     from toolkit.diagnosis.law.learn import Laws
@@ -81,9 +80,7 @@ def resembling(
     return tuple((name, distance) for distance, name in near[: LAWS.resembling])
 
 
-def _likely(
-    problem: Problem, screen: LinearisedFit, scored: Sequence[Scored], added: NDArray[np.float64]
-) -> list[Scored]:
+def _likely(problem: Problem, screen: LinearisedFit, scored: Sequence[Scored], added: Array) -> list[Scored]:
     """Return candidates whose linear responses leave the least of what a law adds, by their best start."""
     best: dict[str, tuple[float, Scored]] = {}
     for trial in scored:
@@ -120,10 +117,10 @@ def _of_either_sign(applied: AppliedEffect) -> AppliedEffect:
     return replace(applied, effect=replace(effect, parameters=parameters))
 
 
-def _away(problem: Problem, screen: LinearisedFit, columns: Stacked) -> NDArray[np.float64]:
+def _away(problem: Problem, screen: LinearisedFit, columns: Stacked) -> Array:
     """Return responses of all outputs less each run's constant and what the simulation's parameters take."""
 
-    def stacked(of: Stacked) -> NDArray[np.float64]:
+    def stacked(of: Stacked) -> Array:
         parts = []
         for name, kept in problem.kept.items():
             spread = float(np.std(problem.observed[name][kept])) if kept.any() else 0.0

@@ -16,9 +16,8 @@ import numpy as np
 from toolkit.diagnosis.policy import LAWS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    Array = NDArray[np.float64]
     Starts = Callable[[Array, Array], list[dict[str, float]]]
 
 Form = Literal["static", "mode", "loop", "event", "tone"]

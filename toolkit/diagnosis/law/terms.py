@@ -24,15 +24,12 @@ from toolkit.diagnosis.simulators.states import term_places
 from toolkit.effects.law import ITSELF, POSITION, TIME
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.screen import LinearisedFit
     from toolkit.diagnosis.simulators.simulator import Moving
-
-    Array = NDArray[np.float64]
 
 
 def terms_of(problem: Problem) -> Iterator[Trial]:

@@ -48,12 +48,10 @@ from toolkit.effects.law import ITSELF, Acts, conversion, formula, law_effect, l
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
-    Array = NDArray[np.float64]
     Stacked = dict[str, Array]
 
 

@@ -13,8 +13,7 @@ from toolkit.errors import UnitError
 from toolkit.units import is_unit, unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
 
 
@@ -104,7 +103,7 @@ class CaseView:
         values = np.abs(self.values(name) - (self.origin(name) or 0.0))
         return float(values.max()) if len(values) and values.max() > 0 else 1.0
 
-    def values(self, name: str | None) -> NDArray[np.float64]:
+    def values(self, name: str | None) -> Array:
         """Return the recorded values of a channel over all runs, (n,) without gaps; none where it was not."""
         if name is not None and name in self._problem.observed:
             values = self._problem.observed[name]

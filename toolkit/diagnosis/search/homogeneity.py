@@ -20,12 +20,9 @@ from toolkit.diagnosis.search.unexplained import StructureFound
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
-
-    Array = NDArray[np.float64]
 
 
 def uneven(problem: Problem, base: Fit, name: str) -> StructureFound | None:

@@ -29,12 +29,9 @@ from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.candidates import CandidateEffect
-
-    Array = NDArray[np.float64]
 
 
 def best_in_place(

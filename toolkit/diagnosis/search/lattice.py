@@ -16,7 +16,7 @@ import numpy as np
 from toolkit.diagnosis.policy import LATTICE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +31,7 @@ class Lattice:
     log_score_gain: float
 
 
-def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | None:
+def lattice_of(values: Array, residual_sd: float) -> Lattice | None:
     """Return the lattice of recorded values, None where there is none or it does not matter.
 
     Parameters
@@ -63,7 +63,7 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     return Lattice(step=step, half_width=ends / total, log_score_gain=len(values) * math.log(step / printed))
 
 
-def _rounding(values: NDArray[np.float64], printed: float) -> float:
+def _rounding(values: Array, printed: float) -> float:
     """Return by how much the distance of the least and the largest value may be off: half a place each.
 
     A file prints either to a fixed place or to so many significant digits, then its ends are the coarsest.
@@ -75,7 +75,7 @@ def _rounding(values: NDArray[np.float64], printed: float) -> float:
     return sum(0.5 * max(printed, place) for place in places)
 
 
-def _last_place(values: NDArray[np.float64]) -> float:
+def _last_place(values: Array) -> float:
     """Return the finest decimal place at which the values are printed."""
     places = 0
     for value in values[:200].tolist():

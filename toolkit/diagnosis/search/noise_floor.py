@@ -20,13 +20,11 @@ from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE
 from toolkit.diagnosis.search.unexplained import StructureFound
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.folds import Folds
     from toolkit.diagnosis.fit.problem import Problem
 
-    Array = NDArray[np.float64]
 
 LARGE = "a floor above a tenth of the output's spread"
 LONG = "a floor that wanders as long as the recording"

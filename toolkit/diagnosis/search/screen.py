@@ -24,11 +24,10 @@ from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
 
-    Stacked = dict[str, NDArray[np.float64]]
+    Stacked = dict[str, Array]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,7 +45,7 @@ class Scored:
     active: AppliedEffect
     gain: float
     directions: Stacked
-    block: NDArray[np.float64]
+    block: Array
     trust: float
     p: tuple[float, ...] | None = None
 
@@ -81,8 +80,8 @@ class Weighed:
     """Rows of all outputs under one noise, with the priors beneath; what the nominal parameters span."""
 
     noise: dict[str, Autoregression]
-    span: NDArray[np.float64]
-    left: NDArray[np.float64]
+    span: Array
+    left: Array
 
     @property
     def rest(self) -> float:
@@ -97,7 +96,7 @@ class LinearisedFit:
     problem: Problem
     base: Fit
     columns: Stacked
-    sizes: NDArray[np.float64]
+    sizes: Array
     layouts: dict[str, Layout]
     log_likelihood: float
     coloured: Weighed
@@ -226,7 +225,7 @@ class LinearisedFit:
 
     def quick(
         self, directions: Stacked, *, fixed: bool = False, beside: Stacked | None = None
-    ) -> tuple[float, NDArray[np.float64]]:
+    ) -> tuple[float, Array]:
         """Return twice the gain at a fixed noise, the better of two, and the responses' orthonormal block.
 
         ``beside`` is a response that is free with and without them.
@@ -265,11 +264,11 @@ class LinearisedFit:
     def _is_coloured(self) -> bool:
         return any(autoregression.reflection for autoregression in self.base.noise.values())
 
-    def rows(self, directions: Stacked) -> NDArray[np.float64]:
+    def rows(self, directions: Stacked) -> Array:
         """Return responses whitened by the fit's noise, (values and priors, columns)."""
         return self._rows(directions, self.coloured.noise)
 
-    def _rows(self, directions: Stacked, noise: dict[str, Autoregression]) -> NDArray[np.float64]:
+    def _rows(self, directions: Stacked, noise: dict[str, Autoregression]) -> Array:
         parts = [
             whiten(directions[name][where.index], where, noise[name]) for name, where in self.layouts.items()
         ]
@@ -389,7 +388,7 @@ def _weighed(
     problem: Problem,
     base: Fit,
     columns: Stacked,
-    sizes: NDArray[np.float64],
+    sizes: Array,
     layouts: dict[str, Layout],
     noise: dict[str, Autoregression],
 ) -> Weighed:
@@ -402,7 +401,7 @@ def _weighed(
     return Weighed(noise, span, target - span @ (span.T @ target))
 
 
-def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def _orthonormal(columns: Array) -> Array:
     """Return an orthonormal basis of columns, (rows, rank), by their Gram matrix."""
     if not columns.shape[1]:
         return columns
@@ -426,7 +425,7 @@ def best_of(scored: Sequence[Scored]) -> list[Scored]:
     return sorted(best.values(), key=lambda scored: -scored.gain)
 
 
-def _solved(blocks: list[NDArray[np.float64]], targets: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _solved(blocks: list[Array], targets: list[Array]) -> Array:
     """Return least squares by normal equations on scaled columns: quick, and enough to rank."""
     gram = sum(block.T @ block for block in blocks)
     right = sum(block.T @ target for block, target in zip(blocks, targets, strict=True))
@@ -440,5 +439,5 @@ def _solved(blocks: list[NDArray[np.float64]], targets: list[NDArray[np.float64]
     return np.asarray(((vectors[:, keep] / values[keep]) @ (vectors[:, keep].T @ (right / size))) / size)
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Array) -> float:
     return math.sqrt(float(np.mean(values**2))) if len(values) else 0.0

@@ -19,13 +19,13 @@ from toolkit.effects.applied import EffectKey
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 # What the best of a whole search is worth: the null distribution of its largest statistic.
 
 
 def search_p_values(
-    screen: LinearisedFit, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
+    screen: LinearisedFit, blocks: Sequence[Array], gains: Sequence[float], seed: int
 ) -> list[float]:
     """Return for every statistic the chance that a search without an effect finds one as improbable.
 
@@ -70,7 +70,7 @@ def search_p_values(
     return p_values
 
 
-def _log_p(statistic: NDArray[np.float64], dof: int) -> NDArray[np.float64]:
+def _log_p(statistic: Array, dof: int) -> Array:
     """Return the logarithm of chi-squared's upper tail; far out by its leading term."""
     from scipy.special import gammaincc, gammaln
 

@@ -20,8 +20,7 @@ from toolkit.diagnosis.search.screen_step import search_p_values
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import CaseChannel
 
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
 TOO_LARGE = "more than its stated noise"
 BEYOND_REPEATS = "more than repeats of a run differ by"
-LINE = "a line at "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +44,7 @@ class Line:
     width: float
     angle: str = ""
 
-    def courses(self, problem: Problem) -> list[NDArray[np.float64]]:
+    def courses(self, problem: Problem) -> list[Array]:
         """Return what it is a line over in every run, (n_run,): time [s], or turns."""
         over = (turns_of(problem, each) for each in problem.case.drivers if each.name == self.angle)
         return next(over, None) or [run.t for run in problem.runs]
@@ -56,8 +54,13 @@ class Line:
         """Return the frequency with its unit."""
         return f"{self.frequency:.4g} {'per turn' if self.angle else 'Hz'}"
 
+    @property
+    def reason(self) -> str:
+        """Return which line of its variable it is, as the answer says it."""
+        return f"a line at {self.told}"
 
-def narrowest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
+
+def narrowest_line(problem: Problem, name: str, residual: Array) -> Line | None:
     """Return the strongest line of an output's residual, over a recorded angle unless time's is narrower.
 
     What is of a shaft keeps its number per turn while the speed changes, and smears over time. As much in
@@ -72,7 +75,7 @@ def narrowest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
     return best
 
 
-def turns_of(problem: Problem, channel: CaseChannel) -> list[NDArray[np.float64]] | None:
+def turns_of(problem: Problem, channel: CaseChannel) -> list[Array] | None:
     """Return the turns of a recorded angle in every run, (n_run,); None where it does not turn in one way."""
     if unit(channel.unit).dimension != "angle":
         return None
@@ -89,9 +92,9 @@ def turns_of(problem: Problem, channel: CaseChannel) -> list[NDArray[np.float64]
 def strongest_line(
     problem: Problem,
     name: str,
-    residual: NDArray[np.float64],
+    residual: Array,
     *,
-    over: Sequence[NDArray[np.float64]] | None = None,
+    over: Sequence[Array] | None = None,
 ) -> Line | None:
     """Return the strongest line of an output's residual, None where no run is long and even enough.
 
@@ -139,13 +142,13 @@ def strongest_line(
     return Line(frequency=k / (n * step), p_value=p, share=share, width=1 / (n * step))
 
 
-def _level(power: NDArray[np.float64], k: int) -> float:
+def _level(power: Array, k: int) -> float:
     low, high = max(1, k - STRUCTURE.line_around), min(len(power), k + STRUCTURE.line_around + 1)
     around = np.concatenate([power[low : max(low, k - 2)], power[min(high, k + 3) : high]])
     return float(np.median(around)) if len(around) else 0.0
 
 
-def beyond_its_past(problem: Problem, name: str, residual: NDArray[np.float64], line: Line) -> float:
+def beyond_its_past(problem: Problem, name: str, residual: Array, line: Line) -> float:
     """Return the chance that coloured noise has waves as large, each run's of its own phase.
 
     Noise that came through a resonance of the plant has a peak in its spectrum as well, as narrow as the line
@@ -199,7 +202,7 @@ class Event:
     end: float
     looked: int
 
-    def columns(self, problem: Problem) -> NDArray[np.float64]:
+    def columns(self, problem: Problem) -> Array:
         """Return one in its rows and zero elsewhere, (rows, 1)."""
         inside = [
             (run.t >= self.start) & (run.t <= self.end) & (run.name == self.run) for run in problem.runs
@@ -207,7 +210,7 @@ class Event:
         return np.concatenate(inside).astype(np.float64)[:, None]
 
 
-def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64]) -> tuple[Event, ...]:
+def strongest_events(problem: Problem, name: str, residual: Array) -> tuple[Event, ...]:
     """Return for every run the stretch of its time that stands off the rest most clearly.
 
     None of a run in which other stretches as long are off as well: that is what wanders, not what happened.
@@ -236,7 +239,7 @@ def strongest_events(problem: Problem, name: str, residual: NDArray[np.float64])
     return tuple(events)
 
 
-def _stands_out(values: NDArray[np.float64], first: int, last: int) -> bool:
+def _stands_out(values: Array, first: int, last: int) -> bool:
     """Tell whether the mean of some rows is far beyond those of all other stretches of as many."""
     rows = last - first
     total = np.concatenate([[0.0], np.cumsum(values)])
@@ -283,7 +286,7 @@ class StructureFound:
     could imitate, and no effect beside it is withdrawn because of it. ``columns`` are the parameters of a
     smooth dependence; a line and a rest have none. ``noise_sd`` is what the output's noise is known to be
     where the structure shows that it is not the residual; None where it shows nothing of it. ``reason`` says
-    which line or event of its variable it is, or why it counts where no variable foretells it; else empty.
+    which ``line`` or event of its variable it is, or why it counts where no variable foretells it.
     """
 
     output: str
@@ -293,6 +296,7 @@ class StructureFound:
     rest: bool = False
     columns: int = 0
     noise_sd: float | None = None
+    line: Line | None = None
     reason: str = ""
 
     @property
@@ -338,10 +342,11 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
         line = narrowest_line(problem, name, base.residual[name])
         if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            over, text = line.angle or "time", f"{LINE}{line.told}"
-            findings.append(
-                StructureFound(output=name, variables=(over,), reason=text, gain=gain, p_value=line.p_value)
+            over = (line.angle or "time",)
+            of_line = StructureFound(
+                output=name, variables=over, line=line, reason=line.reason, gain=gain, p_value=line.p_value
             )
+            findings.append(of_line)
         event = _event(problem, screen, base, name)
         findings += [] if event is None else [event]
         beyond = _beyond_noise(problem, base, name)

@@ -27,8 +27,7 @@ from toolkit.diagnosis.search.screen_step import Look, about_declared
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
 
 
@@ -120,7 +119,7 @@ def _likely(scored: Sequence[Scored]) -> list[Scored]:
     ][: UNSEEN.fitted]
 
 
-def _runs(problem: Problem, simulated: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def _runs(problem: Problem, simulated: Mapping[str, Array]) -> Array:
     """Return the mean square of every run, each output over its own spread, (runs,)."""
     squares = np.zeros(len(problem.slices))
     for name, kept in problem.kept.items():
@@ -130,7 +129,7 @@ def _runs(problem: Problem, simulated: Mapping[str, NDArray[np.float64]]) -> NDA
     return squares
 
 
-def _left(problem: Problem, simulated: Mapping[str, NDArray[np.float64]]) -> float:
+def _left(problem: Problem, simulated: Mapping[str, Array]) -> float:
     return float(np.mean(_runs(problem, simulated)))
 
 
@@ -165,7 +164,7 @@ def gains_of(problem: Problem, before: HeldOut, shown: Sequence[tuple[Fit, HeldO
 
 
 def unseen_errors(
-    problem: Problem, name: str, declared: Mapping[str, NDArray[np.float64]], refitted: HeldOut
+    problem: Problem, name: str, declared: Mapping[str, Array], refitted: HeldOut
 ) -> tuple[float, float, float]:
     """Return the errors of a refit on rows that it has not seen, of the declared simulation, and of a mean.
 
@@ -184,7 +183,7 @@ def unseen_errors(
     return refit, plain, still
 
 
-def does_harm(problem: Problem, declared: Mapping[str, NDArray[np.float64]], refitted: HeldOut) -> bool:
+def does_harm(problem: Problem, declared: Mapping[str, Array], refitted: HeldOut) -> bool:
     """Tell whether a refit is worse, on rows that it has not seen, than no refit or than standing still."""
     for name, kept in problem.kept.items():
         if kept.any():

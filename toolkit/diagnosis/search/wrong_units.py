@@ -36,8 +36,7 @@ from toolkit.effects.unit_ratios import unit_ratios
 from toolkit.errors import FitError, UnitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.effects.effect import Effect
@@ -179,7 +178,7 @@ def unit_step(
     return made, held_out, step
 
 
-def _is_gross(problem: Problem, name: str, residual: NDArray[np.float64]) -> bool:
+def _is_gross(problem: Problem, name: str, residual: Array) -> bool:
     error = residual[problem.kept[name]]
     return bool(len(error)) and float(np.sqrt(np.mean(error**2))) > UNITS.gross * spread(problem, name)
 
@@ -229,7 +228,7 @@ def _left(
     return error
 
 
-def _error(problem: Problem, residual: dict[str, NDArray[np.float64]], names: Sequence[str]) -> float:
+def _error(problem: Problem, residual: dict[str, Array], names: Sequence[str]) -> float:
     """Return the mean of the outputs' mean squares over those of the recording."""
     shares = [
         np.mean(residual[name][problem.kept[name]] ** 2) / max(spread(problem, name) ** 2, 1e-300)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from toolkit.calibration.apply import apply_record
 from toolkit.diagnosis.simulators.channels import through_channels
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
@@ -17,8 +15,7 @@ from toolkit.errors import ConfigError, RecordError
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.diagnosis.case.case import Case, Run
 
@@ -77,7 +74,7 @@ class AcquisitionModel:
                 rule="case",
             )
 
-    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+    def observed(self, run: Run) -> dict[str, Array]:
         """Return FY and MZ as the program wrote them."""
         return {
             output.name: run.columns[output.name] for output in self.outputs if output.name in run.columns
@@ -88,7 +85,7 @@ class AcquisitionModel:
         run: Run,
         p: Mapping[str, float],
         active: Sequence[AppliedEffect],
-    ) -> dict[str, NDArray[np.float64]]:
+    ) -> dict[str, Array]:
         """Return FY and MZ by the record on cells with effects in them, then effects on FY and MZ."""
         del p  # a record's coefficients are known exactly
         around = setting(self.case, run, nominal_load_N=nominal_load(self.case))

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array, Arrays
 
-    Arrays = dict[str, NDArray[np.float64]]
 
 _SAME = 1e-12  # relative: what another order of the same additions leaves
 
@@ -26,11 +25,11 @@ class ArrayColumn(np.ndarray):
     """One column; it gives its numbers by the names by which a Series gives them."""
 
     @property
-    def values(self) -> NDArray[np.float64]:
+    def values(self) -> Array:
         """The numbers."""
         return np.array(self)
 
-    def to_numpy(self) -> NDArray[np.float64]:
+    def to_numpy(self) -> Array:
         """Return the numbers."""
         return np.array(self)
 
@@ -85,7 +84,7 @@ class Trials:
         count = self._calls[run] = self._calls.get(run, 0) + 1
         return count & (count - 1) == 0
 
-    def judge(self, of_arrays: Mapping[str, NDArray[np.float64]] | None, of_table: Arrays) -> None:
+    def judge(self, of_arrays: Mapping[str, Array] | None, of_table: Arrays) -> None:
         """Note whether both ways gave the same; None where arrays were not taken."""
         self.same = self.same and of_arrays is not None and all(
             np.allclose(of_arrays[name], column, rtol=_SAME, atol=0) for name, column in of_table.items()

@@ -25,12 +25,12 @@ from toolkit.diagnosis.policy import NOISE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Model, Parameters, Pattern
     from toolkit.effects.applied import AppliedEffect
     from toolkit.effects.effect import Effect
 
-    Arrays = dict[str, NDArray[np.float64]]
 
 _DEGREE = 3  # of the polynomials
 
@@ -44,9 +44,9 @@ class Windows:
     """
 
     rows: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    weights: Array
 
-    def mean(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean(self, column: Array) -> Array:
         """Return means, (means, ...) of (n, ...): NaN where less than half of a window's weight is there."""
         values = np.moveaxis(column[self.rows], 1, -1)
         there = np.isfinite(values)
@@ -176,7 +176,7 @@ class MeansOf:
         return {name: of.mean(columns) for name, columns in responses.items()}
 
 
-def _weights(count: int) -> NDArray[np.float64]:
+def _weights(count: int) -> Array:
     return np.asarray((1 - np.cos(np.pi * (np.arange(2 * count) + 0.5) / count)) / (2 * count))
 
 

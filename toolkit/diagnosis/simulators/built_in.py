@@ -23,15 +23,12 @@ from toolkit.simulation.plan_file import CaseParameter
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.following import Followed
     from toolkit.diagnosis.simulators.simulator import LedAlong, Parameters
     from toolkit.effects.effect import Effect
     from toolkit.simulation.model_file import FittedEffect
-
-    Arrays = dict[str, NDArray[np.float64]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +104,7 @@ class WithEffects:
 
         def followed(
             runs: Sequence[Run], p: Parameters, active: Sequence[AppliedEffect], asked: Following
-        ) -> tuple[Followed, NDArray[np.float64]]:
+        ) -> tuple[Followed, Array]:
             own = [name in self._own for name in asked.steps]
             steps = {name: step for name, step in asked.steps.items() if name in self._own}
             made, of_own = plain(

@@ -8,7 +8,6 @@ import importlib
 import math
 import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from toolkit.diagnosis.policy import WORKER
@@ -20,13 +19,10 @@ from toolkit.worker.posix import Limits
 from toolkit.worker.worker import DiedError, Worker
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.worker.serve import Handlers
 
-    Arrays = dict[str, NDArray[np.float64]]
     Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -67,9 +63,7 @@ class CaseCode:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.end()
 
     def end(self) -> None:

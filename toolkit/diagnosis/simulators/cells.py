@@ -23,8 +23,7 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
 
 _LEAST_ROWS = 20  # of a run: fewer do not tell what its cells carried from its loads
@@ -61,7 +60,7 @@ class CaseCells:
             }
         )
 
-    def _cell(self, run: Run, name: str) -> NDArray[np.float64]:
+    def _cell(self, run: Run, name: str) -> Array:
         cell_unit, there = unit(self._units[name]), unit(self._recorded_unit[name])
         if cell_unit.dimension != there.dimension:
             raise ConfigError(
@@ -74,17 +73,15 @@ class CaseCells:
             )
         return run.columns[name] * (cell_unit.factor / there.factor)
 
-    def load(self, run: Run, name: str) -> NDArray[np.float64]:
+    def load(self, run: Run, name: str) -> Array:
         """Return FY [N] or MZ [N·m] from the recorded cells, (n,)."""
         return self.loads_of({cell: self._cell(run, cell) for cell in self.names})[name]
 
-    def loads_of(self, cells: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    def loads_of(self, cells: dict[str, Array]) -> dict[str, Array]:
         """Return FY and MZ [SI] of cells in the record's units."""
         return self._loads(cells, self._tare)
 
-    def _loads(
-        self, cells: dict[str, NDArray[np.float64]], tare: dict[str, float] | None
-    ) -> dict[str, NDArray[np.float64]]:
+    def _loads(self, cells: dict[str, Array], tare: dict[str, float] | None) -> dict[str, Array]:
         return apply_record(self.record, cells, units=self._recorded_unit, tare=tare, only=self.loads)
 
     def noise(self, load: str) -> float | None:
@@ -103,10 +100,10 @@ class CaseCells:
     def _carried(
         self,
         run: Run,
-        shown: NDArray[np.float64],
-        values: dict[str, NDArray[np.float64]],
+        shown: Array,
+        values: dict[str, Array],
         outputs: Sequence[Output],
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Return what a cell showed as far as simulated loads and recorded FZ account for it, noise-free.
 
         The cell's noise is in FY and MZ as well: an effect in proportion to what was recorded would explain
@@ -120,9 +117,7 @@ class CaseCells:
             return shown
         return np.asarray(there @ np.linalg.lstsq(there[good], shown[good], rcond=None)[0])
 
-    def _foretold(
-        self, values: dict[str, NDArray[np.float64]], outputs: Sequence[Output]
-    ) -> dict[str, NDArray[np.float64]]:
+    def _foretold(self, values: dict[str, Array], outputs: Sequence[Output]) -> dict[str, Array]:
         """Return cells of inputs that were not recorded: as they went with the loads in the recordings.
 
         Three cells carry more than two loads say; least squares over the case's runs give what went with
@@ -162,12 +157,12 @@ class CaseCells:
 
     def disturbed(
         self,
-        values: dict[str, NDArray[np.float64]],
+        values: dict[str, Array],
         active: Sequence[AppliedEffect],
         run: Run,
         setting: Setting,
         outputs: Sequence[Output],
-    ) -> dict[str, NDArray[np.float64]]:
+    ) -> dict[str, Array]:
         """Return the loads that the record makes of disturbed cells.
 
         What the cells truly carried is the recording with the effect undone; the difference to what they

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +14,7 @@ from toolkit.effects.forward import through, undone
 from toolkit.effects.signals import Setting
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Run
 
 _FORCE_LIKE = ("force", "moment", "bridge_ratio", "count")
@@ -61,10 +60,10 @@ def input_places(effect: Effect, inputs: Sequence[tuple[str, str]]) -> list[tupl
 
 
 def true_inputs(
-    run: Run, active: Sequence[AppliedEffect], inputs: set[str], setting: Setting
-) -> dict[str, NDArray[np.float64]]:
+    run: Run, active: Sequence[AppliedEffect], inputs: Set[str], setting: Setting
+) -> dict[str, Array]:
     """Return the inputs of a run that were recorded with an effect in them, as they are without it."""
-    true: dict[str, NDArray[np.float64]] = {}
+    true: dict[str, Array] = {}
     for applied in active:
         name = str(applied.channel)
         if applied.effect.channel is not None and name in inputs and applied.acts_in(run):
@@ -77,12 +76,12 @@ def _both_loads(channel: str, source: str) -> bool:
 
 
 def through_channels(
-    values: Mapping[str, NDArray[np.float64]],
+    values: Mapping[str, Array],
     active: Sequence[AppliedEffect],
     run: Run,
     setting: Setting,
-    observed: Mapping[str, NDArray[np.float64]],
-) -> dict[str, NDArray[np.float64]]:
+    observed: Mapping[str, Array],
+) -> dict[str, Array]:
     """Return channels of a run with their effects, stage by stage; each channel in its own unit."""
     return through(
         values, [applied for applied in active if applied.acts_in(run)], setting, recorded=observed
@@ -90,12 +89,12 @@ def through_channels(
 
 
 def slopes(
-    values: Mapping[str, NDArray[np.float64]],
+    values: Mapping[str, Array],
     active: Sequence[AppliedEffect],
     run: Run,
     setting: Setting,
-    observed: Mapping[str, NDArray[np.float64]],
-) -> dict[str, NDArray[np.float64]]:
+    observed: Mapping[str, Array],
+) -> dict[str, Array]:
     """Return by how much every channel shows a small change of itself, row by row, (n,).
 
     A channel that is saturated shows nothing of it; what takes time to show it is taken as if it did not.

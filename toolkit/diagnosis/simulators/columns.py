@@ -13,21 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.channels import channel_places, through_channels
-from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
-from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Capability, Output
+from toolkit.diagnosis.simulators.along_recordings import AlongRecordings
 from toolkit.diagnosis.simulators.surface import Surface
-from toolkit.diagnosis.simulators.tire import (
-    base_drive,
-    late,
-    slip_work_before,
-    through_tire,
-    tire_places,
-    tire_signs,
-)
+from toolkit.diagnosis.simulators.tire import base_drive, late, through_tire, tire_signs
 from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
 from toolkit.errors import ConfigError
 from toolkit.spelling import nearest
@@ -36,16 +25,14 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
 
 
-class ColumnsModel(AlongMotion):
+class ColumnsModel(AlongRecordings):
     """Simulated columns; a parameter ``<output>_gain`` or ``<output>_offset`` scales or shifts one."""
 
     def __init__(self, case: Case) -> None:
-        self.case = case
         column_of = dict(case.simulation.simulated)
         missing = [output.name for output in case.outputs if output.name not in column_of]
         if missing:
@@ -79,29 +66,15 @@ class ColumnsModel(AlongMotion):
                 next_step="remove it, or give the simulation as kind python",
                 rule="case",
             )
-        self.parameters = case.parameters
-        self.outputs = tuple(
-            Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
-        )
-        self._load = nominal_load(case)
-        self._settings: dict[Run, Setting] = {}
-        drivers = {driver.name for driver in case.drivers}
-        is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(column_of))
-        self._surface = Surface(case) if is_tire else None
-        self.motion: Motion | None = None if is_tire else motion_of(case)
-        findings = () if self._surface is None else self._surface.too_coarse()
-        self.capability = Capability(
-            nominal_load_N=None,
-            cells=(),
+        super().__init__(case)
+        self._surface = Surface(case) if self.is_tire else None
+        self.capability = self.capability_with(
             unsure={} if self._surface is None else self._surface.unsure,
-            findings=findings,
-            averages=True,
+            findings=() if self._surface is None else self._surface.too_coarse(),
             repeats=None,
-            together=None,
-            motion=self.moving(),
         )
 
-    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+    def observed(self, run: Run) -> Arrays:
         """Return what was recorded of every output, where the other program has a value too."""
         return {
             output.name: np.where(np.isfinite(run.simulated[output.name]), run.columns[output.name], np.nan)
@@ -109,81 +82,39 @@ class ColumnsModel(AlongMotion):
             if output.name in run.columns
         }
 
-    def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return every output of a run with effects in it."""
-        around = self.setting(run)
-        simulated = {
+    def own_outputs(
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], around: Setting
+    ) -> Arrays:
+        """Return the simulated columns, scaled and shifted."""
+        del active, around  # the other program ran once: nothing acts before its outputs
+        return {
             output.name: _whole(run, output.name) * p.get(f"{output.name}_gain", 1.0)
             + p.get(f"{output.name}_offset", 0.0)
             for output in self.outputs
         }
-        if self._surface is not None and any(
-            applied.effect.drive is not None and applied.acts_in(run) for applied in active
-        ):
-            simulated = self._tire(run, simulated, active, around)
-        forces = [
-            applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
-        ]
-        if forces and self.motion is not None:
-            simulated = self.motion.disturbed(simulated, forces, run)
-        return through_channels(simulated, active, run, around, run.columns)
 
-    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
-        """Return where an effect could act."""
-        found: list[tuple[str | None, str | None]] = []
-        drivers = {driver.name for driver in self.case.drivers}
-        if self._surface is not None and self._surface.good:
-            found += tire_places(
-                effect,
-                has_IA=False,
-                has_P=False,
-                varies={"load_commanded": "FZ_CMD" in drivers and "FZ" not in drivers},
-            )
-        if self.motion is not None:
-            found += self.motion.places(effect)
-        others = [(driver.name, driver.unit) for driver in self.case.drivers]
-        return found + channel_places(
-            effect, [(output.name, output.unit) for output in self.outputs], others, drivers
-        )
+    def lateral(self, run: Run) -> Array:
+        """Return the simulated FY of a run."""
+        return _whole(run, "FY")
 
-    def setting(self, run: Run) -> Setting:
-        """Return a run's setting."""
-        if run not in self._settings:
-            self._settings[run] = setting(
-                self.case,
-                run,
-                nominal_load_N=self._load,
-                speed_m_s=NOMINAL_SPEED,
-                work_kJ=self._work_before(run),
-            )
-        return self._settings[run]
+    def tire_inputs(self) -> tuple[bool, bool] | None:
+        """Tell that slip angle and load alone can be asked for anew, where the columns are a surface."""
+        return (False, False) if self._surface is not None and self._surface.good else None
 
-    def _work_before(self, run: Run) -> float:
-        if self._surface is None or "FY" not in {output.name for output in self.outputs}:
-            return 0.0
-        factor = unit(self.case.unit("FY")).factor
-        return slip_work_before(
-            self.case, run, lambda earlier, _: _whole(earlier, "FY") * factor, load_N=self._load
-        )
-
-    def _tire(
-        self,
-        run: Run,
-        simulated: dict[str, NDArray[np.float64]],
-        active: Sequence[AppliedEffect],
-        setting: Setting,
-    ) -> dict[str, NDArray[np.float64]]:
+    def tire_outputs(
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], around: Setting
+    ) -> Arrays:
+        """Return the simulated columns, moved by the surface through them."""
+        simulated = self.own_outputs(run, p, active, around)
         surface, case = self._surface, self.case
         if surface is None:
             return simulated
-        start = base_drive(case, run, load_N=self._load, outputs=False)
+        start = base_drive(case, run, load_N=self.load_N, outputs=False)
         turn, back = tire_signs(case.axes, "machine", run), tire_signs("machine", case.axes, run)
         units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in simulated}
         zero = np.zeros(run.rows)
 
-        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+        def steady(SA: Array, drive: Drive) -> TireForces:
             # The surface gives the difference to the row's own slip angle and load.
             got = {
                 name: turn[name]
@@ -193,13 +124,13 @@ class ColumnsModel(AlongMotion):
             }
             return TireForces(FY=got.get("FY", zero), MZ=got.get("MZ", zero))
 
-        forces = through_tire(start, steady, active, run, setting)
+        forces = through_tire(start, steady, active, run, around)
         result = dict(simulated)
         for name, factor in units.items():
             result[name] = getattr(forces, name) * back[name] / factor
         if "FZ" in result:
             loads = dataclasses.replace(start, FZ=simulated["FZ"])
-            loaded = late(loads, active, run, setting, lambda drive: steady(drive.SA, drive))
+            loaded = late(loads, active, run, around, lambda drive: steady(drive.SA, drive))
             result["FZ"] = result["FZ"] if loaded is None else loaded.FZ
         return result
 
@@ -209,7 +140,7 @@ def build(case: Case, _: Path | None, __: object) -> ColumnsModel:
     return ColumnsModel(case)
 
 
-def _whole(run: Run, name: str) -> NDArray[np.float64]:
+def _whole(run: Run, name: str) -> Array:
     """Return a simulated column; rows that the other program left out, which none judges, are bridged."""
     values = run.simulated[name]
     good = np.isfinite(values)

@@ -18,7 +18,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Array = NDArray[np.float64]
+    from toolkit.arrays import Array
+
     # (t (m,), states (n, m), inputs, parameters) -> rows of results, (k, m)
     Columnwise = Callable[[Array, Array, Mapping[str, Array], Mapping[str, Array]], Array]
     # (function, time, state, inputs, parameters) -> its results

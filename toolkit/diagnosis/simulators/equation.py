@@ -17,12 +17,10 @@ from toolkit.effects.law import TIME
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.columnwise import Columnwise
 
-    Array = NDArray[np.float64]
     RatesAt = Callable[[Array, Array], Array]
 
 _TRIED = 16  # rows
@@ -75,7 +73,7 @@ class Equation:
         """Return a run's inputs between its rows."""
         return Inputs(run, self._drivers)
 
-    def start(self, run: Run, p: Mapping[str, float]) -> NDArray[np.float64]:
+    def start(self, run: Run, p: Mapping[str, float]) -> Array:
         """Return the states at a run's first row, (states,)."""
         import inspect
 
@@ -144,7 +142,7 @@ class Equation:
         if not forces.listed:
             return lambda t, x: np.asarray(plain(t, x, u(t), p), dtype=np.float64)
 
-        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        def rhs(t: float, x: Array) -> Array:
             rate = np.zeros(len(x))
             inputs = u(t)
             rate[:own] = plain(t, x[:own], dict(inputs), p)
@@ -194,9 +192,7 @@ class Equation:
 
         return by_row if columns is None else at_once
 
-    def shown(
-        self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]
-    ) -> dict[str, NDArray[np.float64]]:
+    def shown(self, run: Run, p: Mapping[str, float], x: Array) -> dict[str, Array]:
         """Return the outputs of states, (states, rows)."""
         at_once = self._shown_together(run, p, x)
         if at_once is not None:

@@ -26,13 +26,11 @@ from toolkit.spelling import nearest
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
     from toolkit.worker.serve import Handlers
 
-    Arrays = dict[str, NDArray[np.float64]]
 
 _LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
 _UNPACKED = 2**30  # bytes: what the temporary folder of an isolated worker holds
@@ -89,9 +87,7 @@ class FmuFunction:
         }
         self._unit = self._loaded()
 
-    def call(
-        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
-    ) -> dict[str, NDArray[np.float64]]:
+    def call(self, run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> dict[str, Array]:
         """Return the outputs of a run with some of its inputs changed; FitError where they are none."""
         columns = [
             np.asarray(changed.get(channel, run.columns[channel]), dtype=np.float64) * variable.factor
@@ -126,7 +122,7 @@ class FmuFunction:
             result[name] = column
         return result
 
-    def _begin(self, p: Mapping[str, float], first: NDArray[np.float64], time: float) -> None:
+    def _begin(self, p: Mapping[str, float], first: Array, time: float) -> None:
         self._unit.instantiate()
         listed = [(name, self._parameters[name]) for name in p if name in self._parameters]
         self._write(listed, np.array([p[name] * variable.factor for name, variable in listed]))
@@ -143,7 +139,7 @@ class FmuFunction:
         free = self._unit.fmi2FreeInstance if self._two else self._unit.fmi3FreeInstance
         free(self._unit.component)
 
-    def _write(self, named: list[tuple[str, _Variable]], values: NDArray[np.float64]) -> None:
+    def _write(self, named: list[tuple[str, _Variable]], values: Array) -> None:
         if named:
             write = self._unit.setReal if self._two else self._unit.setFloat64
             write([variable.reference for _, variable in named], values.tolist())
@@ -263,7 +259,7 @@ def build(case: Case, _: Path | None, code: CaseCode | None) -> PythonModel:
     apart = code
     apart.begin(handlers)
 
-    def answer(run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]) -> Arrays:
+    def answer(run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> Arrays:
         shapes = {output.name: (run.rows,) for output in case.outputs}
         outputs = apart.arrays("call", run, p, shapes, dict(changed))
         for name, values in outputs.items():

@@ -25,9 +25,8 @@ import numpy as np
 from toolkit.diagnosis.simulators.trajectory import recursion
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    Array = NDArray[np.float64]
 
 PARAMETER_STEP = 1e-3  # of its prior sd: for the answer of the prediction errors to a parameter
 _PASSES = 4  # the equation is taken as linear about the states of the pass before

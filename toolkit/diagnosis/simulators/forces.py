@@ -24,9 +24,9 @@ from toolkit.errors import ConfigError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.effects.applied import Conditioned, EffectKey
 
-    Array = NDArray[np.float64]
     Places = NDArray[np.intp]
     Seen = Mapping[str, Any]
 

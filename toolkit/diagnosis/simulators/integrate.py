@@ -18,9 +18,9 @@ import numpy as np
 from toolkit.diagnosis.simulators.sliding_friction import Hold, Slide, TurnedError, held, until_turn
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    Rate = Callable[[float, "NDArray[np.float64]"], "NDArray[np.float64]"]
+    Rate = Callable[[float, "Array"], "Array"]
 
 RTOL = 1e-6
 _MOST = 20_000  # rates that the stiff solver may ask for between two rows
@@ -49,11 +49,11 @@ class IntegrationError(Exception):
 
 def integrate(
     rate: Rate,
-    t: NDArray[np.float64],
-    start: NDArray[np.float64],
-    atol: NDArray[np.float64],
+    t: Array,
+    start: Array,
+    atol: Array,
     slides: Sequence[Slide] = (),
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the states at every row, shape (states, rows).
 
     Parameters
@@ -92,12 +92,12 @@ def _advance(
     rate: Rate,
     t: float,
     end: float,
-    x: NDArray[np.float64],
+    x: Array,
     k1: list[float],
     atol: list[float],
     step: float,
     slides: Sequence[Slide],
-) -> tuple[NDArray[np.float64], list[float], float, float]:
+) -> tuple[Array, list[float], float, float]:
     """Go from one row to the next; return state and rate, the step to go on with, the time that was reached.
 
     A time before ``end`` says that the equation is stiff there. In plain numbers, written out: for the few
@@ -191,7 +191,7 @@ def _at(
     return rates
 
 
-def wrong_rates(rates: NDArray[np.float64], states: int) -> str:
+def wrong_rates(rates: Array, states: int) -> str:
     """Return what rhs gives where that is not one rate for each state in a sequence.
 
     >>> wrong_rates(np.array(0.5), 1)
@@ -207,7 +207,7 @@ def wrong_rates(rates: NDArray[np.float64], states: int) -> str:
     return f"rhs gives {got} for {states} state{'' if states == 1 else 's'}"
 
 
-def _check_numbers(t: float, x: NDArray[np.float64], rates: NDArray[np.float64]) -> None:
+def _check_numbers(t: float, x: Array, rates: Array) -> None:
     """Refuse rates that are no numbers, with the time and the state that rhs was asked at."""
     if not np.isfinite(rates).all():
         bad = int(np.flatnonzero(~np.isfinite(rates))[0])
@@ -215,15 +215,13 @@ def _check_numbers(t: float, x: NDArray[np.float64], rates: NDArray[np.float64])
         raise IntegrationError(f"rhs gives {rates[bad]} for state {bad + 1} at t = {t:g} s, x = [{state}]")
 
 
-def _stiff(
-    rate: Rate, t: float, end: float, x: NDArray[np.float64], atol: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _stiff(rate: Rate, t: float, end: float, x: Array, atol: Array) -> Array:
     from scipy.integrate import solve_ivp
 
     calls_left = _MOST
-    bad: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
+    bad: tuple[float, Array, Array] | None = None
 
-    def counted(at: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    def counted(at: float, state: Array) -> Array:
         # Before a state that runs off within finite time, the solver's steps would shrink for ever.
         nonlocal calls_left, bad
         calls_left -= 1

@@ -13,22 +13,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    RatesAt = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+    RatesAt = Callable[[Array, Array], Array]
 
 _STEP = 1e-6  # of a state's size, for differences
 
 
 def propagated(
     rates_at: RatesAt,
-    t: NDArray[np.float64],
-    x: NDArray[np.float64],
-    pushes: NDArray[np.float64],
+    t: Array,
+    x: Array,
+    pushes: Array,
     *,
     at: int,
-    sizes: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    sizes: Array,
+) -> Array:
     """Return how the states move under small additions to one state's rate, (times, states, forces).
 
     The trapezoidal rule on the equation linearised about ``x``: stable at any step, of second order.
@@ -62,7 +62,7 @@ def propagated(
     return responses
 
 
-def integrated(t: NDArray[np.float64], pushes: NDArray[np.float64]) -> NDArray[np.float64]:
+def integrated(t: Array, pushes: Array) -> Array:
     """Return the integral over time of every column, by the trapezoidal rule from zero, (times, forces)."""
     steps = 0.5 * np.diff(t)[:, None] * (pushes[1:] + pushes[:-1])
     return np.concatenate([np.zeros((1, pushes.shape[1])), np.cumsum(steps, axis=0)])

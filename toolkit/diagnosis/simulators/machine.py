@@ -39,8 +39,7 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.diagnosis.case.case import Case, Run
 
@@ -77,13 +76,13 @@ class TirTire:
         self,
         p: Mapping[str, float],
         *,
-        SA: NDArray[np.float64],
-        FZ: NDArray[np.float64],
-        IA: NDArray[np.float64],
-        V: NDArray[np.float64],
-        P: NDArray[np.float64] | None,
-        pressure_error: NDArray[np.float64] | float,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        SA: Array,
+        FZ: Array,
+        IA: Array,
+        V: Array,
+        P: Array | None,
+        pressure_error: Array | float,
+    ) -> tuple[Array, Array]:
         """Return FY [N] and MZ [N·m], each (n,); nothing where there is no load.
 
         ``p`` replaces coefficients by name; ``P`` [Pa], None for the file's own pressure;
@@ -91,7 +90,7 @@ class TirTire:
         """
         loaded = FZ > 0
         load = np.where(loaded, FZ, self.FNOMIN)
-        change: NDArray[np.float64] | float = 0.0
+        change: Array | float = 0.0
         if self._version != "5.2" and self._nominal > 0:
             change = ((self._inflation if P is None else P) + pressure_error) / self._nominal - 1
         values = {**self._p, **p}
@@ -172,7 +171,7 @@ class MachineModel:
             )
         return tuple(outputs)
 
-    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+    def observed(self, run: Run) -> dict[str, Array]:
         """Return FY and MZ as recorded, or from the cells by the calibration; FZ where it is judged."""
         columns = {}
         for output in self.outputs:
@@ -184,9 +183,7 @@ class MachineModel:
                 columns[output.name] = self.cells.load(run, output.name) / unit(output.unit).factor
         return columns
 
-    def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
-    ) -> dict[str, NDArray[np.float64]]:
+    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> dict[str, Array]:
         """Return every output of a run with effects in it."""
         case, around = self.case, self._setting(run)
         start = base_drive(case, run, load_N=self._load, speed_m_s=self._drum_speed(p))
@@ -194,7 +191,7 @@ class MachineModel:
         reverse = rotation(run) == "reverse"
         pressure = first_of(case, run, "P_INFL", "P")
 
-        def steady(SA: NDArray[np.float64], at: Drive) -> TireForces:
+        def steady(SA: Array, at: Drive) -> TireForces:
             FY, MZ = self._tire(
                 p,
                 SA=-SA,
@@ -231,9 +228,7 @@ class MachineModel:
                 return p[parameter.name] * unit(parameter.unit).factor
         return self._speed
 
-    def _shown_too_much(
-        self, run: Run, active: Sequence[AppliedEffect], around: Any
-    ) -> NDArray[np.float64] | float:
+    def _shown_too_much(self, run: Run, active: Sequence[AppliedEffect], around: Any) -> Array | float:
         """Return by how much [N] a channel of FZ that is disturbed shows more than the load on the tire."""
         if not any(applied.channel == "FZ" and applied.acts_in(run) for applied in active):
             return 0.0
@@ -244,7 +239,7 @@ class MachineModel:
         on_load = [applied for applied in active if applied.channel == "FZ"]
         return (through_channels({"FZ": load}, on_load, run, around, run.columns)["FZ"] - load) * factor
 
-    def _load_output(self, run: Run, active: Sequence[AppliedEffect]) -> NDArray[np.float64]:
+    def _load_output(self, run: Run, active: Sequence[AppliedEffect]) -> Array:
         commanded = first_of(self.case, run, "FZ_CMD")
         if commanded is None:
             return si(self.case, "FZ", run.columns["FZ"])
@@ -289,7 +284,7 @@ class MachineModel:
     def _work_before(self, run: Run) -> float:
         values = {parameter.name: parameter.value for parameter in self.parameters}
 
-        def lateral(_: Run, start: Drive) -> NDArray[np.float64]:
+        def lateral(_: Run, start: Drive) -> Array:
             return self._tire(
                 values, SA=-start.SA, FZ=start.FZ, IA=start.IA, V=start.V, P=None, pressure_error=0.0
             )[0]

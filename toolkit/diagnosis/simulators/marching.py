@@ -21,10 +21,10 @@ from toolkit.diagnosis.simulators.sliding_friction import until_turns
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.simulators.row_flow import RowFlow
     from toolkit.diagnosis.simulators.sliding_friction import HeldSlide
 
-    Array = NDArray[np.float64]
     Places = NDArray[np.intp]
     Mask = NDArray[np.bool_]
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-T = TypeVar("T", bound="NDArray[np.float64] | Mapping[str, NDArray[np.float64]] | Exception")
+T = TypeVar("T", bound="Array | Mapping[str, Array] | Exception")
 
 
 class Memory(Generic[T]):

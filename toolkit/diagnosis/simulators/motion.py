@@ -12,17 +12,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.channels import slopes
 from toolkit.diagnosis.simulators.linear_response import integrated
 from toolkit.diagnosis.simulators.rates import Track, reach_of, usual_speed
 from toolkit.diagnosis.simulators.setting import dimension, is_speed
-from toolkit.diagnosis.simulators.simulator import Moving
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.forward import resisting
@@ -31,12 +28,10 @@ from toolkit.effects.surroundings import MotionSizes
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Largest, Pattern
     from toolkit.effects.facts import ForceHook, Values
-    from toolkit.effects.signals import Setting
 
 _LENGTHS = ("length", "angle")
 _SUBSTEPS = 4
@@ -56,7 +51,7 @@ class Motion:
     position: str | None
     velocity: str | None
     speed: float = 0.0
-    _rates: dict[Run, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
+    _rates: dict[Run, Array] = dataclasses.field(default_factory=dict)
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the output that a dynamic effect could enter."""
@@ -94,7 +89,7 @@ class Motion:
         length = output if self.kind == "position" else f"{output}*s"
         return f"{length}/s^2", f"{length}/s", length
 
-    def speeds(self, run: Run) -> NDArray[np.float64]:
+    def speeds(self, run: Run) -> Array:
         """Return the velocity of a run beside a force, (n,): as recorded, or the rate of its position."""
         if self.velocity is not None:
             return run.columns[self.velocity]
@@ -135,10 +130,10 @@ class Motion:
 
     def pushed(
         self,
-        simulated: Mapping[str, NDArray[np.float64]],
+        simulated: Mapping[str, Array],
         run: Run,
         pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:
+    ) -> dict[str, Array]:
         """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
         x = simulated.get(str(self.position), run.columns.get(str(self.position)))
         if x is None:
@@ -152,8 +147,8 @@ class Motion:
         return {name: pushes if name == self.output else none for name in simulated}
 
     def disturbed(
-        self, simulated: Mapping[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
-    ) -> dict[str, NDArray[np.float64]]:
+        self, simulated: Mapping[str, Array], forces: Sequence[AppliedEffect], run: Run
+    ) -> dict[str, Array]:
         """Return the outputs with force-like terms in the equation of motion."""
         result = dict(simulated)
         if self.kind == "force":
@@ -165,8 +160,8 @@ class Motion:
         return self._moved(result, forces, run)
 
     def _moved(
-        self, simulated: dict[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
-    ) -> dict[str, NDArray[np.float64]]:
+        self, simulated: dict[str, Array], forces: Sequence[AppliedEffect], run: Run
+    ) -> dict[str, Array]:
         from scipy.interpolate import CubicSpline
 
         if run.rows < 4:
@@ -201,46 +196,6 @@ class Motion:
         if is_position and self.velocity in result:
             result[str(self.velocity)] = v
         return result
-
-
-class AlongMotion(ABC):
-    """A simulation of which only inputs and outputs are known: what moves in it stands in its recordings."""
-
-    motion: Motion | None
-
-    @abstractmethod
-    def setting(self, run: Run) -> Setting:
-        """Return a run's setting."""
-
-    @abstractmethod
-    def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return every output of a run with effects in it."""
-
-    def moving(self) -> Moving | None:
-        """Return what moves along the recordings, None where their units show no motion."""
-        motion = self.motion
-        if motion is None:
-            return None
-
-        def sizes(channel: str | None, largest: Largest) -> MotionSizes:
-            return motion.sizes(largest(channel), largest)
-
-        def pushed(
-            run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], _: str | None, pattern: Pattern
-        ) -> dict[str, NDArray[np.float64]]:
-            simulated = self.simulate(
-                run, p, [applied for applied in active if applied.effect.channel is None]
-            )
-            shown = slopes(simulated, active, run, self.setting(run), run.columns)
-            responses = motion.pushed(simulated, run, pattern)
-            return {name: shown[name][:, None] * column for name, column in responses.items()}
-
-        return Moving(
-            integrates=False, sizes=sizes, units=lambda _: motion.units(), way=lambda _: motion.way(),
-            position=lambda _: motion.position, states=(), pushed=pushed,
-        )  # fmt: skip
 
 
 def _step(

@@ -28,15 +28,13 @@ from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
     from toolkit.diagnosis.simulators.simulator import Model, Pattern
     from toolkit.effects.effect import Effect
     from toolkit.worker.serve import Handlers
 
-    Arrays = dict[str, NDArray[np.float64]]
     Crossing = tuple[tuple[Any, ...], ...]
     Place = tuple[str | None, str | None]
 
@@ -153,7 +151,7 @@ class OdeApart:
         p: Mapping[str, float],
         active: Sequence[AppliedEffect],
         asked: Following,
-    ) -> tuple[Followed, NDArray[np.float64]]:
+    ) -> tuple[Followed, Array]:
         rows, outputs = sum(run.rows for run in runs), len(self.outputs)
         shapes = following_shapes(rows, self._own, self._own + _MOST_ADDED * len(active), outputs)
         shapes[_ANSWERS] = (rows, outputs, len(asked.steps))

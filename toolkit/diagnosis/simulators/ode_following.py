@@ -16,14 +16,12 @@ from toolkit.diagnosis.simulators.user_code import silenced
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.simulators.ode_responses import IntegratedModel
     from toolkit.diagnosis.simulators.simulator import Following
     from toolkit.effects.applied import AppliedEffect
 
-    Array = NDArray[np.float64]
 
 _STEP = 1e-6  # of a state's size, for differences
 _TURNING_STEPS = 8  # of every interval, where a bristle turns

@@ -15,14 +15,13 @@ from toolkit.effects.law import ITSELF, POSITION, TIME
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.equation import Equation
     from toolkit.diagnosis.simulators.forces import Forces
     from toolkit.diagnosis.simulators.simulator import Output, Pattern
     from toolkit.effects.applied import AppliedEffect
     from toolkit.effects.signals import Setting
-
-    Array = NDArray[np.float64]
 
 
 class IntegratedModel(Protocol):
@@ -81,7 +80,7 @@ def pushed(
     active: Sequence[AppliedEffect],
     channel: str | None,
     pattern: Pattern,
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Array]:
     """Return linear responses of every output to small forces along the motion, (rows, forces)."""
     at = model.states.index(str(channel))
     forces = [applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)]
@@ -113,9 +112,7 @@ def pushed(
     return {name: shown[name][:, None] * column for name, column in responses.items()}
 
 
-def _signals(
-    model: IntegratedModel, run: Run, fine: NDArray[np.float64], at: int
-) -> dict[str, NDArray[np.float64]]:
+def _signals(model: IntegratedModel, run: Run, fine: Array, at: int) -> dict[str, Array]:
     """Return what a term in the equation of a state may read, between the rows too."""
     finer = model.finer(run)
     inputs = {name: finer.columns[name] for name in model.drivers}

@@ -8,27 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.diagnosis.simulators.along_recordings import AlongRecordings
 from toolkit.diagnosis.simulators.array_table import ArrayTable, Trials
-from toolkit.diagnosis.simulators.channels import (
-    channel_places,
-    input_places,
-    through_channels,
-    true_inputs,
-)
-from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
-from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Capability, Output
-from toolkit.diagnosis.simulators.tire import (
-    base_drive,
-    late,
-    slip_work_before,
-    through_tire,
-    tire_places,
-    tire_signs,
-)
+from toolkit.diagnosis.simulators.channels import true_inputs
+from toolkit.diagnosis.simulators.tire import base_drive, late, through_tire, tire_signs
 from toolkit.diagnosis.simulators.user_code import load_functions, raised, silenced
 from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
 from toolkit.errors import FitError
 from toolkit.units import unit
@@ -36,14 +21,12 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
     from toolkit.worker.serve import Handlers
 
-    Arrays = dict[str, NDArray[np.float64]]
-    Answer = Callable[[Run, Mapping[str, float], Mapping[str, NDArray[np.float64]]], Arrays]
+    Answer = Callable[[Run, Mapping[str, float], Mapping[str, Array]], Arrays]
 
 _KEPT = 300  # simulations that are remembered
 _LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
@@ -59,7 +42,7 @@ class UserFunction:
         (self._function,) = load_functions(case.file(), case.simulation.function)
         self._arrays = Trials()
 
-    def call(self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]) -> Arrays:
+    def call(self, run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> Arrays:
         """Return the outputs of a run with some of its inputs changed; FitError where they are none."""
         import pandas as pd
 
@@ -76,7 +59,7 @@ class UserFunction:
             self._arrays.judge(of_arrays, of_table)
         return of_table
 
-    def _inputs(self, run: Run, changed: Mapping[str, NDArray[np.float64]]) -> Arrays:
+    def _inputs(self, run: Run, changed: Mapping[str, Array]) -> Arrays:
         return {
             channel.name: np.array(changed.get(channel.name, run.columns[channel.name]))
             for channel in self.case.channels
@@ -118,66 +101,35 @@ class UserFunction:
         return result
 
 
-class PythonModel(AlongMotion):
+class PythonModel(AlongRecordings):
     """A simulator in Python: ``simulate(inputs, p)`` returns one row for each row of inputs.
 
     ``answer`` is its function with checked outputs, in this process or in a worker.
     """
 
     def __init__(self, case: Case, answer: Answer) -> None:
-        self.case, self._called = case, answer
-        self.parameters = case.parameters
-        self.outputs = tuple(
-            Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
-        )
+        super().__init__(case)
+        self._called = answer
         self._names = {channel.name for channel in case.channels}
-        self._inputs = {channel.name for channel in case.drivers if channel.role == "input"}
-        self._load = nominal_load(case)
-        self._settings: dict[Run, Setting] = {}
-        self._kept: dict[tuple[Run, tuple[float, ...]], dict[str, NDArray[np.float64]]] = {}
-        drivers = {driver.name for driver in case.drivers}
-        self._is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool(
-            {"FY", "MZ"} & {output.name for output in self.outputs}
-        )
-        self.motion: Motion | None = None if self._is_tire else motion_of(case)
-        self.capability = Capability(
-            nominal_load_N=None,
-            cells=(),
-            unsure={},
-            findings=(),
-            averages=True,
-            repeats=self._repeats,
-            together=None,
-            motion=self.moving(),
-        )
+        self.inputs = frozenset(channel.name for channel in case.drivers if channel.role == "input")
+        self._kept: dict[tuple[Run, tuple[float, ...]], Arrays] = {}
+        self.capability = self.capability_with(unsure={}, findings=(), repeats=self._repeats)
 
-    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
-        """Return what was recorded of every output."""
-        return {
-            output.name: run.columns[output.name] for output in self.outputs if output.name in run.columns
-        }
+    def own_outputs(
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], around: Setting
+    ) -> Arrays:
+        """Return what the simulator says of its inputs without the effects that they were recorded with."""
+        return self.call(run, p, true_inputs(run, active, self.inputs, around))
 
-    def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return every output of a run with effects in it."""
-        around = self.setting(run)
-        if self._is_tire and any(
-            applied.effect.drive is not None and applied.acts_in(run) for applied in active
-        ):
-            simulated = self._tire(run, p, active, around)
-        else:
-            simulated = self.call(run, p, true_inputs(run, active, self._inputs, around))
-        forces = [
-            applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
-        ]
-        if forces and self.motion is not None:
-            simulated = self.motion.disturbed(simulated, forces, run)
-        return through_channels(simulated, active, run, around, run.columns)
+    def lateral(self, run: Run) -> Array:
+        """Return the nominal simulator's FY."""
+        return self.call(run, {parameter.name: parameter.value for parameter in self.parameters}, {})["FY"]
 
-    def call(
-        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
-    ) -> dict[str, NDArray[np.float64]]:
+    def tire_inputs(self) -> tuple[bool, bool]:
+        """Tell which of camber and pressure the simulator takes."""
+        return "IA" in self.drivers, bool({"P", "P_INFL"} & self.drivers)
+
+    def call(self, run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> Arrays:
         """Return the simulator's own outputs with some of its inputs changed, checked.
 
         The same inputs and parameters give the same outputs: a slow simulator is not asked twice.
@@ -200,57 +152,16 @@ class PythonModel(AlongMotion):
                     self.case, run, f"other values of {name!r} on a second call with the same inputs"
                 )
 
-    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
-        """Return where an effect could act."""
-        found: list[tuple[str | None, str | None]] = []
-        drivers = {driver.name for driver in self.case.drivers}
-        if self._is_tire:
-            found += tire_places(
-                effect, has_IA="IA" in drivers, has_P=bool({"P", "P_INFL"} & drivers),
-                varies={"load_commanded": "FZ_CMD" in drivers and "FZ" not in drivers},
-            )  # fmt: skip
-        if self.motion is not None:
-            found += self.motion.places(effect)
-        others = [(driver.name, driver.unit) for driver in self.case.drivers]
-        if not self._is_tire:
-            found += input_places(effect, [pair for pair in others if pair[0] in self._inputs])
-        return found + channel_places(
-            effect, [(output.name, output.unit) for output in self.outputs], others, drivers
-        )
-
-    def setting(self, run: Run) -> Setting:
-        """Return a run's setting."""
-        if run not in self._settings:
-            self._settings[run] = setting(
-                self.case,
-                run,
-                nominal_load_N=self._load,
-                speed_m_s=NOMINAL_SPEED,
-                work_kJ=self._work_before(run),
-            )
-        return self._settings[run]
-
-    def _work_before(self, run: Run) -> float:
-        if not self._is_tire or "FY" not in {output.name for output in self.outputs}:
-            return 0.0
-        values = {parameter.name: parameter.value for parameter in self.parameters}
-        factor = unit(self.case.unit("FY")).factor
-        return slip_work_before(
-            self.case,
-            run,
-            lambda earlier, _: self.call(earlier, values, {})["FY"] * factor,
-            load_N=self._load,
-        )
-
-    def _tire(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], setting: Setting
-    ) -> dict[str, NDArray[np.float64]]:
+    def tire_outputs(
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], around: Setting
+    ) -> Arrays:
+        """Return what the simulator says of a tire that road and carriage drive otherwise."""
         case = self.case
-        start = base_drive(case, run, load_N=self._load, outputs=False)
+        start = base_drive(case, run, load_N=self.load_N, outputs=False)
         to_case, to_machine = tire_signs("SAE", case.axes, run), tire_signs(case.axes, "machine", run)
         units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in self._names}
 
-        def raw(SA: NDArray[np.float64], drive: Drive) -> dict[str, NDArray[np.float64]]:
+        def raw(SA: Array, drive: Drive) -> Arrays:
             changed = {}
             for field, names in _FIELDS:
                 value = SA * to_case["SA"] if field == "SA" else getattr(drive, field)
@@ -262,7 +173,7 @@ class PythonModel(AlongMotion):
                     changed[name] = run.columns[name] + drive.pressure_error / unit(case.unit(name)).factor
             return self.call(run, p, changed)
 
-        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+        def steady(SA: Array, drive: Drive) -> TireForces:
             forces = raw(SA, drive)
             zero = np.zeros(run.rows)
             return TireForces(
@@ -270,16 +181,16 @@ class PythonModel(AlongMotion):
                 MZ=forces["MZ"] * units["MZ"] * to_machine["MZ"] if "MZ" in forces else zero,
             )
 
-        forces = through_tire(start, steady, active, run, setting)
+        forces = through_tire(start, steady, active, run, around)
         back = tire_signs("machine", case.axes, run)
-        made = dict(self.call(run, p, {}))
+        outputs = dict(self.call(run, p, {}))
         for name in ("FY", "MZ"):
-            if name in made:
-                made[name] = getattr(forces, name) * back[name] / units[name]
-        if "FZ" in made:
-            loaded = late(start, active, run, setting, lambda drive: steady(drive.SA, drive))
-            made["FZ"] = made["FZ"] if loaded is None else raw(loaded.SA, loaded)["FZ"]
-        return made
+            if name in outputs:
+                outputs[name] = getattr(forces, name) * back[name] / units[name]
+        if "FZ" in outputs:
+            loaded = late(start, active, run, around, lambda drive: steady(drive.SA, drive))
+            outputs["FZ"] = outputs["FZ"] if loaded is None else raw(loaded.SA, loaded)["FZ"]
+        return outputs
 
 
 def build(case: Case, _: Path | None, code: CaseCode | None) -> PythonModel:
@@ -289,9 +200,7 @@ def build(case: Case, _: Path | None, code: CaseCode | None) -> PythonModel:
     apart = code
     apart.begin(handlers)
 
-    def answer(
-        run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
-    ) -> dict[str, NDArray[np.float64]]:
+    def answer(run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> Arrays:
         shapes = {output.name: (run.rows,) for output in case.outputs}
         outputs = apart.arrays("call", run, p, shapes, dict(changed))
         for name, values in outputs.items():
@@ -318,7 +227,7 @@ def _failed(case: Case, run: Run, got: str) -> FitError:
     )  # fmt: skip
 
 
-def _numbers(made: Any, name: str) -> NDArray[np.float64] | None:
+def _numbers(made: Any, name: str) -> Array | None:
     """Return a column's numbers, None where it has texts or complex numbers."""
     column = made[name]
     kind = getattr(getattr(column, "dtype", None), "kind", "O")
@@ -330,5 +239,5 @@ def _numbers(made: Any, name: str) -> NDArray[np.float64] | None:
         return None
 
 
-def _first_bad(values: NDArray[np.float64]) -> int:
+def _first_bad(values: Array) -> int:
     return int(np.flatnonzero(~np.isfinite(values))[0]) + 1

@@ -23,9 +23,8 @@ from toolkit.diagnosis.policy import NOISE, RATES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
-    Array = NDArray[np.float64]
 
 _ORDER = 3  # of the differences: a parabola leaves none
 _ROBUST = 1.4826  # standard deviation of a normal distribution over its median absolute deviation

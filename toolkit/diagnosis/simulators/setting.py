@@ -12,8 +12,7 @@ from toolkit.errors import UnitError
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
 
 NOMINAL_SPEED = 7.66 / 3.6  # m/s, of the drum of the source document (the thesis, 2.2)
@@ -23,7 +22,7 @@ SPEEDS = frozenset({"speed", "frequency"})
 _NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMINALLOAD"})
 
 
-def si(case: Case, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def si(case: Case, name: str, values: Array) -> Array:
     """Return a channel's values in SI."""
     stated = unit(case.unit(name))
     return values * stated.factor + stated.offset
@@ -59,7 +58,7 @@ def setting(
     )
 
 
-def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
+def elapsed(case: Case, run: Run) -> Array:
     """Return the time since the case's first row [s].
 
     Where the runs' clocks go on from one to the next, they are one clock; where each run begins anew, the
@@ -71,7 +70,7 @@ def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
     return run.t - float(starts[0])
 
 
-def pauses(runs: Sequence[Run]) -> NDArray[np.float64] | None:
+def pauses(runs: Sequence[Run]) -> Array | None:
     """Return the time between runs whose clocks go on [s]; None where a clock begins anew."""
     spans = np.array([(run.t[0], run.t[-1]) for run in runs if run.rows]).reshape(-1, 2)
     between = spans[1:, 0] - spans[:-1, 1]

@@ -15,9 +15,7 @@ from toolkit.effects.law import ITSELF, POSITION
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array, Arrays
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.simulators.following import Followed
     from toolkit.effects.applied import AppliedEffect
@@ -25,13 +23,12 @@ if TYPE_CHECKING:
     from toolkit.effects.surroundings import MotionSizes
     from toolkit.simulation.plan_file import CaseParameter
 
-    Arrays = dict[str, NDArray[np.float64]]
     # Signals of an equation, (n,) by name, to force-like terms of shape (n, forces): a `TermPattern`
-    Pattern = Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
+    Pattern = Callable[[Mapping[str, Array]], Array]
     Parameters = Mapping[str, float]
     LedAlong = Callable[
         [Sequence[Run], Parameters, Sequence[AppliedEffect], "Following"],
-        tuple[Followed, NDArray[np.float64]],
+        tuple[Followed, Array],
     ]
     # A channel's name to its largest recorded magnitude over the runs that are judged
     Largest = Callable[[str | None], float]
@@ -47,7 +44,7 @@ class TermPattern:
 
     terms: tuple[tuple[Effect, tuple[Mapping[str, float], ...]], ...]
 
-    def __call__(self, signals: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    def __call__(self, signals: Mapping[str, Array]) -> Array:
         """Return the forces, (n, forces), at what moves (`ITSELF`), its position and what laws read."""
         import numpy as np
 

@@ -19,8 +19,7 @@ from toolkit.errors import ConfigError
 from toolkit.units import unit, units_alike
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.simulators.simulator import Output
     from toolkit.effects.effect import Effect
@@ -32,7 +31,7 @@ _OPEN = frozenset({"ratio"})  # a number without unit may be anything
 
 
 def shown_alone(
-    x: NDArray[np.float64], shown: Mapping[str, NDArray[np.float64]], outputs: Sequence[Output]
+    x: Array, shown: Mapping[str, Array], outputs: Sequence[Output]
 ) -> dict[int, tuple[Output, float]]:
     """Return of every state the output that shows it alone, and by how much: output = factor * state.
 
@@ -154,7 +153,7 @@ def _motions(
     return [i for i in states if i in pairs or meanings.get(i) in allowed]
 
 
-def way_of(rates: Sequence[NDArray[np.float64]], times: Sequence[NDArray[np.float64]]) -> float:
+def way_of(rates: Sequence[Array], times: Sequence[Array]) -> float:
     """Return the spread of the position of which only the rate is a state: of every run's from its start.
 
     Parameters

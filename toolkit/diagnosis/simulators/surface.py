@@ -17,6 +17,7 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
 
 # A smooth function of slip angle and load through known points: a Gaussian process with a tire's shape.
@@ -49,7 +50,7 @@ class Shape:
     noise: float
 
 
-def covariance(shape: Shape, one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+def covariance(shape: Shape, one: Array, other: Array) -> Array:
     """Return the covariance of points (n, 2) and (m, 2) of slip angle and load, (n, m), without noise."""
     a, b = np.arcsinh(one[:, 0] / shape.bend), np.arcsinh(other[:, 0] / shape.bend)
     near = _matern((a[:, None] - b) / shape.length)
@@ -58,7 +59,7 @@ def covariance(shape: Shape, one: NDArray[np.float64], other: NDArray[np.float64
     return np.asarray(((near - mirrored) + shape.even * (near + mirrored)) * loads)
 
 
-def _matern(away: NDArray[np.float64]) -> NDArray[np.float64]:
+def _matern(away: Array) -> Array:
     """Return Matern's correlation of order 5/2 (4.17): no smoother, a tire begins to slide at a corner."""
     far = np.sqrt(5) * np.abs(away)
     return np.asarray((1 + far + far * far / 3) * np.exp(-far))
@@ -67,7 +68,7 @@ def _matern(away: NDArray[np.float64]) -> NDArray[np.float64]:
 class Process:
     """The function through points (n, 2) of slip angle [rad] and load [nominal loads], values (n,)."""
 
-    def __init__(self, shape: Shape, points: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    def __init__(self, shape: Shape, points: Array, values: Array) -> None:
         from scipy.linalg import cho_solve, cholesky
 
         self.shape, self.points, self.values = shape, points, values
@@ -82,11 +83,11 @@ class Process:
         logs = np.log(np.diag(self._root)).sum()
         return float(-0.5 * len(self.values) * np.log(self._variance) - logs)
 
-    def mean(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean(self, points: Array) -> Array:
         """Return the function at points (m, 2), (m,)."""
         return np.asarray(covariance(self.shape, points, self.points) @ self._weights)
 
-    def left_out(self) -> NDArray[np.float64]:
+    def left_out(self) -> Array:
         """Return by how much every point is missed by the others at other slip angles, (n,).
 
         An angle is left out on both sides: the other side of an odd function would tell it. The largest has
@@ -103,7 +104,7 @@ class Process:
         return missed
 
 
-def angles_of(SA: NDArray[np.float64]) -> NDArray[np.int64]:
+def angles_of(SA: Array) -> NDArray[np.int64]:
     """Return to which of the slip angles, counted from the least, every point belongs, (n,).
 
     A sweep has no angles; it is cut into pieces.
@@ -119,12 +120,12 @@ def angles_of(SA: NDArray[np.float64]) -> NDArray[np.int64]:
     return made
 
 
-def cells_of(points: NDArray[np.float64], coarser: float = 1.0) -> NDArray[np.int64]:
+def cells_of(points: Array, coarser: float = 1.0) -> NDArray[np.int64]:
     """Return in which cell of slip angle and load each point (n, 2) lies, (n, 2)."""
     return np.round(_warped(points) / (coarser * np.array(_CELL))).astype(np.int64)
 
 
-def thinned(points: NDArray[np.float64], most: int) -> NDArray[np.int64]:
+def thinned(points: Array, most: int) -> NDArray[np.int64]:
     """Return the indices of at most so many of the points (n, 2), spread evenly over what they cover."""
     coarser = 1.0
     while True:
@@ -139,11 +140,11 @@ def thinned(points: NDArray[np.float64], most: int) -> NDArray[np.int64]:
     return np.asarray(order[np.unique(which[order], return_index=True)[1]])
 
 
-def _warped(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _warped(points: Array) -> Array:
     return np.column_stack([np.arcsinh(points[:, 0] / _BENDS[1]), points[:, 1]])
 
 
-def likeliest(points: NDArray[np.float64], values: NDArray[np.float64]) -> Shape:
+def likeliest(points: Array, values: Array) -> Shape:
     """Return the shape of the highest likelihood, of those tried: parameter by parameter, twice."""
     reach = float(np.ptp(points[:, 1])) or 1.0
     tried = {
@@ -250,17 +251,15 @@ class Surface:
                 )
         return tuple(findings)
 
-    def _points(self, SA: NDArray[np.float64], FZ: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _points(self, SA: Array, FZ: Array) -> Array:
         loads = np.full(len(SA), self._loads[0]) if self._steady_load else FZ / self._load
         return np.column_stack([np.clip(SA, *self._slips), np.clip(loads, *self._loads)])
 
-    def _over(self, FZ: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _over(self, FZ: Array) -> Array:
         # Force over load is what changes little with the load.
         return np.ones(len(FZ)) if self._steady_load else np.maximum(FZ / self._load, _LEAST)
 
-    def difference(
-        self, name: str, run: Run, SA: NDArray[np.float64], FZ: NDArray[np.float64], start: Drive
-    ) -> NDArray[np.float64]:
+    def difference(self, name: str, run: Run, SA: Array, FZ: Array, start: Drive) -> Array:
         """Return output at (SA, FZ) less output at the row's own slip angle and load, in its unit."""
         table = self._fits.get((name, rotation(run)))
         if table is None or (SA is start.SA and FZ is start.FZ):
@@ -297,7 +296,7 @@ class _FineGrid:
         mean = found.mean(np.column_stack([SA.ravel(), load.ravel()]))
         self._spline = RectBivariateSpline(u, z, mean.reshape(SA.shape), kx=3, ky=3)
 
-    def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, points: Array) -> Array:
         """Return the process at points (n, 2), (n,)."""
         return np.asarray(self._spline.ev(np.arcsinh(points[:, 0] / self._bend), points[:, 1]))
 

@@ -15,8 +15,7 @@ from toolkit.effects.forward import Steady, driven, tire_forces
 from toolkit.effects.signals import Drive, Setting, Tire, TireForces, drive
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
 
 
@@ -30,7 +29,7 @@ def tire_signs(source: Axes, target: Axes, run: Run) -> dict[str, int]:
     return signs(source, target, rotation(run))
 
 
-def first_of(case: Case, run: Run, *names: str, outputs: bool = True) -> NDArray[np.float64] | None:
+def first_of(case: Case, run: Run, *names: str, outputs: bool = True) -> Array | None:
     """Return the first of these drivers, or of these outputs, in SI; None where the run has none."""
     among = {channel.name for channel in (case.channels if outputs else case.drivers)}
     for name in names:
@@ -66,7 +65,7 @@ def base_drive(
 def slip_work_before(
     case: Case,
     run: Run,
-    lateral: Callable[[Run, Drive], NDArray[np.float64] | None],
+    lateral: Callable[[Run, Drive], Array | None],
     *,
     load_N: float,
     speed_m_s: float = NOMINAL_SPEED,

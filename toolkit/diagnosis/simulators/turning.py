@@ -27,12 +27,12 @@ from toolkit.diagnosis.simulators.user_code import silenced
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.simulators.forces import Forces
     from toolkit.diagnosis.simulators.ode_responses import IntegratedModel
     from toolkit.effects.applied import AppliedEffect
 
-    Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
     Point = tuple[Mapping[str, float], Sequence[AppliedEffect]]
 

@@ -9,13 +9,11 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.filters import PAST, STRAIGHT, delayed
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _late(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _late(y: Array, values: Values, setting: Setting) -> Array:
     straight, past = STRAIGHT in values, values.get(PAST, 0.0)
     return delayed(setting.t, y, values["delay"], straight=straight, past=past)
 

@@ -8,18 +8,16 @@ from toolkit.effects.effect import ANY_OTHER, Effect
 from toolkit.effects.facts import Alike, ChannelFacts, Values
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
     from toolkit.effects.surroundings import Surroundings
 
 
-def _negated(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _negated(y: Array, values: Values, setting: Setting) -> Array:
     return -y
 
 
-def _restored(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _restored(y: Array, values: Values, setting: Setting) -> Array:
     return -y
 
 

@@ -8,13 +8,11 @@ from toolkit.effects.effect import Effect
 from toolkit.effects.facts import ChannelFacts, Values
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _other(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _other(y: Array, values: Values, setting: Setting) -> Array:
     source = setting.channels.get("from")
     return y if source is None else source
 

@@ -12,7 +12,7 @@ from toolkit.effects.filters import PAST
 from toolkit.effects.surroundings import Surroundings, of_force
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 
 LEAST_REACH = "least_presliding"  # among the values: a shorter bristle shows in no row
@@ -25,7 +25,7 @@ def _resisting(position: Any, velocity: Any, values: Values) -> Any:
     return values["coulomb"] * np.tanh(velocity / values.get("smooth", 1e-4))
 
 
-def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Values) -> NDArray[np.float64]:
+def _recorded(t: Array, velocity: Array, values: Values) -> Array:
     # Dahl's bristle along a velocity that is linear between rows: z tends to sign(v) with the distance
     # travelled. A row shows its mean over one interval between rows, half before it and half after: a
     # filter that suits the rows leaves no sharper a jump, and a jump taken as sharp would be found too small.
@@ -47,9 +47,7 @@ def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Val
     return np.asarray(values["coulomb"] * means)
 
 
-def _path(
-    t: NDArray[np.float64], velocity: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _path(t: Array, velocity: Array) -> tuple[Array, Array, Array]:
     """Return instants between which the way does not turn, the distance by then, and each piece's way.
 
     The rows, the quarters between them, and the reversals: shapes (k,), (k,), (k - 1,).
@@ -67,9 +65,7 @@ def _path(
     return knots, np.concatenate([[0.0], np.cumsum(np.abs(moved))]), np.sign(moved)
 
 
-def _bristle(
-    sizes: NDArray[np.float64], strokes: NDArray[np.float64], reach: float, *, start: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _bristle(sizes: Array, strokes: Array, reach: float, *, start: float) -> tuple[Array, Array]:
     """Return the bristle at the beginning and at the end of each piece."""
     shares = np.exp(-sizes / reach) if reach > 0 else (sizes <= 0).astype(float)
     before, after = np.empty_like(sizes), np.empty_like(sizes)

@@ -11,15 +11,14 @@ from toolkit.effects.facts import ChannelFacts, History, Values
 from toolkit.effects.filters import PAST, begun, lag
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 FROM_REST = "_from_rest"
 """Among the values: each run's first load came on an unloaded channel; without it, it had long been there."""
 
 
-def _creeping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _creeping(y: Array, values: Values, setting: Setting) -> Array:
     start = begun(y, values)
     if values.get(FROM_REST):
         start = values.get(PAST, 0.0) * float(np.ptp(y)) if len(y) else 0.0

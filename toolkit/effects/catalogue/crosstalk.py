@@ -9,14 +9,12 @@ from toolkit.effects.facts import Alike, ChannelFacts, Correctable, Values, moun
 from toolkit.effects.surroundings import Surroundings, of_channel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.facts import Channels
     from toolkit.effects.signals import Setting
 
 
-def _leaking(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _leaking(y: Array, values: Values, setting: Setting) -> Array:
     source = setting.channels.get("from")
     return y if source is None else y + values["coefficient"] * source
 
@@ -31,7 +29,7 @@ def _pulls(case: Surroundings) -> bool:
 
 def _taken_out(
     channels: Channels, recorded: Channels, value: float, channel: str | None, source: str | None
-) -> tuple[str, NDArray[np.float64]]:
+) -> tuple[str, Array]:
     # load = shown - coefficient * other, the others as shown
     return str(channel), channels[str(channel)] - value * recorded[str(source)]
 

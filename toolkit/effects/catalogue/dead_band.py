@@ -12,15 +12,14 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.surroundings import of_channel
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 NOISE = "_noise"
 """Among the values: sd of noise that comes before the band, in the channel's unit; without it none does."""
 
 
-def _dead(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _dead(y: Array, values: Values, setting: Setting) -> Array:
     half = 0.5 * abs(values["width"])
     noise = values.get(NOISE, 0.0)
     if not noise > 0:
@@ -28,7 +27,7 @@ def _dead(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[n
     return _above(y - half, noise) - _above(-y - half, noise)
 
 
-def _above(y: NDArray[np.float64], sd: float) -> NDArray[np.float64]:
+def _above(y: Array, sd: float) -> Array:
     """Return the mean of max(y + noise, 0) for normal noise."""
     from scipy.special import ndtr
 

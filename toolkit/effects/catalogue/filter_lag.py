@@ -9,13 +9,11 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.filters import STRAIGHT, begun, filtered
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _filtered(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _filtered(y: Array, values: Values, setting: Setting) -> Array:
     return filtered(
         setting.t, y, values["time_constant"], straight=STRAIGHT in values, start=begun(y, values)
     )

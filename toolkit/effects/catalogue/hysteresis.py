@@ -12,14 +12,13 @@ from toolkit.effects.filters import PAST, plays
 from toolkit.effects.surroundings import Surroundings, of_channel
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 _OPERATORS = 20  # of half as many the corners are so far apart that a fit of reach ends between them
 
 
-def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _looping(y: Array, values: Values, setting: Setting) -> Array:
     """Add a loop of unit height, less its own line, that a share ``reach`` of the range winds up.
 
     Play operators with half gaps spread evenly over (0, reach x span]; after a reversal a small reach turns
@@ -38,7 +37,7 @@ def _looping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArra
     return y + values["gain"] * y + values["width"] * loop
 
 
-def _line(halves: NDArray[np.float64], span: float) -> float:
+def _line(halves: Array, span: float) -> float:
     """Return how much a full cycle's mean of both branches falls behind, by least squares over the range."""
     x = np.linspace(-span, span, 41)[:, None]
     stuck = np.maximum(span - halves, 0.0)

@@ -9,13 +9,11 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.surroundings import Surroundings, per_channel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _bent(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _bent(y: Array, values: Values, setting: Setting) -> Array:
     return y + values["quadratic"] * y**2 + values["cubic"] * y**3
 
 

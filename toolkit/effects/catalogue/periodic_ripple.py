@@ -12,7 +12,7 @@ from toolkit.effects.facts import Term, Values
 from toolkit.effects.surroundings import Surroundings, of_force, of_position
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from toolkit.arrays import Array
 
 # Responses of two periods have nothing in common once they differ by a cycle over the way.
 _CLOSE = 0.5  # cycles over the way from one period to the next
@@ -27,7 +27,7 @@ def _resisting(position: Any, velocity: Any, values: Values) -> Any:
     )
 
 
-def _waves(x: NDArray[np.float64], starts: Sequence[Values]) -> NDArray[np.float64]:
+def _waves(x: Array, starts: Sequence[Values]) -> Array:
     wave = np.array([2 * np.pi / values["period"] for values in starts])
     size = np.array([values["amplitude"] for values in starts])
     turned = np.multiply.outer(x, wave)

@@ -11,12 +11,11 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.surroundings import of_channel
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _stepped(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _stepped(y: Array, values: Values, setting: Setting) -> Array:
     step = abs(values["step"])
     return y if step == 0 else step * np.round(y / step)
 

@@ -10,12 +10,11 @@ from toolkit.effects.effect import Effect
 from toolkit.effects.facts import ChannelFacts, Values
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _folded(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _folded(y: Array, values: Values, setting: Setting) -> Array:
     return np.abs(y)
 
 

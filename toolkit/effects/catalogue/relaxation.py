@@ -12,8 +12,7 @@ from toolkit.effects.facts import Values
 from toolkit.effects.filters import begun, lag
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Drive, Setting, Tire
     from toolkit.effects.surroundings import Surroundings
 
@@ -43,11 +42,11 @@ def _relaxed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Driv
     return dataclasses.replace(drive, SA=slip)
 
 
-def _over(slope: NDArray[np.float64], nominal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _over(slope: Array, nominal: Array) -> Array:
     return np.divide(slope, nominal, out=np.ones_like(slope), where=nominal != 0)
 
 
-def _slope(tire: Tire, drive: Drive) -> NDArray[np.float64]:
+def _slope(tire: Tire, drive: Drive) -> Array:
     """Return dFY/dSA [N/rad] at the drive's slip angles, shape (n,)."""
     turned = tire(dataclasses.replace(drive, SA=drive.SA + _STEP)).FY
     less = tire(dataclasses.replace(drive, SA=drive.SA - _STEP)).FY

@@ -11,12 +11,11 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.surroundings import of_channel
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _clipped(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _clipped(y: Array, values: Values, setting: Setting) -> Array:
     return np.clip(y, -abs(values["level"]), abs(values["level"]))
 
 

@@ -8,17 +8,15 @@ from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter
 from toolkit.effects.facts import ChannelFacts, Values
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _scaled(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _scaled(y: Array, values: Values, setting: Setting) -> Array:
     return y * (1 + values["gain_error"])
 
 
-def _restored(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _restored(y: Array, values: Values, setting: Setting) -> Array:
     return y / (1 + values["gain_error"])
 
 

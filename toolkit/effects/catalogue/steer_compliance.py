@@ -9,9 +9,7 @@ from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Correctable, Values
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.facts import Channels
     from toolkit.effects.signals import Drive, Setting, Tire
 
@@ -28,7 +26,7 @@ def _compliant(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Dr
 
 def _taken_out(
     channels: Channels, recorded: Channels, value: float, channel: str | None, source: str | None
-) -> tuple[str, NDArray[np.float64]]:
+) -> tuple[str, Array]:
     return "SA", channels["SA"] - value * channels["MZ"]
 
 

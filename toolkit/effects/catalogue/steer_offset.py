@@ -11,8 +11,7 @@ from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Alike, Correctable, Values, everywhere
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.facts import Channels
     from toolkit.effects.signals import Drive, Setting, Tire
 
@@ -23,7 +22,7 @@ def _turned(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive
 
 def _taken_out(
     channels: Channels, recorded: Channels, value: float, channel: str | None, source: str | None
-) -> tuple[str, NDArray[np.float64]]:
+) -> tuple[str, Array]:
     return "SA", channels["SA"] - value
 
 

@@ -10,16 +10,14 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.surroundings import Surroundings, of_channel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
 _TEMPERATURES = ("T_CELL", "T_AMBIENT", "T", "T_TREAD")  # the nearest to the cell first
 
 
-def _warming(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _warming(y: Array, values: Values, setting: Setting) -> Array:
     name = next((channel for channel in _TEMPERATURES if channel in setting.channels), None)
     if name is None or not len(y):
         return y

@@ -12,8 +12,7 @@ from toolkit.effects.facts import Values
 from toolkit.effects.filters import PAST, lag
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Drive, Setting, Tire
     from toolkit.effects.surroundings import Surroundings
 
@@ -31,7 +30,7 @@ def _heated(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive
     )
 
 
-def _rise(drive: Drive, values: Values, setting: Setting, tire: Tire) -> NDArray[np.float64]:
+def _rise(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Array:
     name = next((channel for channel in _TEMPERATURES if channel in setting.channels), None)
     if name is not None and len(drive.t):
         recorded = setting.channels[name]

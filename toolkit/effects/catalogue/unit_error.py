@@ -9,9 +9,7 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.unit_ratios import unit_ratios, units_mistaken
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
     from toolkit.effects.surroundings import Surroundings
 
@@ -28,11 +26,11 @@ def _ratios(case: Surroundings) -> tuple[float, ...]:
     return tuple(_PREFIXES.values()) if text is None else tuple(unit_ratios(text).values())
 
 
-def _converted(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _converted(y: Array, values: Values, setting: Setting) -> Array:
     return y * values["factor"]
 
 
-def _restored(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _restored(y: Array, values: Values, setting: Setting) -> Array:
     return y / values["factor"]
 
 

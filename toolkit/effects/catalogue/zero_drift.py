@@ -10,13 +10,11 @@ from toolkit.effects.facts import ChannelFacts, Values
 from toolkit.effects.surroundings import Surroundings, of_channel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from toolkit.arrays import Array
     from toolkit.effects.signals import Setting
 
 
-def _drifting(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+def _drifting(y: Array, values: Values, setting: Setting) -> Array:
     return y + values["rate"] * setting.elapsed_s / 60.0
 
 

@@ -145,7 +145,7 @@ def _table_of_recording(path: Path, machine: Machine) -> TireTable:
         columns |= corrected(machine, {name: recording[name].si for name in ("SA", "FZ", "FY", "MZ")})
     return table_of(
         [f"{symbol} [{CHANNELS[symbol].si}]" for symbol in columns], list(columns.values()), path=path,
-        axes=machine.axes, required=("SA", "FZ"), measured=True,
+        axes=machine.axes, measured=True,
     )  # fmt: skip
 
 

@@ -12,7 +12,6 @@ import zipfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
 
 from toolkit.errors import RenderError
 from toolkit.inputs import PDF_FILE, read_regular
@@ -131,9 +130,7 @@ class Office:
     def __enter__(self) -> Office:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.tires.global_model import GlobalModel
 from toolkit.tires.mf import (
     MF52,
     Forces,
@@ -22,10 +21,7 @@ from toolkit.tires.mf import (
     equivalent,
     kappa_force,
     longitudinal,
-    mf_bounded,
-    mf_factors,
-    mf_forces,
-    mf_starts,
+    magic_formula,
     weight_x,
     weight_y,
 )
@@ -85,16 +81,11 @@ def _moment(
     return as_array(residual - trail * FY)
 
 
-MODEL = GlobalModel(
+MODEL = magic_formula(
     name="mf52",
     title="Magic Formula 5.2 (PAC2002)",
     reference="Pacejka, Tyre and Vehicle Dynamics (2002), eq. 4.E1 to 4.E78",
     valid="within the loads, angles and slips of the data; one pressure",
-    axes="ISO-W",
-    channels=("FX", "FY", "MZ"),
     parameters=MF52,
-    forces=mf_forces(MF52, forces),
-    starts=mf_starts,
-    bounded=mf_bounded(MF52),
-    factors=mf_factors(MF52),
+    evaluator=forces,
 )

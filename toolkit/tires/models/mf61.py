@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.tires.global_model import GlobalModel
 from toolkit.tires.mf import (
     MF61,
     Forces,
@@ -25,10 +24,7 @@ from toolkit.tires.mf import (
     equivalent,
     kappa_force,
     longitudinal,
-    mf_bounded,
-    mf_factors,
-    mf_forces,
-    mf_starts,
+    magic_formula,
     weight_x,
     weight_y,
 )
@@ -117,16 +113,11 @@ def _moment(
     return as_array(Dr * np.cos(np.arctan(Br * turned)) * q.cosine - trail * FY)
 
 
-MODEL = GlobalModel(
+MODEL = magic_formula(
     name="mf61",
     title="Magic Formula 6.1",
     reference="Pacejka (2012), eq. 4.E1 to 4.E78; Besselink, Schmeitz, Pacejka (2010)",
     valid="within the loads, angles, pressures and slips of the data",
-    axes="ISO-W",
-    channels=("FX", "FY", "MZ"),
     parameters=MF61,
-    forces=mf_forces(MF61, forces),
-    starts=mf_starts,
-    bounded=mf_bounded(MF61),
-    factors=mf_factors(MF61),
+    evaluator=forces,
 )

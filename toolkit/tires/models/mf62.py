@@ -5,20 +5,14 @@ For FX, FY and MZ its equations are those of 6.1 (`toolkit.tires.models.mf61`); 
 
 from __future__ import annotations
 
-from toolkit.tires.global_model import GlobalModel
-from toolkit.tires.mf import MF61, mf_bounded, mf_factors, mf_forces, mf_starts
+from toolkit.tires.mf import MF61, magic_formula
 from toolkit.tires.models.mf61 import forces
 
-MODEL = GlobalModel(
+MODEL = magic_formula(
     name="mf62",
     title="Magic Formula 6.2",
     reference="Pacejka (2012), eq. 4.E1 to 4.E78; Besselink, Schmeitz, Pacejka (2010)",
     valid="within the loads, angles, pressures and slips of the data",
-    axes="ISO-W",
-    channels=("FX", "FY", "MZ"),
     parameters=MF61,
-    forces=mf_forces(MF61, forces),
-    starts=mf_starts,
-    bounded=mf_bounded(MF61),
-    factors=mf_factors(MF61),
+    evaluator=forces,
 )
