@@ -8,12 +8,12 @@ from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.case.reader import read_case
-from toolkit.diagnosis.simulators import ode
+from toolkit.diagnosis.simulators import ode, trajectory
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import RTOL
 from toolkit.diagnosis.simulators.marching import march
-from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
+from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows, enough
 from toolkit.diagnosis.simulators.trajectory import Guesses, Path, recursion, trajectories
 
 T = np.linspace(0.0, 10.0, 201)
@@ -170,6 +170,40 @@ def test_parameters_that_make_an_equation_stiff_do_not_slow_all_that_come_after(
         row_by_row.clear()
         model.simulate(case.runs[0], {"tau": 1.0 + 0.01 * i}, ())
     assert not row_by_row
+
+
+def test_a_simulation_near_a_known_one_comes_to_rest_once(tmp_path, monkeypatch):
+    text = case_text(
+        "ode", states=["x"], force_terms={"x": "N/s"}, parameters={"tau": (10.0, "s", 0.1)},
+        inputs={"F": "N"}, outputs={"X": "N"}, runs=1,
+    )  # fmt: skip
+    t = np.arange(0.0, 20.0, 0.1)
+    frame = pd.DataFrame({"t": t, "F": np.sin(t), "X": np.sin(t)})
+    case = read_case(write_case(tmp_path, text, simulator=RELAXING, r0__csv=frame))
+    model, begun = model_of(case, None), []
+
+    def converged(flow, x, sets, steps, *rest):
+        begun.append(int(steps.max()))
+        return trajectory_converged(flow, x, sets, steps, *rest)
+
+    def begins(tau):
+        begun.clear()
+        model.simulate(case.runs[0], {"tau": tau}, ())
+        return list(begun)
+
+    trajectory_converged = trajectory._converged
+    monkeypatch.setattr(trajectory, "_converged", converged)
+    for tau in (1.0, 0.5):
+        begins(tau)
+    quick = begins(0.3)
+    assert len(quick) > 1
+    assert begins(0.301) == [quick[-1]]
+
+
+def test_fewer_steps_do_where_the_error_of_the_fifth_power_of_their_length_allows_it():
+    # of four steps: half as many leave 32 times the error, a quarter 1024 times
+    errors = np.array([[0.9, 1 / 100, 1 / 10_000], [0.9, 1 / 1000, 0.0]])
+    assert enough(np.array([4, 4, 4]), errors).tolist() == [4, 2, 1]
 
 
 def test_terms_that_miss_wait_ever_longer_and_others_do_not():

@@ -98,21 +98,26 @@ class Problem:
 
     def simulate(self, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
         """Return every output over all runs in their order; ``p`` are the free parameters."""
-        values = dict(self.known)
-        values.update(zip((parameter.name for parameter in self.free), map(float, p), strict=True))
+        values = self._values(p)
         if self.model.capability.together is not None and len(self.runs) > 1:
             self.model.capability.together(self.runs, [(values, active)])
         outputs = [self.model.simulate(run, values, active) for run in self.runs]
         return {name: np.concatenate([output[name] for output in outputs]) for name in self.names}
+
+    def simulated_run(self, run: Run, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
+        """Return every output over one run; ``p`` are the free parameters."""
+        return self.model.simulate(run, self._values(p), active)
+
+    def _values(self, p: Sequence[float]) -> dict[str, float]:
+        values = (float(value) for value in p)
+        return self.known | dict(zip((parameter.name for parameter in self.free), values, strict=True))
 
     def prepare(self, points: Sequence[tuple[Sequence[float], Sequence[AppliedEffect]]]) -> None:
         """Have several simulations made at once where the model can; `simulate` then finds them."""
         together = self.model.capability.together
         if together is None:
             return
-        names = [parameter.name for parameter in self.free]
-        sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in points]
-        together(self.runs, sets)
+        together(self.runs, [(self._values(p), active) for p, active in points])
 
     def pushed(
         self,
@@ -131,8 +136,7 @@ class Problem:
         applied : where and in which runs they act
         pattern : positions and rates (n,) to forces (n, forces)
         """
-        values = dict(self.known)
-        values.update(zip((parameter.name for parameter in self.free), map(float, p), strict=True))
+        values = self._values(p)
         parts: dict[str, list[Array]] = {name: [] for name in self.names}
         moving = self.model.capability.motion
         for run in self.runs:

@@ -58,8 +58,9 @@ def wrong_units(problem: Problem, fits: Sequence[Fit]) -> tuple[CandidateEffect,
     before = min(_error(problem, made.residual, wrong) for made in fits)
     found: list[tuple[float, CandidateEffect]] = []
     for applied in _ratios(problem):
-        left = [error for made in fits if (error := _left(problem, made, applied, wrong)) is not None]
-        if left and min(left) < UNITS.left * before:
+        most = UNITS.left * before
+        left = [error for made in fits if (error := _left(problem, made, applied, wrong, most)) is not None]
+        if left and min(left) < most:
             start = Start(
                 values=dict(applied.values),
                 directions=(dict(applied.values),),
@@ -90,15 +91,18 @@ def _free_factors(
     ratios = {unit.active.channel: factor_of(unit.active) for unit in units[::-1] if _is_ratio(unit)}
     for place in {each.channel: each for each in _ratios(problem) if is_ratio(each.effect)}.values():
 
-        def left(log_factor: float, place: AppliedEffect = place) -> float:
+        def left(log_factor: float, least: float = math.inf, place: AppliedEffect = place) -> float:
             applied = free_factor(place, math.exp(log_factor))
-            errors = [_left(problem, made, applied, wrong) for made in fits]
+            errors = [_left(problem, made, applied, wrong, least) for made in fits]
             return min((error for error in errors if error is not None), default=math.inf)
 
         reach, step = math.log(UNITS.farthest), 2 * math.log(UNITS.farthest) / (UNITS.steps - 1)
         logs = [step * i - reach for i in range(UNITS.steps)]
         logs += [math.log(ratios[place.channel])] if place.channel in ratios else []
-        best = min(logs, key=left)
+        best, least = 0.0, math.inf
+        for log_factor in sorted(logs, key=abs):  # the farther off, the dearer: one that leaves more is left
+            error = left(log_factor, least)
+            best, least = (log_factor, error) if error < least else (best, least)
         ends = (best - step, best + step)
         nearer = minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": UNITS.steps})
         if nearer.fun < most:
@@ -203,12 +207,25 @@ def _values(problem: Problem, effect: Effect, channel: str) -> list[dict[str, fl
     return [{effect.names[0]: ratio} for ratio in ratios.values()]
 
 
-def _left(problem: Problem, made: Fit, applied: AppliedEffect, names: Sequence[str]) -> float | None:
+def _left(
+    problem: Problem, made: Fit, applied: AppliedEffect, names: Sequence[str], most: float = math.inf
+) -> float | None:
+    """Return what is left beside a unit; None where it cannot be simulated, or some runs leave ``most``.
+
+    A unit that is none may drive a simulation through thousands of steps from row to row, and one run of it
+    says as much as all.
+    """
+    residual = {name: np.zeros(problem.rows) for name in names}
     try:
-        simulated = problem.simulate(made.p, (*made.active, applied))
+        for run, rows in zip(problem.runs, problem.slices, strict=True):
+            simulated = problem.simulated_run(run, made.p, (*made.active, applied))
+            for name in names:
+                residual[name][rows] = problem.observed[name][rows] - simulated[name]
+            if (error := _error(problem, residual, names)) >= most:
+                return None
     except FitError:  # so large an input is beyond what the simulation can do
         return None
-    return _error(problem, {name: problem.observed[name] - simulated[name] for name in names}, names)
+    return error
 
 
 def _error(problem: Problem, residual: dict[str, Array], names: Sequence[str]) -> float:

@@ -323,7 +323,7 @@ class OdeModel:
         columns, own = self.equation.columns, len(self.states)
         assert columns is not None  # noqa: S101  asked by whoever calls
         forces = [self.forces(active) for _, active in listed]
-        together, rows = ForcesTogether(forces, own, runs), Rows(runs, self.drivers)
+        together, rows, terms = ForcesTogether(forces, own, runs), Rows(runs, self.drivers), forces[0].terms
         starts = [np.stack([self.equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
         atol = np.stack([self.tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
         p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
@@ -332,7 +332,7 @@ class OdeModel:
         for run, at, start in zip(runs, rows.slices, starts, strict=True):
             x[:own, :, at] = self._near[run][:, None] if run in self._near else start[:, :, None]
             x[:own, :, at.start] = start
-            steps[at.start : at.stop - 1] = self._steps.get(run, 1)
+            steps[at.start : at.stop - 1] = self._guesses.steps(run, terms, self._steps.get(run, 1))
         slopes = self._slopes.get(tuple(runs))
         if slopes is not None and slopes.shape[2] != len(x):
             slopes = None
@@ -341,7 +341,7 @@ class OdeModel:
         )
         for force in forces:
             sizes[own : own + force.added] = force.sizes
-        flow, terms = RowFlow(columns, rows, p, together, atol), forces[0].terms
+        flow = RowFlow(columns, rows, p, together, atol)
         with silenced():
             smooth = ~together.abrupt & self._guesses.are_tried(terms)
             path, reached = trajectories(flow, Path(x, steps, slopes), sizes, smooth)
@@ -350,8 +350,9 @@ class OdeModel:
         for run, at in zip(runs, rows.slices, strict=True):
             if reached[0]:
                 self._near[run] = path.x[:own, 0, at]
-            if path.slopes is not None and self.scale:
+            if path.enough is not None and self.scale:
                 self._steps.setdefault(run, path.steps[at.start : at.stop - 1])
+                self._guesses.did(run, terms, path.enough[at.start : at.stop - 1])
         self._slopes[tuple(runs)] = path.slopes
         return [path.x[:, :, at] for at in rows.slices], reached
 

@@ -189,6 +189,20 @@ def finer(steps: Places, errors: Array) -> Places:
     steps : so far, (rows,)
     errors : of every set, (sets, rows)
     """
+    return np.where(errors > 1, np.maximum(_by_errors(steps, errors), 2 * steps), steps)
+
+
+def enough(steps: Places, errors: Array) -> Places:
+    """Return the steps of every interval that would have done for all sets, (rows,): a power of two.
+
+    Parameters
+    ----------
+    steps : that were taken, (rows,)
+    errors : that they left of every set, (sets, rows)
+    """
+    return np.minimum(steps, _by_errors(steps, errors.max(axis=0)))
+
+
+def _by_errors(steps: Places, errors: Array) -> Places:
     wanted = steps * _SAFE * np.maximum(errors, 1e-30) ** 0.2
-    power = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.intp)
-    return np.where(errors > 1, np.maximum(power, 2 * steps), steps)
+    return np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.intp)

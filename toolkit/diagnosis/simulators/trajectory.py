@@ -18,11 +18,12 @@ import numpy as np
 
 from toolkit.diagnosis.simulators.integrate import OFF, RTOL
 from toolkit.diagnosis.simulators.marching import march
-from toolkit.diagnosis.simulators.row_flow import MOST_STEPS, finer
+from toolkit.diagnosis.simulators.row_flow import MOST_STEPS, enough, finer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.simulators.row_flow import RowFlow
 
     Array = NDArray[np.float64]
@@ -41,11 +42,15 @@ _MARCHED = 8  # columns: fewer are integrated in less time one by one, by plain 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """States at every row, (states, sets, rows), the steps of every interval, and the flow's derivatives."""
+    """States at every row, (states, sets, rows), the steps of every interval, and the flow's derivatives.
+
+    ``enough`` are the steps that would have done, by their errors: what a simulation near by begins with.
+    """
 
     x: Array
     steps: Places
     slopes: Array | None
+    enough: Places | None = None
 
 
 class Guesses:
@@ -53,11 +58,24 @@ class Guesses:
 
     One term with a corner says nothing of another, nor parameters far off of those near by: after three
     misses in turn of the same terms a guess waits, for twice as many simulations after every further one.
+
+    A simulation begins with the steps that the last one of its terms would have done with in its run: with
+    fewer it would come to rest twice, once for nothing.
     """
 
     def __init__(self) -> None:
         self._missed: dict[object, int] = {}
         self._waiting: dict[object, int] = {}
+        self._enough: dict[Run, tuple[tuple[object, ...], Places]] = {}
+
+    def steps(self, run: Run, terms: tuple[object, ...], fewest: Places | int) -> Places | int:
+        """Return the steps of a run's intervals, (rows - 1,), never fewer than the ``fewest``."""
+        last, enough = self._enough.get(run, (None, None))
+        return fewest if enough is None or last != terms else np.maximum(enough, fewest)
+
+    def did(self, run: Run, terms: tuple[object, ...], enough: Places) -> None:
+        """Learn which steps would have done in a run, (rows - 1,)."""
+        self._enough[run] = terms, enough
 
     def are_tried(self, terms: tuple[object, ...]) -> bool:
         """Tell whether the next simulation with such terms is to begin from a guess."""
@@ -102,7 +120,9 @@ def trajectories(
     if len(others) * len(flow.rows.slices) >= _MARCHED:
         starts = guess.x[:, others][:, :, [at.start for at in flow.rows.slices]]
         x[:, others], reached[others] = march(flow, starts, others)
-    return Path(x, steps if len(rest) else guess.steps, slopes if len(rest) else None), reached
+    if not len(rest):
+        return Path(x, guess.steps, None), reached
+    return Path(x, steps, slopes, enough(steps, errors[able])), reached
 
 
 def _converged(
@@ -135,7 +155,10 @@ def _converged(
         usable = np.isfinite(off) & (np.abs(ends) < OFF).all(axis=(0, 2))
         share = _FAR / np.maximum((np.abs(moved) / sizes[:, None, None]).max(axis=(0, 2)), _FAR)
         x[:, at[usable], 1:] += (share[:, None] * moved)[:, usable]
-        done = usable & (off < _CLOSE)
+        # As much smaller as a correction is than the last one, the next is than it.
+        last = before[active]
+        ahead = np.where((off < 1) & (last < np.inf) & (share == 1), off * off / last, off)
+        done = usable & (np.minimum(off, ahead) < _CLOSE)
         errors[active[done]] = shares[done]
         solved[active[done]] = True
         fresh = slopes.shape[1] > 1 or len(active) == 1
