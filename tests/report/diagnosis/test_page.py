@@ -140,12 +140,23 @@ def test_a_size_below_what_the_rows_resolve_is_printed_as_that(dragged):
         assert "e-17" not in text
 
 
-def test_a_class_says_first_which_channel_may_be_what(dragged):
+def test_a_class_says_first_what_it_may_be_and_where(dragged):
     effect = dataclasses.replace(
         dragged.diagnosis.effects[0], channel="F", equivalent_to=("creep", "backlash")
     )
     classed = dataclasses.replace(dragged.diagnosis, verdict="equivalent", effects=(effect,))
-    assert cause(classed).startswith(f"F may have {effect.name} or creep or backlash")
+    assert cause(classed).startswith("quadratic_drag on F (or creep, backlash), drag ")
+
+
+def test_a_name_whose_sizes_may_be_none_is_told_as_no_more(dragged):
+    effect = dragged.diagnosis.effects[0]
+    (drag, *_) = effect.parameters
+    unsure = dataclasses.replace(effect, parameters=(dataclasses.replace(drag, ci95=(-0.1, 0.9)),))
+    named = dataclasses.replace(dragged.diagnosis, effects=(unsure,))
+    assert headline(named, with_cause=True).startswith("Perhaps quadratic_drag on F")
+    for text in (headline(named), diagnosis_text(named, "out")):
+        assert "none of its sizes is told from none" in text
+        assert "has a name" not in text
 
 
 def test_what_is_there_or_not_has_no_smallest_size_and_says_so(dragged):

@@ -244,19 +244,12 @@ def _writable(out: Path) -> None:
 
 def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
-    from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
     from toolkit.report.diagnosis.numbers import UNRESOLVED, chance, over, rounded
-    from toolkit.report.diagnosis.page import cause, provisional, simulated
+    from toolkit.report.diagnosis.page import headline, simulated
 
-    cut = diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped)
-    verdict = _CUT if cut else _RUNS_DIFFER if only_runs_differ(diagnosis) else _VERDICTS[diagnosis.verdict]
-    if diagnosis.verdict == "untestable" and diagnosis.skipped:
-        verdict = "the budget was spent before this recording could be judged"
     mark = simulated(diagnosis)
     lines = [mark] if mark else []
-    lines.append(
-        f"{diagnosis.title}: {' '.join(filter(None, (provisional(diagnosis), cause(diagnosis), verdict)))}"
-    )
+    lines.append(f"{diagnosis.title}: {headline(diagnosis, with_cause=True)}")
     for effect in diagnosis.effects:
         channel = f" on {effect.channel}" if effect.channel else ""
         lines += ["", f"{effect.name}{channel} ({effect.stage}): {effect.statement}", f"  {effect.equation}"]
@@ -343,14 +336,3 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
 
 
 _STRUCTURES = 3  # told on a screen, of dozens that overlap
-_CUT = "something is missing; the budget was spent before every known effect was tried"
-_RUNS_DIFFER = (
-    "runs differ by more than their noise; within the runs nothing is missing that this recording could show"
-)
-_VERDICTS = {
-    "named": "the missing physics has a name",
-    "equivalent": "a class of effects explains it, which this recording cannot tell apart",
-    "unknown": "something is missing that no known effect explains",
-    "nothing": "nothing is missing that this recording could show",
-    "untestable": "this recording cannot tell",
-}

@@ -93,6 +93,7 @@ def provisional(diagnosis: Diagnosis) -> str | None:
 
 
 def _verdict(diagnosis: Diagnosis) -> str:
+    """Return the verdict as a sentence: no more than the sizes of its effects bear out."""
     from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
 
     if diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped):
@@ -103,6 +104,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
         return RUNS_DIFFER
     if diagnosis.laws and not diagnosis.effects:
         return f"{HEADLINES[diagnosis.verdict]} Its law was learned: {diagnosis.laws[0].sentence}."
+    if diagnosis.verdict == "named" and not any(map(is_told_from_none, diagnosis.effects)):
+        return "A known effect may explain the mismatch; none of its sizes is told from none."
     if diagnosis.effects and diagnosis.remaining == "unknown" and diagnosis.laws:
         return f"{HEADLINES[diagnosis.verdict]} What is left follows a law: {diagnosis.laws[0].sentence}."
     if diagnosis.effects and diagnosis.remaining == "unknown":
@@ -130,7 +133,7 @@ def cause(diagnosis: Diagnosis) -> str | None:
             for value, interval in (rounded(parameter.value, parameter.ci95),)
         ]
         told = is_told_from_none(effect)
-        names.append((not told, ("" if told else "perhaps ") + ", ".join((_said(effect), *sizes))))
+        names.append((not told, ("" if told else "perhaps ") + ", ".join((_name(effect), *sizes))))
     shares = []
     for fit in diagnosis.fit.held_out:
         above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
@@ -138,6 +141,7 @@ def cause(diagnosis: Diagnosis) -> str | None:
         if above > 0 and explained > 0:
             shares.append((explained, above, fit.channel))
     listed = "; ".join(name for _, name in sorted(names, key=lambda entry: entry[0]))
+    listed = listed[0].upper() + listed[1:] if listed.startswith("perhaps ") else listed
     if not shares:
         return listed + "."
     explained, above, channel = max(shares, key=lambda share: share[0] / share[1])
@@ -220,14 +224,6 @@ def _lead(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 def _name(effect: DiagnosedEffect) -> str:
     where = f" on {effect.channel}" if effect.channel else ""
     return effect.name + where + (f" (or {', '.join(effect.equivalent_to)})" if effect.equivalent_to else "")
-
-
-def _said(effect: DiagnosedEffect) -> str:
-    """Return an effect's name as a first line has it: of a class first which channel may be what."""
-    if not effect.equivalent_to:
-        return _name(effect)
-    classed = f"{effect.name} or {' or '.join(effect.equivalent_to)}"
-    return f"{effect.channel} may have {classed}" if effect.channel else f"it may be {classed}"
 
 
 def _effect(result: Result, effect: DiagnosedEffect) -> _Effect:
