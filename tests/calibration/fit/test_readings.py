@@ -235,6 +235,7 @@ def test_reversibility_at_equal_loads(tmp_path: Path) -> None:
     assert one.pairs == 27
     assert one.rms == pytest.approx(1.0, rel=2e-3)
     assert one.worst == pytest.approx(1.0, rel=3e-3)
+    assert one.rms_percent_fs == pytest.approx(0.1, rel=2e-3)
 
 
 def test_without_equal_loads_or_a_way_down_there_is_no_reversibility(

@@ -8,7 +8,7 @@ from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.search import forward_step, search
+from toolkit.diagnosis.search import forward_step, search, superfluous
 from toolkit.errors import FitError
 
 GAIN = 1.2
@@ -80,7 +80,7 @@ def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, 
         asked.append([one.effect.name for one in active])
         return refused() if "coulomb_friction" in asked[-1] else whole(problem, folds, active, made)
 
-    for module in (search, forward_step):
+    for module in (search, superfluous, forward_step):
         monkeypatch.setattr(module, "hold_out", without_friction)
     found = names(tmp_path)
     assert ["coulomb_friction"] in asked
@@ -107,7 +107,7 @@ def test_an_effect_without_which_nothing_runs_is_kept(tmp_path, monkeypatch, can
         return made
 
     frames = {f"r{i}__csv": carriage(seed=i).assign(F=lambda df: df["F"] + 15) for i in range(2)}
-    for module in (search, forward_step):
+    for module in (search, superfluous, forward_step):
         monkeypatch.setattr(module, cannot, only_together)
     found = diagnose(read_case(write_case(tmp_path, HEAD + TWO, **frames)), None).diagnosis.effects
     classes = [{effect.name, *effect.equivalent_to} for effect in found]

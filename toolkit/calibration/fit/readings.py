@@ -125,6 +125,8 @@ class Reversibility:
     pairs: int
     worst: float
     rms: float
+    worst_percent_fs: float
+    rms_percent_fs: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -347,7 +349,7 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
         return ()
     columns = table.columns(record.indications)
     reversals = []
-    for load in record.loads:
+    for load, full in zip(record.loads, largest.tolist(), strict=True):
         error = (_equation(load, columns) - table.column(load.load))[loaded]
         mean_up, mean_down = (
             np.bincount(key[direction], weights=error[direction], minlength=len(ups))[paired] / count[paired]
@@ -358,6 +360,7 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
         reversals.append(
             Reversibility(
                 load=load.load, unit=load.unit, pairs=int(paired.sum()), worst=worst, rms=rms,
+                worst_percent_fs=100 * worst / full, rms_percent_fs=100 * rms / full,
             )
         )  # fmt: skip
     return tuple(reversals)
