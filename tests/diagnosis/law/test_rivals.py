@@ -265,9 +265,7 @@ def test_two_names_go_where_a_single_law_of_fewer_parameters_does_better(
     search = replace(
         search, steps=steps, augmented=named, held_refitted=off(1.0, -9.0), held_augmented=off(0.2, 0.0)
     )
-    alone = Laws(
-        listed=(law,), fit=replace(laws.fit, active=(law.applied,)), held_out=off(left, foretold)
-    )
+    alone = Laws(listed=(law,), fit=replace(laws.fit, active=(law.applied,)), held_out=off(left, foretold))
     monkeypatch.setattr(rivals, "before_nothing", lambda bare, **_: bare)
     monkeypatch.setattr(rivals, "learned", lambda *_, **__: alone)
     monkeypatch.setattr(rivals, "_leaves_process_noise", lambda _: True)

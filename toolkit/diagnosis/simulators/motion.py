@@ -102,7 +102,9 @@ class Motion:
         if not self.speed or self.position is None:
             return np.zeros(run.rows)
         if self.position in true:
-            track = _track(self.case, dataclasses.replace(run, columns={**run.columns, **true}), self.position)
+            track = _track(
+                self.case, dataclasses.replace(run, columns={**run.columns, **true}), self.position
+            )
             return track.rate(reach_of(track, self.speed) or track.longest)
         if run not in self._rates:
             track = _track(self.case, run, self.position)
