@@ -164,7 +164,7 @@ class _Averages:
         0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
     )
     everywhere: float = _set(0.3, "of an input's differences", "their median: of noise 1, of steps nothing")
-    of_inputs: float = _set(0.5, "of what is not followed", "goes with an input's noise, or it is physics")
+    of_inputs: float = _set(0.2, "of what is not followed", "goes with an input's noise, or it is physics")
     jitter: float = _set(0.1, "of the usual step", "rows further apart than that are no series")
     jittering: float = _set(0.01, "of all steps", "a clock stumbles now and then")
 

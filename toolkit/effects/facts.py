@@ -47,7 +47,8 @@ class ChannelFacts:
     it names none (None: every load cell). ``by_value`` says that it follows the channel's own value: put
     into a channel that was recorded disturbed, it must not follow that channel's noise. ``about_zero`` says
     that it depends on where the channel has its zero, which is then the recording's first value where the
-    scale has a zero by convention alone. ``between_rows``
+    scale has a zero by convention alone. ``directed`` says that it concerns a direction, which a
+    channel with such a zero does not have. ``between_rows``
     says that it shows what happened between two rows. ``proportion`` says that it is one factor of the
     channel, and what has to be added to its parameter to give it. ``inverse`` takes it away exactly; without
     it, a fixed point does.
@@ -58,6 +59,7 @@ class ChannelFacts:
     by_value: bool
     second: Second | None = None
     about_zero: bool = False
+    directed: bool = False
     usual: str | None = None
     between_rows: bool = False
     proportion: float | None = None

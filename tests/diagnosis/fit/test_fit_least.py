@@ -1,6 +1,7 @@
 """A fit that cannot reach what it is compared with is not carried to its end."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,9 @@ from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.errors import FitError
 
 CASE = case_text(
     "python", parameters={"gain": (1.0, "1", 1.0)}, inputs={"L": "N"}, outputs={"F": "N"}, runs=1,
@@ -61,3 +64,10 @@ def test_a_fit_that_cannot_reach_the_least_ends_early_and_claims_no_uncertainty(
     assert hopeless.covariance.size == 0
     assert hopeless.log_posterior <= free.log_posterior + 1e-6
     assert math.isfinite(hopeless.log_posterior)
+
+
+def test_a_fit_beyond_numbers_is_refused_and_ends_no_diagnosis(problem):
+    bend = next(each for each in candidates(problem) if each.active.effect.name == "nonlinearity")
+    values = bend.starts[0].reached((), {}) | {"quadratic": 1e200, "cubic": 1e200}
+    with pytest.raises(FitError, match="no usable output"), np.errstate(over="ignore", invalid="ignore"):
+        fit(problem, (replace(bend.active, values=values),), plain=True)

@@ -10,6 +10,9 @@ from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import CELL, cell_case, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.candidates import candidates
+from toolkit.diagnosis.simulators.build_simulator import model_of
 
 PISTON = """
 def simulate(inputs, p):
@@ -86,10 +89,8 @@ def test_the_inputs_of_an_equation_are_asked_for_their_units(tmp_path):
 
 
 def test_a_simulation_that_is_only_a_little_wrong_is_asked_for_no_unit(tmp_path):
-    from toolkit.diagnosis.fit.problem import problem_of
     from toolkit.diagnosis.search.search import _as_declared
     from toolkit.diagnosis.search.wrong_units import wrong_units
-    from toolkit.diagnosis.simulators.build_simulator import model_of
 
     runs = {f"r{seed}__csv": piston(seed) for seed in (0, 1)}
     case = read_case(write_case(tmp_path, HEAD, simulator=PISTON, **runs))
@@ -193,3 +194,25 @@ def test_a_steep_bend_is_no_factor(tmp_path):
     assert effect.name == "nonlinearity"
     (quadratic,) = [size for size in effect.parameters if size.name == "quadratic"]
     assert quadratic.ci95[0] < 0.008 < quadratic.ci95[1]
+
+
+@pytest.mark.parametrize(("stated", "asked"), [("V", True), ("degC", False), ("degF", False)])
+def test_a_sign_is_asked_of_what_has_a_direction(tmp_path, stated, asked):
+    # A zero by convention parts no directions: a wall that stores heat was a thermometer with a lost sign.
+    wall = case_text(
+        "python", parameters={"U": (2.0, f"W/m^2/{'V' if asked else 'K'}", 1.0)},
+        inputs={"inside": stated, "outside": stated}, outputs={"flow": "W/m^2"}, runs=2,
+    )  # fmt: skip
+    simulator = """
+def simulate(inputs, p):
+    import pandas as pd
+    return pd.DataFrame({"flow": p["U"] * (inputs["inside"] - inputs["outside"])})
+"""
+    t = np.arange(40) * 600.0
+    frame = pd.DataFrame({"t": t, "inside": 19 + np.sin(t / 4000), "outside": 12 + np.cos(t / 7000)})
+    runs = {f"r{k}__csv": frame.assign(flow=14.0 + k + np.sin(t / 900)) for k in (0, 1)}
+    case = read_case(write_case(tmp_path, wall, simulator=simulator, **runs))
+    places = [candidate.active.key for candidate in candidates(problem_of(case, model_of(case, None, None)))]
+    signs = {place.channel for place in places if place.name == "channel_sign"}
+    assert (signs >= {"inside", "outside"}) is asked
+    assert "flow" in signs

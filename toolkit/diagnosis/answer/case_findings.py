@@ -10,6 +10,7 @@ import numpy as np
 from toolkit.calibration.records.use import UNSIGNED, CalibrationUse
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import unapproved, withdrawal
+from toolkit.diagnosis.case.repeats import repeated_runs
 from toolkit.diagnosis.simulators.cells import record_of
 from toolkit.errors import RegistryError
 from toolkit.findings import Finding
@@ -39,6 +40,15 @@ def case_findings(problem: Problem) -> tuple[Finding, ...]:
                 where=case.path.name,
                 level="note",
                 message="one run only: contiguous blocks of it are held out, not whole runs",
+            )
+        )
+    for place, earlier in repeated_runs(case.runs).items():
+        findings.append(
+            Finding(
+                rule="case-equal-runs",
+                where=case.runs[place].name,
+                level="warning",
+                message=f"every reading is that of {earlier}: of coarse or still readings that may be",
             )
         )
     for run in (*case.runs, *case.predict):

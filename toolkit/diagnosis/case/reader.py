@@ -15,6 +15,7 @@ from toolkit.channels import Axes
 from toolkit.declared import Entry, Fault, Format, Keyed, Size, Source, Text, build, nearest, refuse
 from toolkit.diagnosis.case.case import Case, CaseChannel, Run, Simulation
 from toolkit.diagnosis.case.recordings import read_run
+from toolkit.diagnosis.case.repeats import is_copy, repeated_runs
 from toolkit.diagnosis.case.simulation import (
     FORMAT,
     ColumnsSimulation,
@@ -131,15 +132,11 @@ def _different_files(recording: Recording, path: Path, source: Source) -> None:
 
 
 def _different_content(runs: tuple[Run, ...], recording: Recording, source: Source) -> None:
-    """Refuse a copy of a recording under another name: no noise repeats itself to the last digit."""
-    outputs = [channel.name for channel in recording.channels if channel.role == "output"]
-    first: dict[str, str] = {}
-    for number, run in enumerate(runs):
-        # An output that stands still may well repeat itself.
-        if run.sha256 in first and any(len(set(run.columns.get(output, ()))) > 1 for output in outputs):
-            statement = f"{run.name}, the same bytes as {first[run.sha256]}"
+    """Refuse a copy of a recording under another name."""
+    for number, earlier in repeated_runs(runs).items():
+        if is_copy(runs[number], runs, recording.channels):
+            statement = f"{runs[number].name}, the same bytes as {earlier}"
             _refuse_twice(number, statement, "another recording", source)
-        first.setdefault(run.sha256, run.name)
 
 
 def _refuse_twice(number: int, file: str, earlier: str, source: Source) -> None:

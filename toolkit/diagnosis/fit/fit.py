@@ -20,6 +20,7 @@ from toolkit.diagnosis.fit.noise import (
 )
 from toolkit.diagnosis.policy import NOISE
 from toolkit.effects.applied import AppliedEffect
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,6 +59,7 @@ def covariance(
     parts, spread = [], prior.T @ prior
     for name, where in layouts.items():
         columns = J[name][where.index]
+        _refuse_beyond_numbers(name, columns)
         if plain:
             weight = 1 / (noise[name].marginal_sd ** 2 * noise[name].correlation_rows)
             parts.append(columns * math.sqrt(weight))
@@ -268,7 +270,18 @@ def _solve(
     simulated = space.simulated(x)
     residual = space.residual(simulated)
     noise = noise_of(space.problem, residual, layouts, used=len(x))
+    for name, estimate in noise.items():
+        _refuse_beyond_numbers(name, np.array(estimate.marginal_sd))
     return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
+
+
+def _refuse_beyond_numbers(name: str, values: Array) -> None:
+    """Refuse a fit whose squares or slopes are beyond numbers: an effect's size has run away."""
+    if not np.isfinite(values).all():
+        raise FitError(
+            "the simulation gives no usable output", where=name, rule="simulator", got="beyond numbers",
+            expected="finite squares and slopes in every row", next_step="look at the sizes of its effects",
+        )  # fmt: skip
 
 
 def sizes_off(made: Fit, applied: AppliedEffect) -> tuple[float, list[int]]:

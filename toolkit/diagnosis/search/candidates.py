@@ -175,8 +175,10 @@ def candidates(
 
 
 def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
-    if effect.term is not None and effect.term.limit is not None and case.origin(case.channel) is not None:
-        return ()  # a level above a zero that means nothing
+    of_zero = effect.term is not None and effect.term.limit is not None
+    of_direction = effect.on_channel is not None and effect.on_channel.directed
+    if (of_zero or of_direction) and case.origin(case.channel) is not None:
+        return ()  # a level above a zero that means nothing, or a sign beside it
     if not effect.parameters:
         values = origins(case, effect)
         return (Start(values=values, directions=(values,), amplitudes=()),)

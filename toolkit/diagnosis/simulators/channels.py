@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
 
 _FORCE_LIKE = ("force", "moment", "bridge_ratio", "count")
+# What a sensor gives for a load, in whatever it is read.
+_SIGNALS = ("ratio", "voltage", *_FORCE_LIKE)
 
 
 def channel_places(
@@ -43,11 +45,18 @@ def channel_places(
             if dimension(units[a]) == dimension(units[b]) or _both_loads(units[a], units[b])
         ]  # fmt: skip
     if effect.on_channel.paired:
+        loads = {name for name, unit in others if dimension(unit) in _FORCE_LIKE}
         return [
             (to, source)
             for to, to_unit in outputs
             for source, unit in (*outputs, *others)
-            if source != to and (_both_loads(to_unit, unit) or dimension(unit) == dimension(to_unit))
+            if source != to
+            and (
+                _both_loads(to_unit, unit)
+                or dimension(unit) == dimension(to_unit)
+                # Of several loads one is measured, in volts as well as in newtons, and the others leak.
+                or (len(loads) > 1 and source in loads and dimension(to_unit) in _SIGNALS)
+            )
         ]
     return [(name, None) for name, _ in outputs]
 

@@ -43,6 +43,7 @@ EFFECT = Effect(
         tare="alike",
         by_value=False,
         about_zero=True,
+        directed=True,
         inverse=_restored,
     ),
     discrete=True,

@@ -31,7 +31,7 @@ EFFECT = Effect(
     parameters=(),
     channel=_folded,
     on_channel=ChannelFacts(
-        where=("output", "cell", "program_load"), tare="own", by_value=False, about_zero=True
+        where=("output", "cell", "program_load"), tare="own", by_value=False, about_zero=True, directed=True
     ),
     discrete=True,
     reshapes=True,
