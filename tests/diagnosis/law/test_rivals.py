@@ -222,3 +222,56 @@ def test_a_name_that_takes_nearly_all_that_laws_take_stays(
     judged, listed = judged_by_laws(search, beside, seed=1, budget=ample())
     assert (judged.steps == search.steps) is stays
     assert listed is (beside if stays else alone)
+
+
+@pytest.mark.parametrize(
+    ("names", "foretold", "left", "stay"),
+    [
+        (2, 2.0, 0.1, False),
+        (1, 2.0, 0.1, True),  # a law may be one name's own formula
+        (2, 1.0, 0.1, True),  # no better than chance makes it
+        (2, 2.0, 0.3, True),  # likelier row by row, and farther off over whole runs
+    ],
+)
+def test_two_names_go_where_a_single_law_of_fewer_parameters_does_better(
+    outdone_name: tuple[Search, Laws],
+    monkeypatch: pytest.MonkeyPatch,
+    names: int,
+    foretold: float,
+    left: float,
+    *,
+    stay: bool,
+) -> None:
+    """One law is at most one effect's formula: two that take nearly as much imitate it together.
+
+    A struck bar loses with the square of its amplitude, and a cubic spring and creep took 97 % of that.
+    """
+    search, laws = outdone_name
+    observed, (law,) = search.problem.observed["gain"], laws.listed
+
+    def off(error: float, score: float) -> HeldOut:
+        return HeldOut(scores=(score,), simulated={"gain": observed - error}, fits=())
+
+    (step,) = search.steps
+    cell = step.active
+    other = next(
+        each.active
+        for each in candidates(search.problem)
+        if each.name != cell.effect.name and each.active.channel == "gain" and each.active.searched
+    )
+    active = (cell, other)[:names]
+    steps = tuple(replace(step, active=each) for each in active)
+    named = replace(search.augmented, active=active)
+    search = replace(
+        search, steps=steps, augmented=named, held_refitted=off(1.0, -9.0), held_augmented=off(0.2, 0.0)
+    )
+    alone = Laws(listed=(law,), fit=replace(laws.fit, active=(law.applied,)), held_out=off(left, foretold))
+    monkeypatch.setattr(rivals, "before_nothing", lambda bare, **_: bare)
+    monkeypatch.setattr(rivals, "learned", lambda *_, **__: alone)
+    monkeypatch.setattr(rivals, "_leaves_process_noise", lambda _: True)
+    monkeypatch.setattr(rivals, "_process_noise", lambda *_: True)
+    monkeypatch.setattr(rivals, "_parameters", lambda fit: 1 if fit is alone.fit else 3)
+    nothing_beside = Laws(listed=(), fit=named, held_out=search.held_augmented)
+    judged, listed = judged_by_laws(search, nothing_beside, seed=1, budget=ample())
+    assert (judged.steps == steps) is stay
+    assert listed is (nothing_beside if stay else alone)

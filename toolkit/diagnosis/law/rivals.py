@@ -56,7 +56,8 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     if bare.problem.shown_sd and _leaves_process_noise(search) and not _process_noise(search, alone.fit):
         return bare, alone
     least = LAWS.same if _leaves_process_noise(search) else VERDICT.nearly
-    if _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out, least=least):
+    alike = _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out, least=least)
+    if alike and not _does_with_fewer(search, alone):
         return search, laws
     if any(_holds_beside(laws, step) for step in search.steps):
         if _parameters(alone.fit) >= _parameters(laws.fit):
@@ -67,6 +68,26 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     elif alone.held_out.total - search.held_augmented.total < STEP.least_gain:
         return search, laws
     return bare, alone
+
+
+def _does_with_fewer(search: Search, alone: Laws) -> bool:
+    """Tell whether laws do better with fewer terms and fewer parameters than all effects together.
+
+    A law may be one effect's own formula, with a size more or less. It is not that of two: these imitate it
+    together, however much of it they take. Better is a higher held-out score, and no output with more error.
+    """
+    problem, named = search.problem, search.held_augmented
+    effects = [step for step in search.steps if not step.active.effect.from_digits]
+    return (
+        len(alone.listed) < len(effects)
+        and _parameters(alone.fit) < _parameters(search.augmented)
+        and alone.held_out.total - named.total >= STEP.least_gain
+        and all(
+            _error(problem, alone.held_out, name) <= _error(problem, named, name)
+            for name in problem.names
+            if problem.kept[name].any()
+        )
+    )
 
 
 def _holds_beside(laws: Laws, step: Step) -> bool:

@@ -10,7 +10,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.simulators.channels import channel_places, input_places, slopes, through_channels
+from toolkit.diagnosis.simulators.channels import (
+    channel_places,
+    input_places,
+    slopes,
+    through_channels,
+    true_inputs,
+)
 from toolkit.diagnosis.simulators.motion import Motion, motion_of
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output
@@ -106,7 +112,8 @@ class AlongRecordings(ABC):
             applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
         ]
         if forces and self.motion is not None:
-            simulated = self.motion.disturbed(simulated, forces, run)
+            true = true_inputs(run, active, self.inputs, around)
+            simulated = self.motion.disturbed(simulated, forces, run, true)
         return through_channels(simulated, active, run, around, run.columns)
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:

@@ -89,12 +89,23 @@ class Motion:
         length = output if self.kind == "position" else f"{output}*s"
         return f"{length}/s^2", f"{length}/s", length
 
-    def speeds(self, run: Run) -> Array:
-        """Return the velocity of a run beside a force, (n,): as recorded, or the rate of its position."""
+    def speeds(self, run: Run, true: Mapping[str, Array] | None = None) -> Array:
+        """Return the velocity of a run beside a force, (n,): as recorded, or the rate of its position.
+
+        Parameters
+        ----------
+        true : inputs, (n,) each, that were recorded otherwise than they are
+        """
+        true = true or {}
         if self.velocity is not None:
-            return run.columns[self.velocity]
+            return true.get(self.velocity, run.columns[self.velocity])
         if not self.speed or self.position is None:
             return np.zeros(run.rows)
+        if self.position in true:
+            track = _track(
+                self.case, dataclasses.replace(run, columns={**run.columns, **true}), self.position
+            )
+            return track.rate(reach_of(track, self.speed) or track.longest)
         if run not in self._rates:
             track = _track(self.case, run, self.position)
             self._rates[run] = track.rate(reach_of(track, self.speed) or track.longest)
@@ -147,14 +158,25 @@ class Motion:
         return {name: pushes if name == self.output else none for name in simulated}
 
     def disturbed(
-        self, simulated: Mapping[str, Array], forces: Sequence[AppliedEffect], run: Run
+        self,
+        simulated: Mapping[str, Array],
+        forces: Sequence[AppliedEffect],
+        run: Run,
+        true: Mapping[str, Array],
     ) -> dict[str, Array]:
-        """Return the outputs with force-like terms in the equation of motion."""
+        """Return the outputs with force-like terms in the equation of motion.
+
+        A force follows the motion as it was: friction opposes the velocity, whatever sign its sensor shows.
+
+        Parameters
+        ----------
+        true : inputs, (n,) each, that were recorded otherwise than they are
+        """
         result = dict(simulated)
         if self.kind == "force":
             zero = np.zeros(run.rows)
-            x = zero if self.position is None else run.columns[self.position]
-            push = resisting(forces, run.t, x, self.speeds(run))
+            x = zero if self.position is None else true.get(self.position, run.columns[self.position])
+            push = resisting(forces, run.t, x, self.speeds(run, true))
             result[self.output] = simulated[self.output] + push
             return result
         return self._moved(result, forces, run)
