@@ -84,6 +84,7 @@ class _Priors:
     moved: float = _set(
         1.0, "prior sd", "a refit that went farther may have left what an effect needs: fits begin at both"
     )
+    wider: float = _set(10.0, "prior sd", "so wide, a prior decides nothing, and its parameter keeps a scale")
     masked: int = _set(
         4, "candidates", "of those seen from the declared values, fitted jointly where a prior is far off"
     )

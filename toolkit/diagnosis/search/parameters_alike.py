@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
 
-_WIDER = 10.0  # times a prior's sd: it then decides nothing, and the parameter keeps a scale
-
 
 def with_parameters_alike(search: Search) -> Search:
     """Return a search whose steps have the parameter that explains as much in the effect's place."""
@@ -47,7 +45,7 @@ def _alike(problem: Problem, base: Fit, applied: AppliedEffect) -> ParameterInPl
     if at is None:
         return None
     free = [
-        replace(each, sd=_WIDER * (each.sd or 0.0)) if i == at else each
+        replace(each, sd=PRIORS.wider * (each.sd or 0.0)) if i == at else each
         for i, each in enumerate(problem.free)
     ]
     released = replace(problem, free=tuple(free))
