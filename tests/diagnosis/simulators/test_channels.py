@@ -10,7 +10,7 @@ from toolkit.effects.catalogue import effects
 LOADS = [("FX", "N"), ("FZ", "lbf"), ("MZ", "N*m"), ("T", "degC")]
 
 
-@pytest.mark.parametrize("reading", ["N", "mV/V", "count", "V", "mV", "1"])
+@pytest.mark.parametrize("reading", ["N", "mV/V", "count", "V", "mV", "1", "mA", "ohm", "pF"])
 def test_a_load_leaks_into_a_sensor_of_several_loads_in_whatever_it_is_read(reading):
     places = channel_places(effects()["crosstalk"], [("s", reading)], LOADS, set())
     assert places == [("s", "FX"), ("s", "FZ"), ("s", "MZ")]

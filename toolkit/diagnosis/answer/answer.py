@@ -107,7 +107,10 @@ class DiagnosedEffect:
     equation: str
     reference: str
     parameters: tuple[EffectEstimate, ...]
-    equivalent_to: Annotated[tuple[str, ...], Entry("effects that this recording cannot tell from it")]
+    equivalent_to: Annotated[
+        tuple[str, ...],
+        Entry("effects, last a parameter of the simulation, that this recording cannot tell from it"),
+    ]
     rejected: tuple[RejectedEffect, ...]
     evidence: EffectEvidence
 

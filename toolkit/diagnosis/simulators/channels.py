@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
 
 _FORCE_LIKE = ("force", "moment", "bridge_ratio", "count")
-# What a sensor gives for a load, in whatever it is read.
-_SIGNALS = ("ratio", "voltage", *_FORCE_LIKE)
 
 
 def channel_places(
@@ -55,7 +53,7 @@ def channel_places(
                 _both_loads(to_unit, unit)
                 or dimension(unit) == dimension(to_unit)
                 # Of several loads one is measured, in volts as well as in newtons, and the others leak.
-                or (len(loads) > 1 and source in loads and dimension(to_unit) in _SIGNALS)
+                or (len(loads) > 1 and source in loads and _is_signal(to_unit))
             )
         ]
     return [(name, None) for name, _ in outputs]
@@ -82,6 +80,12 @@ def true_inputs(
 
 def _both_loads(channel: str, source: str) -> bool:
     return dimension(channel) in _FORCE_LIKE and dimension(source) in _FORCE_LIKE
+
+
+def _is_signal(channel: str) -> bool:
+    """Tell whether a sensor gives its readings as numbers or as anything electrical."""
+    stated = dimension(channel)
+    return stated in ("ratio", "voltage", *_FORCE_LIKE) or "[current]" in stated
 
 
 def through_channels(
