@@ -18,6 +18,7 @@ and Taylor, J. Am. Stat. Assoc. 84 (1989) 881, Student's distribution for rows o
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -178,6 +179,15 @@ def matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> 
         ) * (1 - least):
             return True
     return False
+
+
+def unseen_error(problem: Problem, held_out: HeldOut) -> float:
+    """Return the logarithm of the mean square error of unseen rows, summed over the outputs."""
+    errors = (
+        problem.judged(name, observed - held_out.simulated[name])
+        for name, observed in problem.observed.items()
+    )
+    return sum(math.log(max(float(np.mean(error**2)), sys.float_info.min)) for error in errors)
 
 
 def beyond_form(problem: Problem, refitted: HeldOut, before: HeldOut, after: HeldOut, form: float) -> bool:

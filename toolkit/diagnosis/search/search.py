@@ -251,7 +251,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
-            base, held_base, steps = pruned(problem, folds, base, held_base, held_refitted, steps)
+            base, held_base, steps = pruned(problem, folds, base, held_base, held_refitted, steps, listed)
     except BudgetSpentError as error:
         skipped.append(str(error))
     base, steps = with_a_size(problem, base, steps)

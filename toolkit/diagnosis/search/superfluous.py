@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import fit, replace_effects, sizes_off
-from toolkit.diagnosis.fit.folds import beyond_form, hold_out
+from toolkit.diagnosis.fit.folds import beyond_form, hold_out, unseen_error
 from toolkit.diagnosis.policy import STEP, VERDICT
+from toolkit.diagnosis.search.forward_step import Rival, score_in_place
+from toolkit.diagnosis.search.in_place import best_in_place
 from toolkit.diagnosis.search.time_budget import BudgetSpentError
 from toolkit.diagnosis.search.wandering import may_wander, outdoes_wandering
 from toolkit.errors import FitError
@@ -20,8 +22,9 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.folds import Folds, HeldOut
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.diagnosis.search.candidates import CandidateEffect
     from toolkit.diagnosis.search.forward_step import Step
-    from toolkit.effects.applied import AppliedEffect
+    from toolkit.effects.applied import AppliedEffect, EffectKey
 
 
 def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[AppliedEffect, ...]:
@@ -35,34 +38,87 @@ def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[App
 
 
 def pruned(
-    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, refitted: HeldOut, steps: list[Step]
+    problem: Problem,
+    folds: Folds,
+    base: Fit,
+    held_base: HeldOut,
+    refitted: HeldOut,
+    steps: list[Step],
+    listed: Sequence[CandidateEffect] = (),
 ) -> tuple[Fit, HeldOut, list[Step]]:
     """Drop effects that the others make superfluous: of which too little is left to say beside them.
 
     Their held-out score is as good without, or what it takes is no more than the others' own forms are off.
+    Of two either of which does without the other, that one goes without which unseen rows are foretold best:
+    by their score, and where it hardly differs by the error of the simulation itself, for the score of a rest
+    that is nearly all wandering weighs slow errors little. What stays for both has its rivals anew.
 
     Parameters
     ----------
     refitted : the held-out rows without any effect
+    listed : candidates that may stand in the place of what stays
     """
-    for i in range(len(steps) - 1):
-        if len(base.active) < 2:
-            break
-        remaining = without(base.active, steps[i].active)
+    shorter: dict[EffectKey, tuple[Fit, HeldOut]] = {}
+    superfluous: list[HeldOut] = []
+    for step in steps if len(base.active) > 1 else ():
+        remaining = without(base.active, step.active)
+        if not remaining:
+            continue
         try:
             fewer = fit(problem, remaining, start=base.p)
             scores = hold_out(problem, folds, fewer.active, fewer)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
+        shorter[step.active.key] = fewer, scores
         form = max((applied.effect.form_error for applied in remaining), default=0.0)
         if held_base.total - scores.total < STEP.least_gain or not beyond_form(
             problem, refitted, scores, held_base, form
         ):
-            base, held_base = fewer, scores
-            keys = {applied.key for applied in remaining}
-            steps = [step for step in steps if step.active.key in keys]
-            return pruned(problem, folds, base, held_base, refitted, steps)
-    return base, held_base, steps
+            superfluous.append(scores)
+    if not superfluous:
+        return base, held_base, steps
+    near = max(scores.total for scores in superfluous) - STEP.least_gain
+    base, held_base = min(
+        ((fewer, scores) for fewer, scores in shorter.values() if scores.total > near),
+        key=lambda entry: unseen_error(problem, entry[1]),
+    )
+    fits = {applied.key: applied for applied in base.active}
+    steps = [
+        replace(
+            step,
+            rivals=_rivals(problem, base, fits[step.active.key], step, shorter.get(step.active.key), listed),
+        )
+        for step in steps
+        if step.active.key in fits
+    ]
+    return pruned(problem, folds, base, held_base, refitted, steps, listed)
+
+
+def _rivals(
+    problem: Problem,
+    base: Fit,
+    applied: AppliedEffect,
+    step: Step,
+    instead: tuple[Fit, HeldOut] | None,
+    listed: Sequence[CandidateEffect],
+) -> tuple[Rival, ...]:
+    """Return what does as well in the place of an effect, now that it stands for another too.
+
+    Parameters
+    ----------
+    instead : the fit in which the other stands for the effect
+    """
+    own = score_in_place(problem, base, applied)
+    _, chosen, others = best_in_place(problem, base, applied, listed)
+    best = next((-rival.difference for rival in others if rival.active.key == applied.key), 0.0)
+    rivals = {rival.active.key: rival for rival in step.rivals}
+    rivals |= {rival.active.key: replace(rival, difference=rival.difference + best) for rival in others} | {
+        chosen.key: Rival(active=chosen, difference=best)
+    }
+    if instead is not None:
+        other = next(each for each in instead[0].active if each.key not in {e.key for e in base.active})
+        rivals[other.key] = Rival(active=other, difference=score_in_place(problem, instead[0], other) - own)
+    return tuple(rival for key, rival in rivals.items() if key != applied.key)
 
 
 def with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
