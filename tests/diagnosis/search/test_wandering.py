@@ -1,4 +1,4 @@
-"""Bodies whose heat wanders, and bodies that a constant heat warms: what a name for a constant is worth."""
+"""Bodies whose heat wanders, that a constant heat warms, whose sensor has a zero: what a constant is worth."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from toolkit.diagnosis.search.superfluous import told_from_none
 from toolkit.diagnosis.search.wandering import may_wander, outdoes_wandering
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
+PLACES = {"constant_force": "T2", "zero_offset": "T3"}
 BETWEEN, AROUND, CAPACITY = 2.0, 0.25, 400.0  # W/K, W/K, J/K
 SENSOR, ROW, PARTS = 0.1, 10.0, 10  # K, s, steps of the plant between two rows
 WARM = """schema = 1
@@ -54,10 +55,17 @@ def outputs(x, u, p):
 """
 
 
-def warm(folder: Path, *, heat: float, stirred: float) -> tuple[Problem, Fit, Fit]:
-    """Return recorded bodies and two fits, without and with a constant heat of the middle one [K/s].
+def warm(
+    folder: Path, *, heat: float = 0.0, zero: float = 0.0, stirred: float, sought: str = "constant_force"
+) -> tuple[Problem, Fit, Fit]:
+    """Return recorded bodies and two fits, without and with a constant.
 
-    ``stirred`` is Brownian heat of every body [K/s^0.5]. The plant is carried on by its matrix exponential.
+    Parameters
+    ----------
+    heat : of the middle body [K/s]
+    zero : of the last one's thermometer [K]
+    stirred : Brownian heat of every body [K/s^0.5]; the plant is carried on by its matrix exponential
+    sought : the constant of the second fit
     """
     chain = np.array([[-1.0, 1, 0], [1, -2, 1], [0, 1, -1]]) * BETWEEN - np.eye(3) * AROUND
     step, toml, frames, t = ROW / PARTS, WARM, {}, np.arange(240) * ROW
@@ -72,13 +80,14 @@ def warm(folder: Path, *, heat: float, stirred: float) -> tuple[Problem, Fit, Fi
                 heated = power[k] + (power[k + 1] - power[k]) * (part + 0.5) / PARTS
                 x[k + 1] = carried @ x[k + 1] + np.array([heated / CAPACITY, heat, 0.0]) * step
                 x[k + 1] += stirred * np.sqrt(step) * rng.normal(size=3)
-        read = 20 + x[:, ::2] + rng.normal(0, SENSOR, (t.size, 2))
+        read = 20 + x[:, ::2] + rng.normal(0, SENSOR, (t.size, 2)) + [0.0, zero]
         frames[f"r{run}__csv"] = pd.DataFrame({"t": t, "P": power, "T1": read[:, 0], "T3": read[:, 1]})
         toml += f'[[recording.run]]\nfile = "r{run}.csv"\n'
     case = read_case(write_case(folder, toml, simulator=SIMULATOR, **frames))
     problem = problem_of(case, model_of(case, None, None))
     bare = fit(problem)
-    listed = next(each for each in candidates(problem) if each.key[:2] == ("constant_force", "T2"))
+    place = (sought, PLACES[sought], None, None)
+    listed = next(each for each in candidates(problem) if each.key == place)
     constant = replace(listed.active, values=dict(listed.starts[0].values))
     return problem, bare, fit(problem, (constant,), start=bare.p)
 
@@ -92,6 +101,16 @@ def test_a_constant_is_one_where_it_is_more_than_the_mean_of_what_wanders(
     problem, bare, made = warm(tmp_path, heat=heat, stirred=stirred)
     assert may_wander(problem, made.active[0])
     assert made.log_posterior - bare.log_posterior > 15  # to free simulations it is one each time
+    assert outdoes_wandering(problem, bare, made) is is_one
+
+
+@pytest.mark.parametrize(("zero", "stirred", "is_one"), [(0.0, 0.02, False), (0.1, 0.0, True)])
+def test_a_zero_of_a_sensor_is_one_where_it_is_more_than_what_wanders(
+    tmp_path: Path, zero: float, stirred: float, is_one: bool
+) -> None:
+    problem, bare, made = warm(tmp_path, zero=zero, stirred=stirred, sought="zero_offset")
+    assert may_wander(problem, made.active[0])
+    assert made.log_posterior - bare.log_posterior > 15
     assert outdoes_wandering(problem, bare, made) is is_one
 
 

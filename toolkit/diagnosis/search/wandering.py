@@ -1,4 +1,4 @@
-"""Whether a constant in an equation is more than the mean of a plant that wanders.
+"""Whether a constant, in an equation or beside an output, is more than the mean of a plant that wanders.
 
 What stirs a plant, or takes something from it and gives it back, has a mean over any recording, and a free
 simulation takes every row of the way that this led to for evidence of a constant. An equation that is led
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 def may_wander(problem: Problem, applied: AppliedEffect) -> bool:
-    """Tell whether an effect is a constant in an equation that can be led along its recording."""
+    """Tell whether an effect is a constant, in an equation that can be led along its recording or beside it."""
     term, moving = applied.effect.term, problem.model.capability.motion
     constant = term is not None and term.of == "nothing" and term.law is None
-    return constant and moving is not None and moving.followed is not None
+    return (constant or applied.effect.is_zero) and moving is not None and moving.followed is not None
 
 
 def outdoes_wandering(problem: Problem, bare: Fit, made: Fit) -> bool:
