@@ -1,4 +1,4 @@
-"""Bodies whose heat wanders, that a constant heat warms, whose sensor has a zero: what a constant is worth."""
+"""Bodies whose heat wanders, that a constant heats, whose sensor has a zero: what a constant is worth."""
 
 from __future__ import annotations
 

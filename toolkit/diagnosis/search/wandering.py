@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def may_wander(problem: Problem, applied: AppliedEffect) -> bool:
-    """Tell whether an effect is a constant, in an equation that can be led along its recording or beside it."""
+    """Tell whether an effect is a constant, in or beside an equation that can be led along its recording."""
     term, moving = applied.effect.term, problem.model.capability.motion
     constant = term is not None and term.of == "nothing" and term.law is None
     return (constant or applied.effect.is_zero) and moving is not None and moving.followed is not None
