@@ -208,7 +208,9 @@ class _Scatter:
     nearly: float = _set(
         0.95, "of a mean square above the sensor's", "own values take: zeros under noise of 0.99 up to 0.91"
     )
-    outdone: float = _set(0.5, "of a mean square", "left by all that was found, leave values fitted to each run")
+    outdone: float = _set(
+        0.5, "of a mean square", "left by all that was found, leave values fitted to each run"
+    )
     loudness: tuple[float, ...] = _set(tuple(2.0**k for k in range(12)), "degrees", "from twice to 2 % apart")
 
 

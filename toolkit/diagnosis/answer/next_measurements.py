@@ -116,8 +116,8 @@ def next_measurements(
         (low, _, _), (high, _, _) = search.disagreed.ends
         name = search.disagreed.name
         sentences.append(
-            f"The runs disagree about {name}: measure it by itself as it was in {low} and in {high}, and note "
-            "what else differed between them."
+            f"The runs disagree about {name}: measure it by itself as it was in {low} and in {high}, and "
+            "note what else differed between them."
         )
     elif verdict == "unknown":
         sentences += to_find_it(search)
