@@ -76,7 +76,7 @@ def test_the_distance_is_that_of_the_difference_of_two_values(tmp_path):
     case = case_of(tmp_path, rates=(1.2, 0.8, 1.0))
     problem = problem_of(case, model_of(case, None, None))
     problem = replace(problem, free=problem.free[:1])
-    own = run_parameter(problem, fit(problem), least=SCATTER.linear)
+    own = run_parameter(problem, fit(problem), least=SCATTER.halved)
     assert own is not None
     t = np.arange(ROWS) / 60
     errors = [

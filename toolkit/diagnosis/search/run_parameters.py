@@ -40,14 +40,14 @@ def with_disagreement(search: Search, held_out: HeldOut, budget: TimeBudget) -> 
         return search
     with contextlib.suppress(BudgetSpentError, FitError):
         budget.check("whether the runs agree")
-        own = run_parameter(problem, base, least=SCATTER.linear)
+        own = run_parameter(problem, base, least=SCATTER.halved)
         if own is None or not _is_apart(own, len(problem.free)):
             return search
         for name, part in parts.items():
             before, left, sensor = part.total_sd**2, own.left[name], part.sensor_sd**2
             error = (problem.observed[name] - held_out.simulated[name])[problem.kept[name]]
             takes = before - left > SCATTER.nearly * (before - sensor) > 0
-            if takes and left < SCATTER.outdone * float(np.mean(error**2)):
+            if takes and left < SCATTER.halved * float(np.mean(error**2)):
                 return replace(search, disagreed=own)
     return search
 
