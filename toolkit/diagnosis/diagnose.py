@@ -34,6 +34,7 @@ from toolkit.diagnosis.law.resembling import with_resemblances
 from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations, without_untested
 from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.parameters_alike import with_parameters_alike
+from toolkit.diagnosis.search.run_parameters import with_disagreement
 from toolkit.diagnosis.search.search import Search, search
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.simulators.averaged import MeansOf, averaged, smoothed
@@ -148,6 +149,7 @@ def _diagnosed(
                 outcome = without_untested(outcome, laws)
                 laws = with_resemblances(outcome, laws, budget)
                 outcome = with_parameters_alike(outcome)
+                outcome = with_disagreement(outcome, laws.held_out, budget)
             answer = answer_of(posed.case, outcome, laws, findings)
     except BudgetSpentError as error:
         answer = _too_late(posed.case, posed.problem, declared, findings, str(error))

@@ -204,6 +204,8 @@ class _Scatter:
     fewest: int = _set(2, "runs held out", "one alone has no scatter that could be told from a mismatch")
     least: float = _set(0.3, "sd of what a run shows of its own zero", "a smaller scatter changes no score")
     intervals: int = _set(3, "runs", "whose zeros and gains enter values and intervals; two tell no scatter")
+    nearly: float = _set(0.95, "above the sensor", "own values take; under AR(1) of 0.99 at most 0.91")
+    halved: float = _set(0.5, "of a mean square", "own values take linearly, and leave of what was left")
     loudness: tuple[float, ...] = _set(tuple(2.0**k for k in range(12)), "degrees", "from twice to 2 % apart")
 
 

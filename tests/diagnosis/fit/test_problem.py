@@ -12,12 +12,12 @@ T = np.arange(400) * 0.05
 RAMP = np.interp(T % 5.0, [0.0, 2.4, 2.5, 4.9, 5.0], [0.0, 8.0, 0.0, -8.0, 0.0])  # jumps back within two rows
 
 
-def problem_of(residual):
-    run = Run(name="r", t=T, columns={"SA": RAMP}, conditions={}, declared={}, simulated={})
+def problem_of(observed, driver=RAMP):
+    run = Run(name="r", t=T, columns={"SA": driver}, conditions={}, declared={}, simulated={})
     case = SimpleNamespace(drivers=(SimpleNamespace(name="SA", role="input"),), has_order=True)
     whole = np.ones(len(T), dtype=bool)
     return Problem(
-        case=case, model=None, runs=(run,), free=(), known={}, observed={"FY": residual}, kept={"FY": whole},
+        case=case, model=None, runs=(run,), free=(), known={}, observed={"FY": observed}, kept={"FY": whole},
         floor={"FY": 1e-6}, slices=(slice(0, len(T)),),
     )  # fmt: skip
 
@@ -37,6 +37,19 @@ def test_what_answers_a_sharp_move_is_no_outlier(noise):
     sharp = np.flatnonzero(np.abs(np.diff(RAMP)) > 3)
     noise[sharp] += 40.0
     assert without_outliers(problem_of(noise), {"FY": noise}).kept["FY"].all()
+
+
+@pytest.mark.parametrize(("missed", "left_out"), [(-3.0, []), (12.0, [120]), (-12.0, [120])])
+def test_the_row_in_which_a_heater_is_switched_lies_between_its_neighbours(missed, left_out):
+    """A block heated from row 120 on: over that row it rises by 9.8 K, and by 9.3 K over the next."""
+    noise = np.random.default_rng(3).normal(0, 0.05, len(T))
+    at = np.arange(len(T))
+    simulated = 40 + np.where(at < 120, 0.0, 200 * (1 - np.exp(-(at - 119) / 20)))
+    observed = simulated + noise
+    observed[120] += missed
+    residual = {"FY": observed - simulated}
+    kept = without_outliers(problem_of(observed, np.where(at < 120, 0.25, 0.85)), residual).kept["FY"]
+    assert np.flatnonzero(~kept).tolist() == left_out
 
 
 def readings_of(residuals, loads):

@@ -133,6 +133,21 @@ def test_of_a_constant_the_spread_is_its_noise(tmp_path):
     assert hidden(case) == ()
 
 
+@pytest.mark.parametrize(("size", "reasons"), [(0.5, [LONG]), (0.05, [])])
+def test_what_no_state_has_made_wander_as_long_as_the_runs_is_no_noise(tmp_path, size, reasons):
+    """A sensor of 0.01 N under a simulation without a state, off by 5 % of the spread in a way of each run.
+
+    Half a per cent is what simulations are off by now and then.
+    """
+    slow = np.sin(np.pi * np.arange(N) / N)
+
+    def rest(_, rng):
+        zero, bend = rng.uniform(-1, 1, 2)
+        return size * (zero + bend * slow) + rng.normal(0, 0.01, N)
+
+    assert [found.reason for found in hidden(case_of(tmp_path, rest))] == reasons
+
+
 CONSTANT = case_text(
     "python", title="A filter", parameters={"level": (2.0, "1", 0.01)}, outputs={"y": "1"}, runs=1,
 )  # fmt: skip

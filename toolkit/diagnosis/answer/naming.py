@@ -40,7 +40,8 @@ def mostly_unknown(search: Search) -> bool:
         return True
     if not search.structure or (search.steps and cut_short(search.skipped)):
         return False
-    if outsized(search):
+    # A rest that no test tells from anything (its gain is none) is no evidence that a size imitates it.
+    if outsized(search) and any(structure.gain > 0 for structure in search.structure):
         return True
     if any(removed > VERDICT.nearly * above for removed, above in shown) or _takes_more_than_is_left(search):
         return False

@@ -112,7 +112,14 @@ def next_measurements(
 ) -> tuple[str, ...]:
     """Return a sentence for each measurement that would say more than this case does."""
     sentences = [text for effect in effects if (text := parted(effect))]
-    if verdict == "unknown":
+    if search.disagreed is not None:
+        (low, _, _), (high, _, _) = search.disagreed.ends
+        name = search.disagreed.name
+        sentences.append(
+            f"The runs disagree about {name}: measure it by itself as it was in {low} and in {high}, and "
+            "note what else differed between them."
+        )
+    elif verdict == "unknown":
         sentences += to_find_it(search)
     if verdict == "unknown" or effects:
         beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))

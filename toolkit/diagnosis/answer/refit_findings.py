@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.policy import PRIORS, VERDICT
+from toolkit.diagnosis.policy import LOCATION, PRIORS, VERDICT
+from toolkit.diagnosis.search.run_parameters import errors_apart
 from toolkit.diagnosis.search.unseen_runs import unseen_errors
 from toolkit.findings import Finding
 
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
     """Return what is told of parameters at their bounds, runs that differ, and a refit that does harm."""
     return (
-        *_at_bounds(case, search), *_alike(case, search), *_scatter(case, search), *_worse(case, search),
-        *_drifting(case, search),
+        *_at_bounds(case, search), *_alike(case, search), *_scatter(case, search),
+        *_disagreed(case, search), *_worse(case, search), *_drifting(case, search),
     )  # fmt: skip
 
 
@@ -103,6 +104,24 @@ def _scatter(case: Case, search: Search) -> tuple[Finding, ...]:
             f"{100 * each.gain_sd:.2g} %, both standard deviations: values and intervals have it in them",
         )
         for each in search.scatter
+    )
+
+
+def _disagreed(case: Case, search: Search) -> tuple[Finding, ...]:
+    own = search.disagreed
+    if own is None:
+        return ()
+    unit = next(parameter.unit for parameter in search.problem.free if parameter.name == own.name)
+    listed = ", ".join(f"{run} {value:.4g}" for run, value, _ in own.values[: LOCATION.listed])
+    listed += ", ..." if len(own.values) > LOCATION.listed else ""
+    return (
+        Finding(
+            rule="runs-disagree",
+            where=f"{case.path.name}: {own.name}",
+            level="warning",
+            message=f"every run has a value of its own that fits it, and no common one fits all [{unit}]: "
+            f"{listed}; the smallest and the largest are {errors_apart(own):.2g} standard errors apart",
+        ),
     )
 
 

@@ -243,7 +243,8 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
     """Return the problem without single rows that stand far off all their neighbours.
 
     The rows are chosen once, on the residual of the refitted simulation, so that every hypothesis is
-    judged on the same rows.
+    judged on the same rows. Beside a sharp move of an input a simulation that is late by a part of a row is
+    far off in that row alone: there the recording itself has to leave the range of its neighbours.
     """
     from dataclasses import replace
 
@@ -259,9 +260,10 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
             away = values - _running_median(values)
             scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
-            far = np.abs(away) > ROWS.isolated * max(scale, steps, 1e-300)
-            if _answers(beside[counting], far):
-                far &= ~beside[counting]
+            least = ROWS.isolated * max(scale, steps, 1e-300)
+            far = np.abs(away) > least
+            alone = _outside_neighbours(problem.observed[name][places]) > least
+            far &= ~beside[counting] | (alone & (not _answers(beside[counting], far)))
             if 0 < far.sum() <= max(1, ROWS.outliers * len(places)):
                 good[places[far]] = False
         counted[name] = good
@@ -306,6 +308,13 @@ def _moved_sharply(problem: Problem, rows: slice) -> NDArray[np.bool_]:
         beside[shift:] |= sharp[:-shift]
         beside[:-shift] |= sharp[shift:]
     return beside
+
+
+def _outside_neighbours(values: Array) -> Array:
+    """Return by how much every value is outside the range of the one before and the one behind, (n,)."""
+    before, behind = values[[0, *range(len(values) - 1)]], values[[*range(1, len(values)), -1]]
+    low, high = np.minimum(before, behind), np.maximum(before, behind)
+    return np.asarray(np.maximum(np.maximum(low - values, values - high), 0.0))
 
 
 def _running_median(x: Array) -> Array:

@@ -8,6 +8,9 @@ generalised least squares beside them, and what they make a value unsure by has 
 
 A scatter is taken up only where it makes the recording likelier than the coloured noise that else holds it.
 
+A parameter may move from run to run as well: the mass of water that somebody wrote down, a clamp that was
+tightened anew. A value of its own then fits every run, and no common one does.
+
 Source: Laird and Ware, Biometrics 38 (1982) 963; Pinheiro and Bates, Mixed-Effects Models (2000), ch. 2.
 """
 
@@ -23,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.descent import Space
-from toolkit.diagnosis.fit.fit import Fit, resimulated
+from toolkit.diagnosis.fit.fit import Fit, fit, jacobian, resimulated
 from toolkit.diagnosis.fit.noise import Autoregression, fit_noise, log_likelihood, whiten
 from toolkit.diagnosis.fit.scatter_sizes import likeliest_sizes
 from toolkit.diagnosis.policy import SCATTER, VERDICT
@@ -46,6 +49,26 @@ class RunScatter:
     output: str
     zero_sd: float
     gain_sd: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunParameter:
+    """A parameter with a value of its own in every run: run, value and standard deviation [its unit].
+
+    ``left`` has the mean square that these values leave of each output [its unit squared], ``worth`` the
+    independent values of all runs beside them.
+    """
+
+    name: str
+    values: tuple[tuple[str, float, float], ...]
+    left: Mapping[str, float]
+    worth: float
+
+    @property
+    def ends(self) -> tuple[tuple[str, float, float], tuple[str, float, float]]:
+        """The runs of the smallest and of the largest value."""
+        ordered = sorted(self.values, key=lambda entry: entry[1])
+        return ordered[0], ordered[-1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +123,69 @@ def with_run_scatter(problem: Problem, made: Fit) -> tuple[Fit, tuple[RunScatter
         if zero or gain
     )
     return replace(about.made, covariance=covariance), scatter
+
+
+def run_parameter(problem: Problem, made: Fit, *, least: float) -> RunParameter | None:
+    """Return the free parameter whose own values fit the runs best, the others as in a fit; None of any.
+
+    Parameters
+    ----------
+    made : a fit without effects
+    least : share of some output's mean square that own values have to take, looked at linearly before any
+        run is fitted
+
+    Raises
+    ------
+    FitError
+        the simulation gives nothing at a run's own value
+    """
+    if len(problem.runs) < 2 or not problem.free:
+        return None
+    columns, _ = jacobian(problem, made)
+    taken = [_taken_by_own(problem, made, columns, at) for at in range(len(problem.free))]
+    best = int(np.argmax(taken))
+    if taken[best] < least:
+        return None
+    parameter = problem.free[best]
+    known = dict(zip((each.name for each in problem.free), made.p, strict=True))
+    values, worth = [], 0.0
+    squares, rows = dict.fromkeys(problem.names, 0.0), dict.fromkeys(problem.names, 0)
+    for run, place in zip(problem.runs, problem.slices, strict=True):
+        kept = {name: column[place] for name, column in problem.kept.items()}
+        if not any(map(np.any, kept.values())):
+            continue
+        alone = replace(
+            problem, runs=(run,), free=(parameter,), known=problem.known | known, kept=kept,
+            observed={name: column[place] for name, column in problem.observed.items()},
+            slices=(slice(0, run.rows),),
+        )  # fmt: skip
+        own = fit(alone, start=(made.p[best],))
+        values.append((run.name, own.p[0], math.sqrt(max(float(own.covariance[0, 0]), 0.0))))
+        for name, column in kept.items():
+            squares[name] += float(np.sum(own.residual[name][column] ** 2))
+            rows[name] += int(column.sum())
+            worth += int(column.sum()) / own.noise[name].correlation_rows
+    left = {name: square / max(rows[name], 1) for name, square in squares.items()}
+    return RunParameter(name=parameter.name, values=tuple(values), left=left, worth=worth)
+
+
+def _taken_by_own(problem: Problem, made: Fit, columns: Mapping[str, Array], at: int) -> float:
+    """Return the share of an output's mean square that own values of a parameter take, at most, linearly.
+
+    Parameters
+    ----------
+    columns : d(output)/d(parameter) of every output, (rows, parameters)
+    at : which parameter
+    """
+    shares = []
+    for name, kept in problem.kept.items():
+        left = 0.0
+        for place in problem.slices:
+            slope, rest = columns[name][place, at][kept[place]], made.residual[name][place][kept[place]]
+            left += float(rest @ rest) - float(slope @ rest) ** 2 / max(float(slope @ slope), 1e-300)
+        rest = made.residual[name][kept]
+        shares.append(1 - left / max(float(rest @ rest), 1e-300))
+    return max(shares)
 
 
 def held_out_beside_scatter(problem: Problem, folds: Folds, held_out: HeldOut) -> HeldOut:

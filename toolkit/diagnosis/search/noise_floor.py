@@ -16,7 +16,7 @@ import numpy as np
 from toolkit.diagnosis.fit.noise import Layout, draws, fit_noise
 from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts, shows_sensor, spread
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
-from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE
+from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.unexplained import StructureFound
 
 if TYPE_CHECKING:
@@ -48,9 +48,19 @@ def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tup
             found += [] if follows is None else [follows]
             # Of so few independent values nothing can be told apart from anything, noise least of all.
             few = problem.layout(name).n <= ROWS.fewest * base.noise[name].correlation_rows
-            if few and parts.total_sd > NOISE.largest * spread(problem, name):
+            if few and parts.total_sd > _least(problem) * spread(problem, name):
                 found.append(_untested(name, LONG, 0.0))
     return tuple(found)
+
+
+def _least(problem: Problem) -> float:
+    """Return the share of an output's spread from which a rest that wanders so long counts.
+
+    A plant may wander by itself: process noise. Without a state nothing wanders but the sensor, and one that
+    takes as long as the recording for it is no noise: the simulation is off, if by more than any is.
+    """
+    motion = problem.model.capability.motion
+    return NOISE.largest if motion is not None and motion.integrates else VERDICT.accuracy
 
 
 def _untested(name: str, reason: str, gain: float) -> StructureFound:

@@ -75,6 +75,11 @@ class Scored:
         return reached
 
 
+def trust_of(worth: float) -> float:
+    """Return the share of a gain that coloured series of so many independent values leave."""
+    return max(SCREENING.least_trust, 1 - SCREENING.short / max(worth, 1.0))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Weighed:
     """Rows of all outputs under one noise, with the priors beneath; what the nominal parameters span."""
@@ -257,8 +262,7 @@ class LinearisedFit:
         """
         if not self.problem.case.has_order:
             return 1.0
-        worth = sum(where.n / noise[name].correlation_rows for name, where in self.layouts.items())
-        return max(SCREENING.least_trust, 1 - SCREENING.short / max(worth, 1.0))
+        return trust_of(sum(where.n / noise[name].correlation_rows for name, where in self.layouts.items()))
 
     @property
     def _is_coloured(self) -> bool:

@@ -15,7 +15,12 @@ from toolkit.diagnosis.fit.drift import judged_by_rates
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
-from toolkit.diagnosis.fit.run_scatter import RunScatter, held_out_beside_scatter, with_run_scatter
+from toolkit.diagnosis.fit.run_scatter import (
+    RunParameter,
+    RunScatter,
+    held_out_beside_scatter,
+    with_run_scatter,
+)
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.channel_factors import leaves_noise, with_units_judged
@@ -102,7 +107,8 @@ def _with_noise(base: Fit, effect: AppliedEffect) -> tuple[AppliedEffect, ...] |
 class Search:
     """What a search has found, with the fits that show it.
 
-    ``undecided`` are the effects that the last look of all showed, confirmed by unseen rows or not.
+    ``undecided`` are the effects that the last look of all showed, confirmed by unseen rows or not;
+    ``disagreed`` is the parameter that its runs disagree about.
     """
 
     problem: Problem
@@ -120,6 +126,7 @@ class Search:
     skipped: tuple[str, ...]
     scatter: tuple[RunScatter, ...] = ()
     undecided: frozenset[str] = frozenset()
+    disagreed: RunParameter | None = None
 
     def variance(self, at: int) -> float:
         """Return the variance of a parameter of the augmented fit, by its place among them.
