@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
 from toolkit.audit.sides import disputed
+from toolkit.calibration.registry.standing import overtaken
 from toolkit.declared import Entry, derived
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.files import check_keys, parse_json, real_path
@@ -67,7 +68,7 @@ class RestingReport:
         Fy and Mz stand in the files; any other is taken to rest on these.
         """
         if self.id is not None:
-            return bool(self.in_force) and set(self.calibrations) != self.in_force
+            return bool(self.in_force) and overtaken(self.calibrations, self.in_force)
         return self.not_clean > 0
 
 

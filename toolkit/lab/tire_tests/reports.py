@@ -276,7 +276,10 @@ def _job(
     if options.issuing is not None:
         decided = options.issuing.registry.ledger(instrument_of(content.calibrations[0].id)).decided
         content = options.issuing.content(content)
-        issue = options.issuing.issue(content, document=f"report {content.identity}", decided=decided)
+        issue = options.issuing.issue(
+            content, document=f"report {content.identity}", decided=decided,
+            tested=resolved.result.reduced.info.date,
+        )  # fmt: skip
     return Job(
         issue=issue,
         template=options.template,
