@@ -153,6 +153,7 @@ _FORMS = LineForms()
 _DAMAGE = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 _DECIDING = frozenset(("approved", "withdrawn", "discarded"))
 BRINGING = ("entered", "enrolled")  # events with files of their own
+ENDING = ("withdrawn", "discarded")  # events that end a record, and can always be entered
 
 
 @dataclass(frozen=True, kw_only=True)
