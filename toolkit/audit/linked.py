@@ -21,6 +21,7 @@ from toolkit.calibration.registry.standing import overtaken
 from toolkit.declared import Entry, derived
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.files import check_keys, parse_json, real_path
+from toolkit.findings import Finding
 from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
 from toolkit.publication import ENTERING, PENDING, settle
 from toolkit.recording.csvfile import read_lines
@@ -84,8 +85,17 @@ class Linked:
         return [report.report for report in self.reports if test in report.tests]
 
 
-def read_reports(source: Path) -> tuple[RestingReport, ...]:
+def unread_folder(where: str, error: OSError) -> Finding:
+    """Return what is said of a folder that cannot be read, or that is gone by the time that it is."""
+    reason = error.strerror or "an error"
+    message = f"the folder cannot be read, and nothing in it was looked at: {reason}"
+    return Finding(rule="unreadable-folder", where=where, message=message)
+
+
+def read_reports(source: Path, unread: list[Finding]) -> tuple[RestingReport, ...]:
     """Return the reports that a folder holds, or a CSV file names; no link is followed.
+
+    ``unread`` takes what is said of folders that cannot be read.
 
     Raises
     ------
@@ -93,7 +103,7 @@ def read_reports(source: Path) -> tuple[RestingReport, ...]:
         there is no such folder or file, or the CSV file has other columns or a hash that is none
     """
     if source.is_dir():
-        return tuple(_of_folder(source))
+        return tuple(_of_folder(source, unread))
     return tuple(_of_csv(source))
 
 
@@ -193,11 +203,18 @@ def _of_csv(source: Path) -> Iterator[RestingReport]:
     yield from past_reports.values()
 
 
-def _of_folder(folder: Path) -> Iterator[RestingReport]:
-    for place, folders, names in os.walk(folder):
+def _of_folder(folder: Path, unread: list[Finding]) -> Iterator[RestingReport]:
+    def tell(error: OSError) -> None:
+        unread.append(unread_folder(str(error.filename or folder), error))
+
+    for place, folders, names in os.walk(folder, onerror=tell):
         if {PENDING, ENTERING} & {*folders}:
-            settle(Path(place))
-            names = [path.name for path in Path(place).iterdir() if path.is_file()]
+            try:
+                settle(Path(place))
+                names = [path.name for path in Path(place).iterdir() if path.is_file()]
+            except OSError as error:
+                tell(error)
+                continue
         folders[:] = sorted(
             name for name in folders if not name.startswith(PASSING) and not (Path(place) / name).is_symlink()
         )

@@ -122,8 +122,8 @@ def misplaced(ledger: Ledger, instrument: str) -> str | None:
 def disorder(ledger: Ledger) -> str | None:
     """Say which line's time lies before that of the one before it; None where none does.
 
-    A line that ends a record may: it can always be entered, after a line of a clock that was fast too, and the
-    lines after it follow its time. That a document was issued decides nothing, and its time bounds no decision.
+    A line that ends a record may: it can always be entered, after a line of a clock that was fast too, and
+    the lines after it follow its time. That a document was issued decides nothing, and its time bounds none.
     """
     last: Entry | None = None
     for entry in ledger.entries:

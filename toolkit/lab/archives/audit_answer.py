@@ -130,6 +130,7 @@ class AuditAnswer(TypedDict):
 
 
 _SHOWN, _SETTINGS, _PATH = 40, 10, 40
+_TROUBLES = ("unreadable-folder", "registry-damaged", "ledger-time")  # what no row of a file can tell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -232,6 +233,12 @@ def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
     lines += [one_line(f"{count} files: {message}") for message, count in settings.most_common(_SETTINGS)]
     if len(settings) > _SETTINGS:
         lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
+    troubles = [f"{f.where}: {f.message}" for f in audit.findings if f.rule in _TROUBLES]
+    lines += [one_line(text) for text in troubles[:_SETTINGS]]
+    if len(troubles) > _SETTINGS:
+        lines.append(
+            f"... and {len(troubles) - _SETTINGS} more of folders and ledgers; --json tells all of them"
+        )
     lines += [f"refused record {record.id}: {record.reason}" for record in audit.refused]
     lines += [f"head of {name}: {head}" for name, head in audit.heads]
     return "\n".join([*lines, *_asked(answer, width)])
