@@ -181,7 +181,7 @@ def _of_file(line: Mapping[str, Any]) -> list[Finding]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inventory:
-    """Paths of an archive's files, relative to it, with ``/``, sorted; ``unread`` tells of its other folders."""
+    """Paths of an archive's files, relative to it, with ``/``, sorted; ``unread`` tells of other folders."""
 
     files: tuple[str, ...]
     unread: tuple[Finding, ...]

@@ -322,7 +322,7 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
         )
         for amended in answer.amended:
             pdf = amended.as_dict()["pdf"]
-            yield f"{pdf or 'NO REPORT: ' + str(amended.outcome)} replaces {amended.replaces}"
+            yield one_line(f"{pdf or f'NO REPORT: {amended.outcome}'} replaces {amended.replaces}")
 
 
 def _rows(audit: ArchiveAudit) -> Iterator[list[str]]:

@@ -20,6 +20,7 @@ from toolkit.declared.answers import merged
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import parse_json, sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
+from toolkit.lab.answers import one_line
 from toolkit.lab.signatures.proofs import (
     PROOF,
     TESTED,
@@ -89,7 +90,7 @@ class Verdict:
         if self.still_holds and _UNPROVED in self.why:
             holds = "the records that it names still hold"
         parts = [f"{self.signature.upper():<9} {self.kind}", issued, holds, self.why]
-        return f"{self.file}: " + "; ".join(part for part in parts if part)
+        return one_line(f"{self.file}: " + "; ".join(part for part in parts if part))
 
 
 class VerifyAnswer(TypedDict):

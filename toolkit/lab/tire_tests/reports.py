@@ -23,6 +23,7 @@ from toolkit.lab.answers import (
     finding_lines,
     mark_words,
     needs_attention,
+    one_line,
 )
 
 if TYPE_CHECKING:
@@ -337,7 +338,7 @@ def report_text(report: MadeReport) -> str:
     """Return a report for people: its files, what was verified, its findings."""
     resolved, delivered = report.resolved, report.outcome
     if resolved is None or isinstance(delivered, Exception):
-        return f"{report.test}: no report\n{delivered}"
+        return f"{one_line(report.test)}: no report\n{delivered}"
     use = resolved.result.reduced.calibration
     marks = (
         ("  SIMULATED" if resolved.result.reduced.info.simulated else "")
@@ -346,7 +347,7 @@ def report_text(report: MadeReport) -> str:
     )
     lines = [
         *(
-            f"{path}"
+            one_line(path)
             for path in (delivered.pdf, delivered.docx, delivered.manifest, *delivered.extras)
             if path is not None
         ),
