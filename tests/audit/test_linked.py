@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests import commands
 from tests.audit.archive_made import FY, dated, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.linked import RestingReport, link, read_reports
@@ -146,3 +147,28 @@ def test_what_is_to_be_amended(identity, calibrations, not_clean, amend):
         report="R", id=identity, calibrations=calibrations, not_clean=not_clean, in_force={"m15-r2"}
     )
     assert one.to_amend is amend
+
+
+def test_an_archive_and_a_folder_of_reports_that_are_the_test_itself_are_called_by_their_names(
+    tmp_path, monkeypatch
+):
+    test, out = tmp_path / "tire C", tmp_path / "report of tire C"
+    for folder in (test, out):
+        folder.mkdir()
+    dated(test, "2019-06-01")
+    written = test / "one.xlsx"
+    write(written, recording(seed=7))
+    manifest = {
+        "generator": "toolkit", "schema": 1, "report": "T-18",
+        "inputs": [{"name": "a", "sha256": sha256_file(written)}],
+        "calibrations": [{"id": "m15-r1", "sha256": "0" * 64}], "outputs": [],
+    }  # fmt: skip
+    (out / "manifest.json").write_text(json.dumps(manifest))
+    (tmp_path / "none").mkdir()
+    monkeypatch.chdir(test)
+    _, said, _ = commands.said(
+        "audit", ".", "--reports", "../report of tire C", "--calibrations", CALIBRATIONS
+    )
+    assert "report report of tire C (tire C): to be amended" in said
+    _, said, _ = commands.said("audit", ".", "--reports", "../none", "--calibrations", CALIBRATIONS)
+    assert "report unknown: 1 test, tire C" in said

@@ -262,6 +262,10 @@ class ArchiveAudit:
     findings: tuple[Finding, ...]
     reused: int = field(compare=False)
 
+    def shown(self, test: str) -> str:
+        """Return a test's path as people read it: an archive that is one test has its folder's name."""
+        return self.archive.absolute().name if test == "." else test
+
     @property
     def clean(self) -> bool:
         """Whether every file is exact or rounding and nothing else asks for a person's attention."""

@@ -133,7 +133,7 @@ def link(audit: ArchiveAudit, reports: tuple[RestingReport, ...]) -> Linked:
                 same_report.disputed += disputed(plain)
     names: dict[str, list[str]] = {}
     for test in tests:
-        names.setdefault(_words(_last(test, audit.archive)), []).append(test)
+        names.setdefault(_words(audit.shown(test).rpartition("/")[2]), []).append(test)
     for report in reports:
         for test in _by_name(report, names):
             report.tests.add(test)
@@ -169,10 +169,6 @@ def _by_name(past_report: RestingReport, names: Mapping[str, list[str]]) -> Iter
             # Tests of the same name in different folders: those whose folders are named too, if any are.
             inside = [test for test in tests if set(_words(test).split()) <= set(text.split())]
             yield from inside or tests
-
-
-def _last(test: str, archive: Path) -> str:
-    return archive.absolute().name if test == "." else test.rpartition("/")[2]
 
 
 def _words(text: str) -> str:
@@ -245,7 +241,9 @@ def _manifest(path: Path, folder: Path) -> tuple[RestingReport, set[str]] | None
         return None
     outputs = {output.get("name") for output in _dicts(manifest.get("outputs"))}
     past_report = RestingReport(
-        report=path.parent.relative_to(folder).as_posix(),
+        report=folder.absolute().name
+        if path.parent == folder
+        else path.parent.relative_to(folder).as_posix(),
         id=str(manifest.get("report")),
         hashes={
             entry["sha256"].lower() for entry in _dicts(manifest["inputs"]) if _is_sha(entry.get("sha256"))

@@ -18,7 +18,7 @@ from toolkit.calibration.registry.registry import RefusedRecord, Registry
 from toolkit.calibration.registry.standing import approved_after
 from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import ErrorEntry, one_line, table
+from toolkit.lab.answers import ErrorEntry, counted, one_line, table
 from toolkit.lab.archives.audit_headline import Headline, headline
 
 if TYPE_CHECKING:
@@ -284,7 +284,7 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
             why = why if report.to_amend else "stands"
             if report.disputed:
                 why += f"; in {report.disputed} of {report.files} files the cells are changed, or may be"
-            tests = ", ".join(sorted(report.tests))
+            tests = ", ".join(answer.made.shown(test) for test in sorted(report.tests))
             yield one_line(
                 f"report {report.report} ({tests}): {why}"
                 if report.files
@@ -292,7 +292,8 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
             )
         if answer.linked.unknown:
             unknown = answer.linked.unknown
-            yield one_line(f"report unknown: {len(unknown)} tests, {', '.join(unknown[:10])}")
+            first = ", ".join(answer.made.shown(test) for test in unknown[:10])
+            yield one_line(f"report unknown: {counted(len(unknown), 'test')}, {first}")
     if answer.drift is not None:
         drift = answer.drift
         yield ""
