@@ -107,7 +107,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
     amended: tuple[Amended, ...] = ()
     if order.repair is not None and linked is not None:
         with stage(None, "amended reports") as step:
-            amended = amend(linked, order.archive, order.repair, order.basis, step=step)
+            amended = amend(linked, results, order.repair, order.basis, step=step)
     answer = AuditOutcome(
         made=results,
         linked=linked,
