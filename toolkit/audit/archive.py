@@ -14,9 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from toolkit.audit.archive_findings import Across, Lines
+from toolkit.audit.archive_findings import Across, Lines, unread_folder
 from toolkit.audit.cluster import run_on_cluster
-from toolkit.audit.linked import unread_folder
 from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED, TELLS, DisagreeingSides, Grade
 from toolkit.audit.one_file import Auditor, unreadable
 from toolkit.audit.other_files import by_other_files

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from toolkit.audit.archive_findings import unread_folder
 from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
 from toolkit.audit.sides import disputed
 from toolkit.calibration.registry.standing import overtaken
@@ -83,13 +84,6 @@ class Linked:
     def of_test(self, test: str | None) -> list[str]:
         """Return the reports that rest on a test."""
         return [report.report for report in self.reports if test in report.tests]
-
-
-def unread_folder(where: str, error: OSError) -> Finding:
-    """Return what is said of a folder that cannot be read, or that is gone by the time that it is."""
-    reason = error.strerror or "an error"
-    message = f"the folder cannot be read, and nothing in it was looked at: {reason}"
-    return Finding(rule="unreadable-folder", where=where, message=message)
 
 
 def read_reports(source: Path, unread: list[Finding]) -> tuple[RestingReport, ...]:
