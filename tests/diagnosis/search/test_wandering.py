@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +24,7 @@ from toolkit.diagnosis.search.superfluous import told_from_none
 from toolkit.diagnosis.search.wandering import may_wander, outdoes_wandering
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
+Warmed = Callable[[float, float], tuple[Problem, Fit, Fit]]
 BETWEEN, AROUND, CAPACITY = 2.0, 0.25, 400.0  # W/K, W/K, J/K
 SENSOR, ROW, PARTS = 0.1, 10.0, 10  # K, s, steps of the plant between two rows
 WARM = """schema = 1
@@ -52,6 +55,14 @@ def rhs(t, x, u, p):
 def outputs(x, u, p):
     return {"T1": x[0], "T3": x[2]}
 """
+
+
+@pytest.fixture(scope="module")
+def warmed(tmp_path_factory: pytest.TempPathFactory) -> Warmed:
+    """Return what `warm` does for a heat and a stirring, recorded and fitted once."""
+    return functools.cache(
+        lambda heat, stirred: warm(tmp_path_factory.mktemp("warm"), heat=heat, stirred=stirred)
+    )
 
 
 def warm(folder: Path, *, heat: float, stirred: float) -> tuple[Problem, Fit, Fit]:
@@ -87,9 +98,9 @@ def warm(folder: Path, *, heat: float, stirred: float) -> tuple[Problem, Fit, Fi
     ("heat", "stirred", "is_one"), [(0.0, 0.02, False), (0.0015, 0.0, True), (0.01, 0.01, True)]
 )
 def test_a_constant_is_one_where_it_is_more_than_the_mean_of_what_wanders(
-    tmp_path: Path, heat: float, stirred: float, is_one: bool
+    warmed: Warmed, heat: float, stirred: float, is_one: bool
 ) -> None:
-    problem, bare, made = warm(tmp_path, heat=heat, stirred=stirred)
+    problem, bare, made = warmed(heat, stirred)
     assert may_wander(problem, made.active[0])
     assert made.log_posterior - bare.log_posterior > 15  # to free simulations it is one each time
     assert outdoes_wandering(problem, bare, made) is is_one
@@ -97,9 +108,9 @@ def test_a_constant_is_one_where_it_is_more_than_the_mean_of_what_wanders(
 
 @pytest.mark.parametrize(("heat", "stirred", "named"), [(0.0, 0.02, 0), (0.0015, 0.0, 1)])
 def test_the_mean_of_what_wanders_is_no_step_and_no_name(
-    tmp_path: Path, heat: float, stirred: float, named: int
+    warmed: Warmed, heat: float, stirred: float, named: int
 ) -> None:
-    problem, bare, made = warm(tmp_path, heat=heat, stirred=stirred)
+    problem, bare, made = warmed(heat, stirred)
     folds = folds_of(problem, bare)
     before, unseen = hold_out(problem, folds, (), bare), hold_out(problem, folds, made.active, made)
     steps = [Step(active=made.active[0], p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=())]
