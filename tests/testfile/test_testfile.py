@@ -292,9 +292,14 @@ def test_any_changed_cell_of_any_sheet_is_an_edit(tmp_path: Path, made: Made) ->
         series=tuple(dataclasses.replace(s, values=s.values[:5]) for s in made[1][one].series),
     )
     finding = Finding(rule="no-tare", where="here", message="a text")
+    # A cell of each kind of every sheet: of a few rows as of all.
+    reduced = dataclasses.replace(made[0].reduced, conditions=made[0].reduced.conditions[:3])
     few = dataclasses.replace(
         made[0],
-        characteristics=dataclasses.replace(made[0].characteristics, findings=(finding,)),
+        reduced=reduced,
+        characteristics=dataclasses.replace(
+            made[0].characteristics, rows=made[0].characteristics.rows[:3], findings=(finding,)
+        ),
     )
     source, path = tmp_path / "source.xlsx", tmp_path / "edited.xlsx"
     write_test_file(source, few, {one: short})
