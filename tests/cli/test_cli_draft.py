@@ -121,7 +121,7 @@ def test_a_draft_says_so_in_answer_and_file_and_stays_one(
     assert all(sheet.oddHeader.center.text.startswith("DRAFT") for sheet in book)
     assert book.properties.title.startswith("DRAFT: ")
     tire = tmp_path / "tire.tir"
-    code, answer = toolkit(home, "fit", draft_file, "--draft", "--model", "mf52", "--tir", tire)
+    code, answer = toolkit(home, "fit", draft_file, "--draft", "--model", "mf61", "--tir", tire)
     assert (code, answer["draft"], answer["calibration"]["id"]) == (1, True, REFUSED)
     assert "failed gates sign" in answer["draft_reasons"][0]
     assert f"! DRAFT, NOT APPROVED: {REFUSED}" in tire.read_text()
