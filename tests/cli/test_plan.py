@@ -20,6 +20,7 @@ from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 from toolkit.lab.plans import protocol_plan
 from toolkit.planning import protocol_plan as planning
+from toolkit.planning import protocol_search
 from toolkit.planning.sweep_search import least_sweeps
 
 ROOT = Path(toolkit.__file__).resolve().parents[1]
@@ -35,6 +36,12 @@ def run(tmp_path, monkeypatch):
 
 NEAR = LOADS[1:4]
 """Loads of the earlier test about that which is asked for: further ones are tried alike, and take as long."""
+
+
+@pytest.fixture(autouse=True)
+def few_starts(monkeypatch):
+    """A plan is a little longer at most: `test_protocol_search.py` has the exchange from all its starts."""
+    monkeypatch.setattr(protocol_search, "_STARTS", 2)
 
 
 @pytest.fixture
