@@ -94,6 +94,7 @@ def plan_test(
     demands = tuple(dict.fromkeys(parse_demand(text) for text in order.demands or DEMANDS))
     labels = [demand.label for demand in demands]
     _refuse_doubled(labels, where="--u", what="a characteristic has two demands")
+    _refuse_doubled([str(like) for like in order.like], where="--like", what="a tire is named twice")
     _refuse_endless(order)
     _refuse_before_a_test(order, demands)
     tell("the earlier test")
@@ -154,7 +155,6 @@ def _tires(
     known = [_earlier(order, like) for like in order.like or (None,)]
     if not order.like and not order.spread:
         spread = PASSENGER
-    _refuse_doubled([earlier.tire for earlier, _, _ in known], where="--like", what="a tire is named twice")
     tires = tuple(member for earlier, _, _ in known for member in members(earlier, spread))
     machines = list(dict.fromkeys(earlier.machine.name for earlier in tires))
     if len(machines) > 1 or not shared_loads(tires):
