@@ -73,7 +73,7 @@ def test_nothing_is_searched_beyond_certainty(search: RunSearch) -> None:
 def test_of_runs_that_part_with_certainty_the_nearest_to_the_recording_counts(
     search: RunSearch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Evidence that grows with the pace, and all of it beyond certainty: a search for the most ends at the fastest.
+    # Evidence grows with the pace, all of it beyond certainty: the most of it is at the fastest.
     monkeypatch.setattr(
         next_run, "expected_log_evidence", lambda run, *_: 1e3 * fastest(T, run.columns["u"]) ** 4
     )

@@ -363,7 +363,7 @@ def _nothing_parts(chosen: NextRun, effect: DiagnosedEffect, *, complete: bool) 
     from toolkit.diagnosis.answer.next_measurements import apart
     from toolkit.diagnosis.policy import VERDICT
 
-    most = max(gain for _, _, gain in chosen.pairs)
+    most = max(0.0, *(gain for _, _, gain in chosen.pairs))
     longer = "" if complete else "search longer with --budget, "
     return ConfigError(
         "no run within the limits parts the class", where="--limit, --rate",
