@@ -190,7 +190,7 @@ def outputs(x, u, p):
 
 @pytest.mark.parametrize(("scatter", "reasons"), [(0.06, [LONG]), (0.0, [])])
 def test_an_arc_as_long_as_every_run_is_not_known_to_be_noise(tmp_path, scatter, reasons):
-    """Coast-downs under a wind that is another one each time leave arcs of both signs, far above the sensor."""
+    """Coast-downs under another wind each time leave arcs of both signs, far above the sensor."""
     t = np.arange(200) * 0.1
     frames = {}
     for run, wind in enumerate((-1, 0.2, 1)):

@@ -55,9 +55,9 @@ def _is_untestable(problem: Problem, base: Fit, name: str, parts: ChannelNoise) 
     """Tell whether a rest has too few independent values to be told from anything, and matters.
 
     Without a state nothing wanders but the sensor, and one that takes as long as the whole recording is no
-    noise: the simulation is off, if by more than any is. What an equation lacks shows integrated, as an arc as
-    long as a run, however many runs there are: a plant may wander so by itself, but nothing shows that it does
-    where the arcs are far above the sensor's noise.
+    noise: the simulation is off, if by more than any is. What an equation lacks shows integrated, as an arc
+    as long as a run, however many runs there are: a plant may wander so by itself, but nothing shows that it
+    does where the arcs are far above the sensor's noise.
     """
     motion, least = problem.model.capability.motion, VERDICT.accuracy * spread(problem, name)
     rows = problem.layout(name).n
