@@ -246,9 +246,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
                 break
             both = None
             try:
-                check = partial(
-                    budget.check, f"step {turn + 1}: pairs of candidates", reserve=BUDGET.laws
-                )
+                check = partial(budget.check, f"step {turn + 1}: pairs of candidates", reserve=BUDGET.laws)
                 both = best_pair(problem, folds, base, held_base, screen, paired, share, check)
             except BudgetSpentError as error:  # what came before, and laws, need no pair
                 skipped.append(str(error))

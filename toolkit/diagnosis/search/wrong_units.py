@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,8 +108,10 @@ def _free_factors(
                 error = left(log_factor, made, least)
                 best, least, begun = (log_factor, error, made) if error < least else (best, least, begun)
         # A joint fit goes on from there: it asks for no more digits than tell one ratio from another.
-        ends, options = (best - step, best + step), {"maxiter": UNITS.steps, "xatol": UNITS.told}
-        nearer = minimize_scalar(left, bounds=ends, args=(begun,), method="bounded", options=options)
+        nearer = minimize_scalar(
+            partial(left, made=begun), bounds=(best - step, best + step), method="bounded",
+            options={"maxiter": UNITS.steps, "xatol": UNITS.told},
+        )  # fmt: skip
         if nearer.fun < most:
             applied = free_factor(place, math.exp(nearer.x))
             values = dict(applied.values)
