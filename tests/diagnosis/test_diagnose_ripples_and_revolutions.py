@@ -8,6 +8,8 @@ from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from tests.diagnosis.tire_case import SIGNS, SIMULATOR, sweep, toml
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
@@ -116,6 +118,22 @@ def test_linear_responses_of_an_equation_are_its_simulations_for_a_small_force(t
         moved_by = (model.simulate(run, p, (ripple,))["TH"] - plain) / 1e-3
         # Where the motion passes a period within a row the trapezoid is coarse: a tenth of the largest.
         np.testing.assert_allclose(linear[:, column], moved_by, atol=0.1 * np.abs(moved_by).max())
+
+
+def test_rows_at_rest_ask_for_no_shorter_ripple(tmp_path):
+    from_rest = PENDULUM.replace("[0.3, 0.0]", "[0.0, 0.0]")
+    moves = 3 * np.sin(2.2 * np.arange(150) * 0.04)
+    periods = []
+    for rest in (0, 200):
+        torque = np.concatenate([np.zeros(rest), moves])
+        rows = pd.DataFrame({"t": np.arange(torque.size) * 0.04, "M": torque, "TH": 0.0 * torque})
+        folder = tmp_path / str(rest)
+        folder.mkdir()
+        case = read_case(write_case(folder, SWINGS, simulator=from_rest, r0__csv=rows))
+        problem = problem_of(case, model_of(case, None, None))
+        starts = effects()["periodic_ripple"].parameters[1].start_values
+        periods.append(min(starts(CaseView(problem, "om", None))))
+    assert periods[0] < periods[1] * 1.05
 
 
 def test_a_channel_that_is_saturated_shows_nothing_of_a_small_force(tmp_path):

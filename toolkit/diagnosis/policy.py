@@ -22,6 +22,7 @@ class _Budget:
 
     quick_s: float = _set(2.0, "s of one simulation", "a slower one is not run twice to see that it repeats")
     alarm_s: float = _set(0.5, "s after its end", "a worker that is late is told by itself before the alarm")
+    laws: float = _set(1 / 3, "of the budget", "kept for laws, which come after pairs and are seldom dearer")
     grace: float = _set(0.25, "of the budget", "left for predictions after a search that has spent all of it")
 
 
@@ -314,9 +315,7 @@ class _Pairs:
     fitted: int = _set(4, "pairs", "fitted jointly, of those that are ranked first")
     judged: int = _set(2, "pairs", "held out one after the other, the best first")
     least: float = _set(
-        0.2,
-        "of an output's held-out mean square",
-        "false names on simulations a little wrong took up to 14 %",
+        0.2, "of an output's held-out mean square", "false names on simulations a little wrong took 14 %"
     )
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -18,7 +20,7 @@ from toolkit.declared import json_value
 from toolkit.diagnosis.answer.reader import read_answer
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose as diagnose_case
-from toolkit.diagnosis.search import search
+from toolkit.diagnosis.search import search, time_budget
 
 SIMULATOR = """
 def simulate(inputs, p):
@@ -201,3 +203,26 @@ def test_of_noise_no_law_is_learned(tmp_path):
     assert answer["verdict"] == "nothing"
     assert answer["laws"] == []
     assert answer["fit"]["held_out"][0]["with_laws_rmse"] is None
+
+
+@pytest.mark.parametrize(("spent", "skipped"), [(0.5, ()), (0.8, ("step 1: pairs of candidates",))])
+def test_laws_are_learned_though_the_time_of_pairs_is_over(monkeypatch, tmp_path, spent, skipped):
+    """What explains the most here is a law, and pairs before it may be as dear as all single effects."""
+    begun: list[float] = []
+
+    def tell(step: str) -> None:
+        if step == "step 1: unseen runs":
+            begun.append(spent * 600.0)
+
+    def pairs(*arguments: object) -> None:
+        assert callable(arguments[-1])
+        arguments[-1]()
+
+    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + sum(begun))
+    monkeypatch.setattr(time_budget, "time", clock)
+    monkeypatch.setattr(search, "candidates", lambda _: ())
+    monkeypatch.setattr(search, "best_pair", pairs)
+    path = written(tmp_path, lambda r, _: r.F * (1 + 0.15 * np.exp(-(((r["T"] - 28) / 3) ** 2))), T)
+    answer = diagnose_case(read_case(path), None, budget_s=600.0, tell=tell).diagnosis
+    assert (answer.skipped, answer.complete) == (skipped, not skipped)
+    assert [(law.form, law.variables) for law in answer.laws] == [("static", ("T",))]

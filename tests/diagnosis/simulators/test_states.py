@@ -10,7 +10,13 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.case_code import running
 from toolkit.diagnosis.simulators.simulator import Output
-from toolkit.diagnosis.simulators.states import declared_dimensions, dimensions, fitting, shown_alone
+from toolkit.diagnosis.simulators.states import (
+    declared_dimensions,
+    dimensions,
+    fitting,
+    shown_alone,
+    usual_step,
+)
 from toolkit.effects.catalogue import effects
 
 FRICTION = ("coulomb_friction", "viscous_damping", "quadratic_drag")
@@ -115,3 +121,20 @@ def test_a_state_that_an_output_of_its_name_shows_in_another_unit_keeps_its_own(
     case = read_case(write_case(tmp_path, IN_MILLIMETRES, simulator=spring, r0__csv=frame, r1__csv=frame))
     with running(case, None):
         assert model_of(case, None, None).capability.motion.units("v") == units
+
+
+def test_the_usual_step_is_that_of_the_motion_however_many_rows_stand_still():
+    # A way of 2 at 0.02 from row to row, and a carriage that creeps by 1e-6 for nine times as many rows.
+    moving, resting = np.arange(101) * 0.02, 2.0 + np.arange(900) * 1e-6
+    assert usual_step([np.concatenate([moving, resting])]) == pytest.approx(0.02)
+    assert usual_step([resting, moving]) == pytest.approx(0.02)
+
+
+def test_half_of_a_way_is_made_in_shorter_steps_than_the_usual_one():
+    # x = t^2: half of the way to t = 1 is made by t = 1/sqrt(2), where dx/dt = 2 t.
+    t = np.linspace(0.0, 1.0, 2001)
+    assert usual_step([t**2]) == pytest.approx(np.sqrt(2.0) * (t[1] - t[0]), rel=1e-3)
+
+
+def test_what_never_moves_has_no_usual_step():
+    assert usual_step([np.full(5, 3.0), np.ones(1)]) == usual_step([]) == 0.0

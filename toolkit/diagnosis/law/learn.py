@@ -89,9 +89,9 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
     structure = search.structure_before if withdrawn and search.steps else search.structure
     outputs = _outputs(search.problem, base, structure)
     listed: list[Law] = []
-    complete = not search.skipped
+    complete = True
     try:
-        for turn in range(LAWS.most if complete else 0):
+        for turn in range(LAWS.most):
             if not outputs:
                 break
             budget.check(f"laws of what has no name: {turn + 1}")

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,15 +97,18 @@ def best_pair(
     screen: LinearisedFit,
     scored: Sequence[Scored],
     least: float,
+    check: Callable[[], None],
 ) -> tuple[Fit, HeldOut, tuple[Step, Step]] | None:
     """Return the first pair that stands on what it has not seen, None where none does.
 
     Parameters
     ----------
     least : share of an output's held-out mean square that the two must take away
+    check : called before every pair is fitted, and before one is held out
     """
     fitted: list[tuple[Pair, Fit]] = []
     for pair in _of_different_effects(ranked_pairs(screen, scored))[: PAIRS.fitted]:
+        check()
         members = _reached(screen, pair)
         joint = None if members is None else joint_fit(problem, base, members)
         if joint is None or only_bends(problem, joint):
@@ -118,6 +121,7 @@ def best_pair(
         p_value = pair.p_value(2 * (joint.log_posterior - base.log_posterior))
         if p_value >= SCREENING.alpha:
             continue
+        check()
         try:
             held_out = hold_out(problem, folds, joint.active, joint)
         except FitError:

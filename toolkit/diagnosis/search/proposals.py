@@ -25,7 +25,7 @@ from toolkit.diagnosis.search.screen import Scored
 from toolkit.diagnosis.search.unexplained import StructureFound
 from toolkit.diagnosis.simulators.following import PARAMETER_STEP
 from toolkit.diagnosis.simulators.simulator import Following, TermPattern
-from toolkit.diagnosis.simulators.states import way_of
+from toolkit.diagnosis.simulators.states import usual_step, way_of
 from toolkit.effects.law import ITSELF, POSITION, TIME
 from toolkit.errors import FitError
 
@@ -249,8 +249,7 @@ class _FollowedView(CaseView):
             return super().way
         place = self._followed.states[names.index(position)]
         runs = [place[rows] for rows in self._problem.slices if rows.stop > rows.start]
-        steps = np.concatenate([np.abs(np.diff(run)) for run in runs])
-        return max(float(np.ptp(run)) for run in runs), float(np.median(steps)) if len(steps) else 0.0
+        return max(float(np.ptp(run)) for run in runs), usual_step(runs)
 
 
 class _PredictionErrors:

@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +22,7 @@ from toolkit.diagnosis.fit.run_scatter import (
     held_out_beside_scatter,
     with_run_scatter,
 )
-from toolkit.diagnosis.policy import STEP, VERDICT
+from toolkit.diagnosis.policy import BUDGET, STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.channel_factors import leaves_noise, with_units_judged
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
@@ -243,8 +244,12 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
             # Of a residual without structure no two effects explain what no single one does.
             if not structure or turn + 2 > STEP.most_effects:
                 break
-            budget.check(f"step {turn + 1}: pairs of candidates")
-            both = best_pair(problem, folds, base, held_base, screen, paired, share)
+            both = None
+            try:
+                check = partial(budget.check, f"step {turn + 1}: pairs of candidates", reserve=BUDGET.laws)
+                both = best_pair(problem, folds, base, held_base, screen, paired, share, check)
+            except BudgetSpentError as error:  # what came before, and laws, need no pair
+                skipped.append(str(error))
             if both is None:
                 break
             base, held_base, pair = both

@@ -26,6 +26,7 @@ class TimeBudget:
     """
 
     def __init__(self, budget_s: float, tell: Callable[[str], None], *, alarm: bool = True) -> None:
+        self._whole_s = budget_s
         self.until = time.monotonic() + budget_s
         self.step = "the simulation as declared"
         self.last_s = 0.0
@@ -36,9 +37,12 @@ class TimeBudget:
         self.step = step
         self._tell(step)
 
-    def check(self, step: str) -> None:
-        """Tell the step that comes next; BudgetSpentError where the time is over."""
-        if time.monotonic() > self.until:
+    def check(self, step: str, *, reserve: float = 0.0) -> None:
+        """Tell the step that comes next; BudgetSpentError where the time is over.
+
+        A step that others wait for leaves them a ``reserve`` of the whole time [1].
+        """
+        if time.monotonic() > self.until - reserve * self._whole_s:
             raise BudgetSpentError(step)
         self.tell(step)
 

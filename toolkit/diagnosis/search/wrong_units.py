@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,20 +92,26 @@ def _free_factors(
     ratios = {unit.active.channel: factor_of(unit.active) for unit in units[::-1] if _is_ratio(unit)}
     for place in {each.channel: each for each in _ratios(problem) if is_ratio(each.effect)}.values():
 
-        def left(log_factor: float, least: float = math.inf, place: AppliedEffect = place) -> float:
+        def left(
+            log_factor: float, made: Fit, least: float = math.inf, place: AppliedEffect = place
+        ) -> float:
             applied = free_factor(place, math.exp(log_factor))
-            errors = [_left(problem, made, applied, wrong, least) for made in fits]
-            return min((error for error in errors if error is not None), default=math.inf)
+            error = _left(problem, made, applied, wrong, least)
+            return math.inf if error is None else error
 
         reach, step = math.log(UNITS.farthest), 2 * math.log(UNITS.farthest) / (UNITS.steps - 1)
         logs = [step * i - reach for i in range(UNITS.steps)]
         logs += [math.log(ratios[place.channel])] if place.channel in ratios else []
-        best, least = 0.0, math.inf
+        best, least, begun = 0.0, math.inf, fits[0]
         for log_factor in sorted(logs, key=abs):  # the farther off, the dearer: one that leaves more is left
-            error = left(log_factor, least)
-            best, least = (log_factor, error) if error < least else (best, least)
-        ends = (best - step, best + step)
-        nearer = minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": UNITS.steps})
+            for made in fits:
+                error = left(log_factor, made, least)
+                best, least, begun = (log_factor, error, made) if error < least else (best, least, begun)
+        # A joint fit goes on from there: it asks for no more digits than tell one ratio from another.
+        nearer = minimize_scalar(
+            partial(left, made=begun), bounds=(best - step, best + step), method="bounded",
+            options={"maxiter": UNITS.steps, "xatol": UNITS.told},
+        )  # fmt: skip
         if nearer.fun < most:
             applied = free_factor(place, math.exp(nearer.x))
             values = dict(applied.values)

@@ -20,6 +20,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.linear_response import integrated
 from toolkit.diagnosis.simulators.rates import Track, reach_of, usual_speed
 from toolkit.diagnosis.simulators.setting import dimension, is_speed
+from toolkit.diagnosis.simulators.states import usual_step
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.forward import resisting
@@ -127,7 +128,7 @@ class Motion:
         return size / span, size, size * span
 
     def way(self) -> tuple[float, float]:
-        """Return the longest way of a run [position's unit], and the usual way from row to row.
+        """Return the longest way of a run [position's unit], and the usual way from row to row as it moves.
 
         None is passed unseen where the force stands on the rows' own positions.
         """
@@ -135,9 +136,7 @@ class Motion:
         columns = [run.columns[name] for run in self.case.runs if name in run.columns]
         columns = [column[np.isfinite(column)] for column in columns]
         spans = [float(np.ptp(column)) for column in columns if len(column)]
-        steps = [np.abs(np.diff(column)) for column in columns if len(column) > 1]
-        unseen = bool(steps) and self.kind != "force"
-        return max(spans, default=0.0), float(np.median(np.concatenate(steps))) if unseen else 0.0
+        return max(spans, default=0.0), 0.0 if self.kind == "force" else usual_step(columns)
 
     def pushed(
         self,

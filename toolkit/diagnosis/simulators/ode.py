@@ -34,6 +34,7 @@ from toolkit.diagnosis.simulators.states import (
     state_names,
     state_units,
     term_places,
+    usual_step,
     way_of,
 )
 from toolkit.diagnosis.simulators.trajectory import Guesses, Path, trajectories
@@ -134,11 +135,10 @@ class OdeModel:
             for state, run in zip(states, runs, strict=True)
         ]
         fastest = np.abs(np.concatenate(rates, axis=1)).max(axis=1)
-        steps = [np.abs(np.diff(state, axis=1)) for state in states]
         self.ways = {
             name: (
                 max(float(np.ptp(state[i])) for state in states),
-                float(np.median(np.concatenate([step[i] for step in steps] or [np.zeros(1)]))),
+                usual_step([state[i] for state in states]),
             )
             for i, name in enumerate(self.states)
         }

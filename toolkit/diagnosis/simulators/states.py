@@ -165,6 +165,20 @@ def way_of(rates: Sequence[Array], times: Sequence[Array]) -> float:
     return float(np.std(np.concatenate(ways)))
 
 
+def usual_step(places: Sequence[Array]) -> float:
+    """Return the step from row to row in the middle of all that is travelled, 0 where nothing moves.
+
+    Half of the way is made in shorter ones. Rows at rest, however many, make none of it.
+
+    Parameters
+    ----------
+    places : of every run, shape (rows,) each, all finite
+    """
+    steps = np.sort(np.concatenate([np.zeros(1), *(np.abs(np.diff(place)) for place in places)]))
+    way = np.cumsum(steps)
+    return float(steps[np.searchsorted(way, 0.5 * way[-1])])
+
+
 def state_names(case: Case, count: int) -> tuple[str, ...]:
     """Return the names of an equation's states, of which ``count`` have initial values.
 
