@@ -10,16 +10,18 @@ import pytest
 
 from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import carriage, write_case
-from toolkit.diagnosis.answer.answer import Dependence
+from toolkit.diagnosis.answer.answer import Dependence, RejectedEffect
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.sensor_noise import ChannelNoise
 from toolkit.findings import Finding
 from toolkit.lab.studies.diagnosis import diagnosis_text
 from toolkit.report.diagnosis import figures
+from toolkit.report.diagnosis.answer import Told, rejected
 from toolkit.report.diagnosis.figures import size_maps, variables
 from toolkit.report.diagnosis.numbers import chance, few, over
 from toolkit.report.diagnosis.page import HEADLINES, cause, condition, headline, page
+from toolkit.report.style import Style
 
 
 @pytest.fixture(scope="module")
@@ -333,6 +335,18 @@ def test_what_has_no_name_has_a_list_of_what_it_is_not(dragged):
     unknown = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=())
     assert "why it is not named" in words_of(dataclasses.replace(dragged, diagnosis=unknown))
     assert "why it is not named" not in words_of(dragged)
+
+
+def test_the_rivals_that_are_listed_are_the_nearest(dragged):
+    """Ten rivals, as older answers have them: the farthest first."""
+    rivals = tuple(RejectedEffect(name=f"rival{k}", log_likelihood_less=10.0 * k) for k in range(10, 0, -1))
+    (effect,) = dragged.diagnosis.effects
+    answer = dataclasses.replace(dragged.diagnosis, effects=(dataclasses.replace(effect, rejected=rivals),))
+    assert "(log-likelihood less): rival1 (by 10.0), rival2 (by 20.0), rival3" in words_of(
+        dataclasses.replace(dragged, diagnosis=answer)
+    )
+    listed = [name for _, name, _ in rejected.build(Told(answer=answer), Style())]
+    assert listed == [f"rival{k}" for k in range(1, 7)]
 
 
 def test_a_long_curve_keeps_its_extremes():

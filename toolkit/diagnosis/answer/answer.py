@@ -111,8 +111,13 @@ class DiagnosedEffect:
         tuple[str, ...],
         Entry("effects, last a parameter of the simulation, that this recording cannot tell from it"),
     ]
-    rejected: tuple[RejectedEffect, ...]
+    rejected: Annotated[tuple[RejectedEffect, ...], Entry("the nearest first")]
     evidence: EffectEvidence
+
+    def __post_init__(self) -> None:
+        """Put the nearest rival first, in older answers too: whoever cuts the list drops the farthest."""
+        nearest = sorted(self.rejected, key=lambda other: other.log_likelihood_less)
+        object.__setattr__(self, "rejected", tuple(nearest))
 
     @property
     def key(self) -> EffectKey:
