@@ -47,9 +47,8 @@ class _Rows:
     )
     outliers: float = _set(0.03, "of a run's rows", "more than that is no outlier but a pattern")
     sharp: float = _set(0.5, "of a run's outliers", "beside sharp moves of an input: they may answer it")
-    coincidence: float = _set(
-        0.001, "chance of as many", "a lone outlier may stand beside a turn of the input; a dozen do not"
-    )
+    coincidence: float = _set(0.001, "chance of as many", "beside turns of the input: a dozen do not by it")
+    smooth: float = _set(2.0, "times a mismatch's noise", "a rougher recording does not lead from row to row")
     fewest_for_outliers: int = _set(12, "rows of a run", "fewer have no scatter that a row could be far off")
     folds: int = _set(5, "parts", "each fit sees four fifths of the rows, at the price of five fits")
     fewest: int = _set(3, "rows of an output", "with as many nothing can be told apart from anything")

@@ -198,9 +198,7 @@ def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
             f"{subject} differs from run to run: repeat one run unchanged, and note what else changed."
         )
     if "time" in variables:
-        sentences.append(
-            f"{subject} goes with time: {_TO_PART_TIME[min(len(inputs), 2)].format(*inputs)}."
-        )
+        sentences.append(f"{subject} goes with time: {_TO_PART_TIME[min(len(inputs), 2)].format(*inputs)}.")
     return sentences or [_WHERE_NOTHING_TELLS[min(len(inputs), 2)].format(*inputs)]
 
 
