@@ -471,8 +471,12 @@ class _Verdict:
     open_interval: float = _set(1e5, "times the value", "a wider interval is none: the data leave it open")
     power: float = _set(0.8, "probability", "with which the smallest detectable size would have been found")
     far: float = _set(1e3, "times the usual size", "no response is in proportion over so many sizes")
+    moved: float = _set(0.25, "of an output's range", "a larger response that is not seen is no size to tell")
+    of_a_run: float = _set(
+        0.5, "of the longest run", "a later channel has fewer rows to show it than it loses"
+    )
     observable: float = _set(
-        1e-3, "of a response", "left beside the nominal parameters, or nothing is seen of it"
+        1e-3, "of a response", "left by the nominal parameters, or nothing is seen of it"
     )
 
 

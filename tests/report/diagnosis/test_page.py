@@ -72,7 +72,8 @@ def test_a_search_that_was_cut_off_does_not_say_that_no_effect_explains(dragged)
     )
     assert "before every known effect was tried" in headline(cut)
     assert "no known effect explains" in headline(dataclasses.replace(cut, skipped=("predictions",)))
-    assert headline(dataclasses.replace(cut, complete=True, skipped=())) == HEADLINES["unknown"]
+    whole = headline(dataclasses.replace(cut, complete=True, skipped=()))
+    assert whole.startswith(HEADLINES["unknown"].removesuffix("."))
 
 
 @pytest.mark.parametrize(("step", "is_said"), [("laws", True), ("swaps", True), ("predictions", False)])
@@ -268,7 +269,27 @@ def test_the_first_line_says_that_a_name_is_not_the_whole(dragged):
     whole = dataclasses.replace(dragged.diagnosis, remaining="nothing")
     part = dataclasses.replace(dragged.diagnosis, remaining="unknown")
     assert headline(whole) == HEADLINES[whole.verdict]
-    assert headline(part) == f"{HEADLINES[part.verdict]} More is left that no known effect explains."
+    assert headline(part).startswith(
+        f"{HEADLINES[part.verdict]} More is left that no known effect explains: F is off by "
+    )
+
+
+@pytest.mark.parametrize("skipped", [(), ("step 2: screening 150 candidates",)])
+def test_the_first_line_says_how_large_is_what_has_no_name(dragged, skipped):
+    """A house: 0.21 K of a temperature that varies by 4.7 K is 4.5 %; an answer of old does not know it."""
+    (fit,) = dragged.diagnosis.fit.held_out
+    assert fit.spread == pytest.approx(np.std(dragged.search.problem.observed["F"]))
+    house = dataclasses.replace(fit, channel="T", unit="K", augmented_rmse=0.2099, spread=4.7)
+    quiet = dataclasses.replace(fit, channel="P", unit="W", augmented_rmse=9.0, spread=9.0)
+    answer = dataclasses.replace(
+        dragged.diagnosis, verdict="unknown", effects=(), skipped=skipped,
+        depends_on=(Dependence(channel="T", variables=("sun",)),),
+        fit=dataclasses.replace(dragged.diagnosis.fit, held_out=(quiet, house)),
+    )  # fmt: skip
+    assert ": T is off by 0.21 K, 4.5 % of its spread" in headline(answer)
+    old = dataclasses.replace(house, spread=None)
+    answer = dataclasses.replace(answer, fit=dataclasses.replace(answer.fit, held_out=(old,)))
+    assert "off by" not in headline(answer)
 
 
 @pytest.mark.parametrize(

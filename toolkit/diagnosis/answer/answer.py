@@ -245,6 +245,9 @@ class HeldOutChannel:
     noise_floor: OrNan
     with_laws_rmse: Annotated[float | None, Entry("with the laws of what has no name too")] = None
     noise: Annotated[ChannelNoise | None, Entry("null where no fit was made, and in older answers")] = None
+    spread: Annotated[
+        float | None, Entry("standard deviation of what was recorded of it; null as of `noise`")
+    ] = None
 
     @property
     def sensor_sd(self) -> float | None:
